@@ -1,0 +1,153 @@
+"""A mission: what the robot is sent, exactly as mission.json holds it.
+
+Metres, radians counter-clockwise from +x, seconds; keys that end in `_deg` are degrees.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any, Literal
+
+import msgspec
+
+from mission.settings import Settings
+
+SCHEMA = "stopgo/mission"
+VERSION = 1
+
+Point = tuple[float, float]
+OnFailure = Literal["retry", "skip", "ask", "abort", "home"]
+
+
+class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Base of every part of the document: frozen, and strict about unknown keys."""
+
+
+class Transform(Document):
+    """Site to map: turn by `heading`, then shift by (x, y)."""
+
+    x: float
+    y: float
+    heading: float
+
+
+class Frame(Document):
+    name: str
+    to_map: Transform | None = None
+
+
+class SiteOrigin(Document):
+    """WGS84 position of the frame's origin; heading is the bearing of +y clockwise from true north."""
+
+    lat: float
+    lon: float
+    alt: float
+    heading_deg: float
+
+
+class RobotSpec(Document):
+    radius: float
+    speed: float
+    turn_rate: float
+    """Radians per second."""
+    acceleration: float
+
+
+class ScannerSpec(Document):
+    profile: str
+    range: float
+    fov_deg: float = 360.0
+
+
+class Start(Document):
+    x: float
+    y: float
+    heading: float
+    reason: str
+
+
+class Scan(Document):
+    profile: str
+    duration_s: float
+    timeout_s: float
+
+
+class Sees(Document):
+    units: int
+    """Target units this stop sees."""
+    new_units: int
+    """Of those, the ones that no stop before it on the route sees."""
+
+
+class Stop(Document):
+    id: str
+    x: float
+    y: float
+    heading: float
+    doorway: bool
+    tolerance_m: float
+    settle_s: float
+    scan: Scan
+    on_failure: OnFailure
+    retries: int
+    approach: tuple[Point, ...]
+    """Polyline from the stop before (or the start) to this stop, both ends included."""
+    sees: Sees
+
+
+class Policy(Document):
+    link_loss: Literal["continue", "finish_stop", "hold", "home"]
+    link_loss_after_s: float
+    battery_min: float
+
+
+class Origin(Document):
+    """What the mission was made from."""
+
+    floor: str
+    floor_digest: str
+    parameters: Settings
+    stopgo: str
+
+
+class Mission(Document, kw_only=True):
+    """A route of scan stops, in the order of driving."""
+
+    schema: Literal["stopgo/mission"] = SCHEMA
+    version: Literal[1] = VERSION
+    id: str
+    revision: int
+    name: str
+    digest: str
+    frame: Frame
+    georeference: SiteOrigin | None
+    robot: RobotSpec
+    scanner: ScannerSpec
+    start: Start
+    stops: tuple[Stop, ...]
+    return_: tuple[Point, ...] | None = msgspec.field(name="return")
+    policy: Policy
+    origin: Origin
+
+
+def canonical(document: dict[str, Any]) -> bytes:
+    """Canonical JSON: keys sorted, no spaces, shortest numbers that read back the same."""
+    return msgspec.json.encode(document, order="deterministic")
+
+
+def digest_of(mission: Mission) -> str:
+    """sha256 of the mission's canonical JSON without its `digest`, hexadecimal."""
+    document = msgspec.to_builtins(mission)
+    del document["digest"]
+    return hashlib.sha256(canonical(document)).hexdigest()
+
+
+def sealed(mission: Mission) -> Mission:
+    """The same mission with its `digest` set."""
+    return msgspec.structs.replace(mission, digest=digest_of(mission))
+
+
+def mission_id(floor_digest: str, settings: Settings, version: str, part: int = 0) -> str:
+    """Hash of floor, parameters, version and part: known before planning, and the recording id."""
+    basis = [floor_digest, msgspec.to_builtins(settings), version, part]
+    return hashlib.sha256(canonical({"basis": basis})).hexdigest()[:32]

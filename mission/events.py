@@ -1,0 +1,147 @@
+"""What a robot tells while it runs a mission: events from its journal, and telemetry.
+
+Times are nanoseconds on the robot's clock (`robot_ns`, since 1970) and seconds since the run began
+(`mission_time_s`). Poses are in the mission's frame.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+State = Literal["IDLE", "READY", "RUNNING", "PAUSED", "HELD", "HOMING", "FINISHED", "ABORTED"]
+StopState = Literal[
+    "WAITING",
+    "NAVIGATING",
+    "SETTLING",
+    "SCANNING",
+    "VERIFYING",
+    "DONE",
+    "RETRIABLE",
+    "SKIPPED",
+    "FAILED",
+]
+
+
+class Pose(msgspec.Struct, frozen=True, kw_only=True):
+    x: float
+    y: float
+    heading: float
+
+
+class Event(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="event"):
+    """One line of the robot's journal; `number` counts from 1 and never repeats on a robot."""
+
+    number: int
+    robot: str
+    boot_id: str
+    run_id: str
+    mission_id: str
+    revision: int
+    robot_ns: int
+    mission_time_s: float
+
+
+class Started(Event, frozen=True, kw_only=True):
+    commander: str
+
+
+class Arrived(Event, frozen=True, kw_only=True):
+    stop: str
+    pose: Pose
+    deviation_m: float
+    """Distance of the pose from the stop."""
+
+
+class Settled(Event, frozen=True, kw_only=True):
+    stop: str
+    pose: Pose
+
+
+class Scanned(Event, frozen=True, kw_only=True):
+    stop: str
+    pose: Pose
+    file: str
+    size: int
+    sha256: str
+    points: int
+
+
+class Skipped(Event, frozen=True, kw_only=True):
+    stop: str
+    reason: str
+
+
+class Failed(Event, frozen=True, kw_only=True):
+    stop: str
+    reason: str
+
+
+class Held(Event, frozen=True, kw_only=True):
+    reason: str
+
+
+class Paused(Event, frozen=True, kw_only=True):
+    reason: str
+
+
+class Resumed(Event, frozen=True, kw_only=True):
+    commander: str
+
+
+class Finished(Event, frozen=True, kw_only=True):
+    pass
+
+
+class Aborted(Event, frozen=True, kw_only=True):
+    reason: str
+
+
+AnyEvent = (
+    Started
+    | Arrived
+    | Settled
+    | Scanned
+    | Skipped
+    | Failed
+    | Held
+    | Paused
+    | Resumed
+    | Finished
+    | Aborted
+)
+
+
+class StateReport(msgspec.Struct, frozen=True, kw_only=True):
+    """A full snapshot, sent on every change and at least every second."""
+
+    robot: str
+    boot_id: str
+    seq: int
+    robot_ns: int
+    state: State
+    run_id: str | None
+    mission_id: str | None
+    revision: int | None
+    stop: str | None
+    stop_state: StopState | None
+    done: tuple[str, ...]
+    skipped: tuple[str, ...]
+    battery: float
+    """0 to 1."""
+    last_event: int
+    """Number of the newest event in the journal, 0 if none."""
+
+
+class PoseReport(msgspec.Struct, frozen=True, kw_only=True):
+    """Where the robot is, 10 to 50 times a second."""
+
+    robot: str
+    boot_id: str
+    seq: int
+    robot_ns: int
+    run_id: str | None
+    mission_time_s: float | None
+    pose: Pose
+    speed: float

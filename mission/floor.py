@@ -1,0 +1,130 @@
+"""A floor as it was read: outline, rooms, openings, elements, and what was odd about the input."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from mission.geometry import FloatArray, Polygon
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something odd in the input that travels with the noun made from it."""
+
+    code: str
+    """A short fixed word per kind of finding, such as `unknown_layer` or `narrow_door`."""
+    message: str
+    """One sentence a person reads, naming the thing and the value."""
+    element: str | None = None
+    """Id of the element, opening or room it is about."""
+    at: tuple[float, float] | None = None
+    """Where, in the drawing's metres."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What an element of a layer means to the laser and to the robot."""
+
+    name: str
+    occludes: bool
+    obstacle: bool
+    target: bool
+
+
+KINDS: dict[str, Kind] = {
+    kind.name: kind
+    for kind in (
+        Kind("walls", occludes=True, obstacle=True, target=True),
+        Kind("columns", occludes=True, obstacle=True, target=True),
+        Kind("beams", occludes=False, obstacle=False, target=True),
+        Kind("stairs", occludes=True, obstacle=True, target=False),
+        Kind("windows", occludes=False, obstacle=True, target=False),
+        Kind("railings", occludes=False, obstacle=True, target=False),
+        Kind("other", occludes=False, obstacle=True, target=False),
+    )
+}
+"""Every element kind with its defaults; `other` is a closed shape on a layer nobody named."""
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """A building element's plan: filled shapes, open lines, or both."""
+
+    id: str
+    kind: str
+    solids: tuple[Polygon, ...] = ()
+    """Closed shapes, filled."""
+    lines: tuple[FloatArray, ...] = ()
+    """Open polylines, each (n, 2)."""
+    global_id: str | None = None
+    """IFC GlobalId, where the drawing carries one."""
+    occludes: bool = False
+    obstacle: bool = False
+    target: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """A room's area, wall face to wall face; `name` is empty when the drawing gives none."""
+
+    id: str
+    name: str
+    polygons: tuple[Polygon, ...]
+    global_id: str | None = None
+
+    @property
+    def label(self) -> str:
+        return self.name or self.id
+
+    @property
+    def area(self) -> float:
+        """Area in m²."""
+        return sum(polygon.area for polygon in self.polygons)
+
+
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """A door or an open passage, as the line across it (2, 2)."""
+
+    id: str
+    kind: str
+    """`door` or `passage`."""
+    line: FloatArray
+    global_id: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Georeference:
+    """Where the site's origin is: WGS84 degrees, metres, and the bearing of +y clockwise from true north."""
+
+    lat: float
+    lon: float
+    alt: float
+    heading_deg: float
+
+
+@dataclass(frozen=True, eq=False)
+class FloorPlan:
+    """A floor in the drawing's own coordinates, in metres."""
+
+    name: str
+    digest: str
+    """sha256 of the file's bytes, hexadecimal."""
+    outline: tuple[Polygon, ...]
+    """The floor layer: every part of it, holes included."""
+    rooms: tuple[Room, ...] = ()
+    openings: tuple[Opening, ...] = ()
+    elements: tuple[Element, ...] = ()
+    level: str | None = None
+    georeference: Georeference | None = None
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def area(self) -> float:
+        """Area in m² of the outline, holes subtracted."""
+        return sum(polygon.area for polygon in self.outline)
+
+    def with_targets(self, kinds: tuple[str, ...]) -> FloorPlan:
+        """The same floor, where exactly the elements of `kinds` are to be scanned."""
+        elements = tuple(replace(item, target=item.kind in kinds) for item in self.elements)
+        return replace(self, elements=elements)

@@ -1,0 +1,305 @@
+"""The nouns between a floor and a mission, one per stage; each keeps the noun it was made from.
+
+Distances are metres, areas m², angles radians counter-clockwise from +x. Arrays are read-only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from mission.floor import Element, Finding, FloorPlan, Opening, Room
+from mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen, polyline_length
+from mission.settings import Settings
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """What is to be scanned: boundary segments, each cut into units of at most d_dis (paper, 3.1)."""
+
+    a: FloatArray
+    """Start of each segment (m, 2)."""
+    b: FloatArray
+    """End of each segment (m, 2)."""
+    units: IntArray
+    """Units on each segment (m,); unit i of n lies at the fraction (i + 1/2) / n from a to b."""
+    element: IntArray
+    """Index of each segment's element in `FloorPlan.elements` (m,)."""
+    occluding: BoolArray
+    """True where the segment is a face of an occluding solid, seen from outside only (m,)."""
+    raw: dict[str, int]
+    """Units per kind before touching solids are unioned, the paper's Table 2."""
+
+    @property
+    def total(self) -> int:
+        """Number of units."""
+        return int(self.units.sum())
+
+    @cached_property
+    def first_unit(self) -> IntArray:
+        """Number of the first unit of each segment, and the total at the end (m + 1,)."""
+        return frozen(np.concatenate([[0], np.cumsum(self.units)]), np.int64)
+
+    @cached_property
+    def unit_segment(self) -> IntArray:
+        """Segment of each unit (n,)."""
+        return frozen(np.repeat(np.arange(len(self.units)), self.units), np.int64)
+
+    @cached_property
+    def unit_xy(self) -> FloatArray:
+        """Midpoint of each unit (n, 2)."""
+        within = np.arange(self.total) - self.first_unit[:-1][self.unit_segment]
+        t = (within + 0.5) / self.units[self.unit_segment]
+        a, b = self.a[self.unit_segment], self.b[self.unit_segment]
+        return frozen(a + t[:, None] * (b - a))
+
+    def by_kind(self, elements: tuple[Element, ...]) -> dict[str, int]:
+        """Units per element kind."""
+        counts: dict[str, int] = {}
+        for index, units in zip(self.element, self.units, strict=True):
+            kind = elements[int(index)].kind
+            counts[kind] = counts.get(kind, 0) + int(units)
+        return dict(sorted(counts.items()))
+
+
+@dataclass(frozen=True, eq=False)
+class OpeningState:
+    """What an opening is to the robot."""
+
+    opening: Opening
+    rooms: tuple[int | None, int | None]
+    """Indices into `FloorPlan.rooms` of the rooms on its two sides."""
+    clear_width: float
+    """Widest clear piece of the line between obstacles."""
+    passable: bool
+    why: str
+    """Empty when passable, else the reason in words."""
+
+
+@dataclass(frozen=True, eq=False)
+class RoomSpace:
+    """Where in a room stops may be (for pictures and areas: points are decided exactly)."""
+
+    room: int | None
+    """Index into `FloorPlan.rooms`; None for the floor outside every room."""
+    name: str
+    area: tuple[Polygon, ...]
+    """The room itself, as planned (rooms inside it subtracted)."""
+    stop_area: tuple[Polygon, ...]
+    """Points at least d_sec from every element and `edge` from floor edges."""
+
+
+@dataclass(frozen=True, eq=False)
+class NavigableSpace:
+    """Where the robot's centre may be, and what it is to look at."""
+
+    floor: FloorPlan
+    settings: Settings
+    rooms: tuple[RoomSpace, ...]
+    openings: tuple[OpeningState, ...]
+    obstacles: tuple[Polygon, ...]
+    """Everything a robot must keep away from, unioned."""
+    occluders: tuple[Polygon, ...]
+    """Everything a laser does not pass, unioned."""
+    barriers: FloatArray
+    """Openings that are not driven through, as segments (k, 2, 2)."""
+    drive_area: tuple[Polygon, ...]
+    """Where the robot's centre may drive."""
+    gaps: FloatArray
+    """Straight crossings (k, 2, 2) of openings exactly as wide as the robot, between drive areas."""
+    targets: Targets
+    findings: tuple[Finding, ...] = ()
+
+
+DROP_REASONS = (
+    "kept",
+    "outside the room",
+    "in a hole",
+    "closer than d_sec to an element",
+    "closer than the edge distance to a floor edge",
+    "not reachable by the robot",
+    "in another part of the floor",
+)
+"""Why a candidate was dropped; `Candidates.reason` holds indices into this."""
+KEPT, OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, UNREACHABLE, OTHER_PART = range(len(DROP_REASONS))
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Possible scan positions, those that were dropped included, each with the reason."""
+
+    space: NavigableSpace
+    xy: FloatArray
+    """Positions (n, 2)."""
+    room: IntArray
+    """Index into `NavigableSpace.rooms` (n,)."""
+    reason: IntArray
+    """Index into DROP_REASONS (n,)."""
+    part: IntArray
+    """Part of the floor each reachable candidate belongs to, else -1 (n,)."""
+    strategy: str
+    chosen_part: int = 0
+    """The part this plan is of."""
+    part_area: tuple[float, ...] = ()
+    """Free area of each part, m²."""
+
+    @cached_property
+    def kept(self) -> IntArray:
+        """Indices of the reachable candidates."""
+        return frozen(np.flatnonzero(self.reason == KEPT), np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Visibility:
+    """What each kept candidate sees, as runs of units on segments.
+
+    Run k of candidate row c, `pointer[c] <= k < pointer[c + 1]`, says that units `first[k]` to
+    `last[k]` (inclusive, counted over all targets) lie visible on `segment[k]`.
+    """
+
+    candidates: Candidates
+    pointer: IntArray
+    segment: IntArray
+    first: IntArray
+    last: IntArray
+    method: str
+
+    @property
+    def targets(self) -> Targets:
+        return self.candidates.space.targets
+
+    @property
+    def rows(self) -> int:
+        """Number of candidates, in the order of `candidates.kept`."""
+        return len(self.pointer) - 1
+
+    def seen_by(self, row: int) -> IntArray:
+        """Units that the candidate of this row sees, ascending."""
+        start, stop = int(self.pointer[row]), int(self.pointer[row + 1])
+        if start == stop:
+            return frozen([], np.int64)
+        first, last = self.first[start:stop], self.last[start:stop]
+        lengths = last - first + 1
+        offsets = np.repeat(first - np.concatenate([[0], np.cumsum(lengths)[:-1]]), lengths)
+        return frozen(np.unique(np.arange(int(lengths.sum())) + offsets), np.int64)
+
+    @cached_property
+    def visible(self) -> BoolArray:
+        """Whether any candidate sees each unit (n,)."""
+        return self.seen_from(np.arange(self.rows))
+
+    def seen_from(self, rows: IntArray) -> BoolArray:
+        """Whether any of the candidates in `rows` sees each unit (n,)."""
+        change = np.zeros(self.targets.total + 1, dtype=np.int64)
+        for row in rows:
+            start, stop = int(self.pointer[row]), int(self.pointer[row + 1])
+            np.add.at(change, self.first[start:stop], 1)
+            np.add.at(change, self.last[start:stop] + 1, -1)
+        return frozen(np.cumsum(change[:-1]) > 0, np.bool_)
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The chosen candidates, in the order they were chosen."""
+
+    visibility: Visibility
+    chosen: IntArray
+    """Rows of `visibility` (k,)."""
+    coverage_steps: FloatArray
+    """Coverage after each choice (k,)."""
+    required: float
+    bound: int
+    """No selection that reaches the required coverage has fewer stops."""
+    method: str
+
+    @property
+    def coverage(self) -> float:
+        """Share of the visible units that the chosen stops see."""
+        return float(self.coverage_steps[-1]) if len(self.coverage_steps) else 0.0
+
+    @cached_property
+    def xy(self) -> FloatArray:
+        """Positions of the chosen candidates (k, 2)."""
+        candidates = self.visibility.candidates
+        return frozen(candidates.xy[candidates.kept[self.chosen]].reshape(-1, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """The order of the stops and the way between them."""
+
+    selection: Selection
+    order: IntArray
+    """Indices into `selection.chosen`, in the order of driving (k,)."""
+    start: tuple[float, float, float]
+    """Where the route begins: x, y, heading."""
+    start_reason: str
+    approaches: tuple[FloatArray, ...]
+    """For each stop in order, the polyline (n, 2) driven to it from the stop before (or the start)."""
+    return_leg: FloatArray | None
+    """The polyline back to the start of a closed tour, or on to a given end."""
+    tour: str
+    """`closed` or `open`."""
+    bound: float
+    """No route over these stops is shorter."""
+    method: str
+
+    @cached_property
+    def length(self) -> float:
+        legs = self.approaches if self.return_leg is None else (*self.approaches, self.return_leg)
+        return sum(polyline_length(leg) for leg in legs)
+
+    @cached_property
+    def xy(self) -> FloatArray:
+        """Stop positions in the order of driving (k, 2)."""
+        return frozen(self.selection.xy[self.order].reshape(-1, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """How long the mission is planned to take, in seconds."""
+
+    drive_s: float
+    turn_s: float
+    settle_s: float
+    scan_s: float
+    arrival_s: FloatArray = field(default_factory=lambda: frozen([]))
+    """Planned time of arrival at each stop, from the mission's start (k,)."""
+
+    @property
+    def total_s(self) -> float:
+        return self.drive_s + self.turn_s + self.settle_s + self.scan_s
+
+
+@dataclass(frozen=True, eq=False)
+class Unreached:
+    """A room that the plan does not enter, and why."""
+
+    room: str
+    why: str
+    area_m2: float
+
+
+__all__ = [
+    "AT_EDGE",
+    "DROP_REASONS",
+    "IN_HOLE",
+    "KEPT",
+    "OTHER_PART",
+    "OUTSIDE",
+    "TOO_CLOSE",
+    "UNREACHABLE",
+    "Candidates",
+    "NavigableSpace",
+    "OpeningState",
+    "Room",
+    "RoomSpace",
+    "Route",
+    "Schedule",
+    "Selection",
+    "Targets",
+    "Unreached",
+    "Visibility",
+]

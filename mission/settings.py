@@ -1,0 +1,217 @@
+"""Every parameter of a plan, with its default; read from plan.toml, overridden by options.
+
+Names are those of the command's options with underscores. What a person types is metres, seconds and
+degrees, as here; see planning notes of each name for the paper's symbol.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from mission.errors import InputError
+from mission.floor import KINDS
+
+
+class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """All parameters of a plan. `None` means: decided from the others or from the floor."""
+
+    # [plan]
+    candidates: str = "grid"
+    visibility: str = "exact"
+    selector: str = "default"
+    router: str = "default"
+    coverage: float = 0.9
+    """c_min: share of the visible units that the chosen stops must see."""
+    d_sec: float = 0.7
+    """Least distance from a stop to any element."""
+    d_dis: float = 0.05
+    """Greatest length of a unit (Eq. 1)."""
+    grid: float = 1.0
+    """r_grid: greatest spacing of grid candidates."""
+    door_access: float = 0.7
+    """Least clear width of an opening that is driven through."""
+    edge: float = 0.35
+    """Least distance of stops and legs from floor edges and holes."""
+    doors: Literal["open", "closed"] = "open"
+    """Whether the laser passes doors; closed is the paper's "range restricted to rooms"."""
+    targets: tuple[str, ...] | None = None
+    """Element kinds to be scanned."""
+    tour: Literal["closed", "open"] | None = None
+    start: tuple[float, float, float] | None = None
+    """x, y in metres and heading in degrees counter-clockwise from +x."""
+    end: tuple[float, float] | None = None
+    origin: tuple[float, float, float, float] | None = None
+    """Latitude, longitude, altitude of the drawing's origin, and the bearing of its +y axis."""
+    seed: int = 1
+    # [robot]
+    robot_radius: float | None = None
+    speed: float = 0.5
+    turn_rate: float = 45.0
+    """Degrees per second."""
+    acceleration: float = 0.5
+    """Metres per second squared."""
+    # [scanner]
+    range: float = 5.0
+    """r: the scanner's range."""
+    profile: str = "default"
+    settle: float = 2.0
+    scan_time: float = 60.0
+    # [policy]
+    tolerance: float = 0.05
+    """Greatest distance of the robot from a stop at the start of its scan."""
+    on_failure: Literal["retry", "skip", "ask", "abort", "home"] = "ask"
+    retries: int = 1
+    link_loss: Literal["continue", "finish_stop", "hold", "home"] = "continue"
+    link_loss_after: float = 30.0
+    battery_min: float = 0.15
+
+    @property
+    def radius(self) -> float:
+        """The robot's radius in metres: half of door_access unless given."""
+        return self.door_access / 2 if self.robot_radius is None else self.robot_radius
+
+
+SECTIONS: dict[str, tuple[str, ...]] = {
+    "plan": (
+        *("candidates", "visibility", "selector", "router", "coverage", "d_sec", "d_dis", "grid"),
+        *("door_access", "edge", "doors", "targets", "tour", "start", "end", "origin", "seed"),
+    ),
+    "robot": ("robot_radius", "speed", "turn_rate", "acceleration"),
+    "scanner": ("range", "profile", "settle", "scan_time"),
+    "policy": (
+        *("tolerance", "on_failure", "retries", "link_loss", "link_loss_after", "battery_min"),
+    ),
+}
+"""The tables of plan.toml and the keys in each."""
+
+_POSITIVE = (
+    *("d_dis", "grid", "door_access", "robot_radius", "speed", "turn_rate"),
+    "acceleration",
+    "range",
+    "tolerance",
+)
+_NOT_NEGATIVE = ("d_sec", "edge", "settle", "scan_time", "retries", "link_loss_after", "seed")
+_LIMIT = 1e6
+
+
+def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
+    """Settings from plan.toml (if given) and then `overrides`; both are checked.
+
+    Raises
+    ------
+    InputError
+        Naming the file or option, the key, the value and what would be right.
+    """
+    values = {} if path is None else _read_toml(path)
+    values.update({key: value for key, value in overrides.items() if value is not None})
+    try:
+        settings = msgspec.convert(values, Settings)
+    except msgspec.ValidationError as error:
+        key = str(error).rpartition("`$.")[2].strip("`") if "`$." in str(error) else ""
+        shown = f" {key} = {values[key]!r}" if key in values else ""
+        raise InputError(f"{path or 'options'}:{shown}: {error}") from None
+    check_settings(settings)
+    return settings
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a TOML file ({error})") from None
+    values: dict[str, Any] = {}
+    for table, content in document.items():
+        if table not in SECTIONS or not isinstance(content, dict):
+            raise InputError(f"{path}: unknown table [{table}]; known: {', '.join(SECTIONS)}")
+        for key, value in content.items():
+            if key not in SECTIONS[table]:
+                raise InputError(f"{path}: unknown key {key} in [{table}]; {_home_of(key, table)}")
+            values[key] = value
+    return values
+
+
+def _home_of(key: str, table: str) -> str:
+    for section, keys in SECTIONS.items():
+        if key in keys:
+            return f"it belongs in [{section}]"
+    return f"known there: {', '.join(SECTIONS[table])}"
+
+
+def check_settings(settings: Settings) -> None:
+    """Refuse values that no plan can be made with, naming key and value."""
+    for key in settings.__struct_fields__:
+        for number in _numbers(getattr(settings, key)):
+            if not math.isfinite(number) or abs(number) > _LIMIT:
+                raise InputError(f"{key} = {number}: must be a finite number below {_LIMIT:g}")
+    for key in _POSITIVE:
+        value = getattr(settings, key)
+        if value is not None and value <= 0:
+            raise InputError(f"{key} = {value}: must be greater than 0")
+    for key in _NOT_NEGATIVE:
+        if getattr(settings, key) < 0:
+            raise InputError(f"{key} = {getattr(settings, key)}: must not be negative")
+    _check_shares(settings)
+    _check_choices(settings)
+
+
+def _numbers(value: object) -> list[float]:
+    values = value if isinstance(value, tuple) else (value,)
+    return [item for item in values if isinstance(item, int | float) and not isinstance(item, bool)]
+
+
+def _check_shares(settings: Settings) -> None:
+    if not 0 < settings.coverage <= 1:
+        raise InputError(
+            f"coverage = {settings.coverage}: must be above 0 and at most 1 (0.9 is 90 %)"
+        )
+    if not 0 <= settings.battery_min < 1:
+        raise InputError(f"battery_min = {settings.battery_min}: must be at least 0 and below 1")
+    if settings.d_dis < 1e-3:
+        raise InputError(
+            f"d_dis = {settings.d_dis}: units below 1 mm are not planned; use 0.001 or more"
+        )
+    if settings.grid < 0.05:
+        raise InputError(
+            f"grid = {settings.grid}: spacing below 5 cm is not planned; use 0.05 or more"
+        )
+
+
+def _check_choices(settings: Settings) -> None:
+    for kind in settings.targets or ():
+        if kind not in KINDS:
+            raise InputError(f"targets = {kind}: unknown kind; known: {', '.join(KINDS)}")
+    if settings.targets == ():
+        raise InputError(f"targets is empty; known: {', '.join(KINDS)}")
+    if settings.tour == "closed" and settings.end is not None:
+        raise InputError("tour = closed and end are both given; a closed tour ends where it starts")
+    if settings.origin is not None and not (
+        abs(settings.origin[0]) <= 90 and abs(settings.origin[1]) <= 180
+    ):
+        raise InputError(f"origin = {settings.origin}: latitude must be within ±90, longitude ±180")
+
+
+def settings_toml(settings: Settings) -> str:
+    """The settings as a plan.toml that reads back the same; what is undecided stands as a comment."""
+    lines: list[str] = []
+    for section, keys in SECTIONS.items():
+        lines.append(f"[{section}]")
+        for key in keys:
+            value = getattr(settings, key)
+            lines.append(
+                f"# {key} = (decided by stopgo)" if value is None else f"{key} = {_toml(value)}"
+            )
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_toml(item) for item in value) + "]"
+    return f'"{value}"' if isinstance(value, str) else repr(value)
