@@ -48,7 +48,7 @@ def build_app() -> typer.Typer:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command; returns its exit code (house rules: 0 done, 1 no, 2 bad input, 3 unknown, 130 Ctrl-C)."""
+    """Run one command; returns its exit code: 0 done, 1 no, 2 bad input, 3 unknown, 130 Ctrl-C."""
     try:
         command = typer.main.get_command(build_app())
         result = command.main(args=arguments, prog_name="stopgo", standalone_mode=False)

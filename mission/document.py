@@ -6,14 +6,14 @@ Metres, radians counter-clockwise from +x, seconds; keys that end in `_deg` are 
 from __future__ import annotations
 
 import hashlib
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import msgspec
 
 from mission.settings import Settings
 
-SCHEMA = "stopgo/mission"
-VERSION = 1
+SCHEMA: Final = "stopgo/mission"
+VERSION: Final = 1
 
 Point = tuple[float, float]
 OnFailure = Literal["retry", "skip", "ask", "abort", "home"]
@@ -23,7 +23,7 @@ class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Base of every part of the document: frozen, and strict about unknown keys."""
 
 
-class Transform(Document):
+class Transform(Document, frozen=True):
     """Site to map: turn by `heading`, then shift by (x, y)."""
 
     x: float
@@ -31,12 +31,12 @@ class Transform(Document):
     heading: float
 
 
-class Frame(Document):
+class Frame(Document, frozen=True):
     name: str
     to_map: Transform | None = None
 
 
-class SiteOrigin(Document):
+class SiteOrigin(Document, frozen=True):
     """WGS84 position of the frame's origin; heading is the bearing of +y clockwise from true north."""
 
     lat: float
@@ -45,7 +45,7 @@ class SiteOrigin(Document):
     heading_deg: float
 
 
-class RobotSpec(Document):
+class RobotSpec(Document, frozen=True):
     radius: float
     speed: float
     turn_rate: float
@@ -53,33 +53,33 @@ class RobotSpec(Document):
     acceleration: float
 
 
-class ScannerSpec(Document):
+class ScannerSpec(Document, frozen=True):
     profile: str
     range: float
     fov_deg: float = 360.0
 
 
-class Start(Document):
+class Start(Document, frozen=True):
     x: float
     y: float
     heading: float
     reason: str
 
 
-class Scan(Document):
+class Scan(Document, frozen=True):
     profile: str
     duration_s: float
     timeout_s: float
 
 
-class Sees(Document):
+class Sees(Document, frozen=True):
     units: int
     """Target units this stop sees."""
     new_units: int
     """Of those, the ones that no stop before it on the route sees."""
 
 
-class Stop(Document):
+class Stop(Document, frozen=True):
     id: str
     x: float
     y: float
@@ -95,13 +95,13 @@ class Stop(Document):
     sees: Sees
 
 
-class Policy(Document):
+class Policy(Document, frozen=True):
     link_loss: Literal["continue", "finish_stop", "hold", "home"]
     link_loss_after_s: float
     battery_min: float
 
 
-class Origin(Document):
+class Origin(Document, frozen=True):
     """What the mission was made from."""
 
     floor: str
@@ -110,7 +110,7 @@ class Origin(Document):
     stopgo: str
 
 
-class Mission(Document, kw_only=True):
+class Mission(Document, frozen=True, kw_only=True):
     """A route of scan stops, in the order of driving."""
 
     schema: Literal["stopgo/mission"] = SCHEMA

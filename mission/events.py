@@ -99,17 +99,7 @@ class Aborted(Event, frozen=True, kw_only=True):
 
 
 AnyEvent = (
-    Started
-    | Arrived
-    | Settled
-    | Scanned
-    | Skipped
-    | Failed
-    | Held
-    | Paused
-    | Resumed
-    | Finished
-    | Aborted
+    Started | Arrived | Settled | Scanned | Skipped | Failed | Held | Paused | Resumed | Finished | Aborted
 )
 
 

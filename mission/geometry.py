@@ -32,7 +32,7 @@ def ring_area(ring: FloatArray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Polygon:
-    """A region: `exterior` (n, 2) counter-clockwise, `holes` clockwise; rings do not repeat their first point."""
+    """A region: `exterior` (n, 2) counter-clockwise, `holes` clockwise; first points are not repeated."""
 
     exterior: FloatArray
     holes: tuple[FloatArray, ...] = ()

@@ -83,9 +83,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
     ),
     "robot": ("robot_radius", "speed", "turn_rate", "acceleration"),
     "scanner": ("range", "profile", "settle", "scan_time"),
-    "policy": (
-        *("tolerance", "on_failure", "retries", "link_loss", "link_loss_after", "battery_min"),
-    ),
+    "policy": (*("tolerance", "on_failure", "retries", "link_loss", "link_loss_after", "battery_min"),),
 }
 """The tables of plan.toml and the keys in each."""
 
@@ -168,19 +166,13 @@ def _numbers(value: object) -> list[float]:
 
 def _check_shares(settings: Settings) -> None:
     if not 0 < settings.coverage <= 1:
-        raise InputError(
-            f"coverage = {settings.coverage}: must be above 0 and at most 1 (0.9 is 90 %)"
-        )
+        raise InputError(f"coverage = {settings.coverage}: must be above 0 and at most 1 (0.9 is 90 %)")
     if not 0 <= settings.battery_min < 1:
         raise InputError(f"battery_min = {settings.battery_min}: must be at least 0 and below 1")
     if settings.d_dis < 1e-3:
-        raise InputError(
-            f"d_dis = {settings.d_dis}: units below 1 mm are not planned; use 0.001 or more"
-        )
+        raise InputError(f"d_dis = {settings.d_dis}: units below 1 mm are not planned; use 0.001 or more")
     if settings.grid < 0.05:
-        raise InputError(
-            f"grid = {settings.grid}: spacing below 5 cm is not planned; use 0.05 or more"
-        )
+        raise InputError(f"grid = {settings.grid}: spacing below 5 cm is not planned; use 0.05 or more")
 
 
 def _check_choices(settings: Settings) -> None:
@@ -191,9 +183,7 @@ def _check_choices(settings: Settings) -> None:
         raise InputError(f"targets is empty; known: {', '.join(KINDS)}")
     if settings.tour == "closed" and settings.end is not None:
         raise InputError("tour = closed and end are both given; a closed tour ends where it starts")
-    if settings.origin is not None and not (
-        abs(settings.origin[0]) <= 90 and abs(settings.origin[1]) <= 180
-    ):
+    if settings.origin is not None and not (abs(settings.origin[0]) <= 90 and abs(settings.origin[1]) <= 180):
         raise InputError(f"origin = {settings.origin}: latitude must be within ±90, longitude ±180")
 
 
@@ -204,9 +194,7 @@ def settings_toml(settings: Settings) -> str:
         lines.append(f"[{section}]")
         for key in keys:
             value = getattr(settings, key)
-            lines.append(
-                f"# {key} = (decided by stopgo)" if value is None else f"{key} = {_toml(value)}"
-            )
+            lines.append(f"# {key} = (decided by stopgo)" if value is None else f"{key} = {_toml(value)}")
         lines.append("")
     return "\n".join(lines)
 
