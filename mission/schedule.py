@@ -1,0 +1,59 @@
+"""How long a mission takes: a differential drive that stops, turns in place, drives straight, and scans."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+from mission.document import Mission, Point, RobotSpec
+from mission.geometry import frozen
+from mission.planning import Schedule
+
+
+def schedule(mission: Mission) -> Schedule:
+    """Times of a mission in which nothing goes wrong.
+
+    The robot turns in place at every corner of a leg, and at each stop to the stop's heading, and
+    drives each straight piece from rest to rest. A stop's arrival is when it stands there, turned,
+    and begins to settle. The return leg ends where it ends, without a last turn.
+    """
+    drive_s = turn_s = settle_s = scan_s = 0.0
+    heading = mission.start.heading
+    arrivals: list[float] = []
+    for stop in mission.stops:
+        drive, turn, heading = leg_times(stop.approach, heading=heading, robot=mission.robot)
+        drive_s += drive
+        turn_s += turn + turn_time(stop.heading - heading, turn_rate=mission.robot.turn_rate)
+        heading = stop.heading
+        arrivals.append(drive_s + turn_s + settle_s + scan_s)
+        settle_s += stop.settle_s
+        scan_s += stop.scan.duration_s
+    drive, turn, _ = leg_times(mission.return_ or (), heading=heading, robot=mission.robot)
+    return Schedule(drive_s + drive, turn_s + turn, settle_s, scan_s, frozen(arrivals))
+
+
+def leg_times(leg: Sequence[Point], *, heading: float, robot: RobotSpec) -> tuple[float, float, float]:
+    """Seconds driving, seconds turning, and the heading at the end of a polyline."""
+    drive_s = turn_s = 0.0
+    for (x0, y0), (x1, y1) in pairwise(leg):
+        length = math.hypot(x1 - x0, y1 - y0)
+        if length == 0:
+            continue
+        direction = math.atan2(y1 - y0, x1 - x0)
+        turn_s += turn_time(direction - heading, turn_rate=robot.turn_rate)
+        drive_s += straight_time(length, speed=robot.speed, acceleration=robot.acceleration)
+        heading = direction
+    return drive_s, turn_s, heading
+
+
+def turn_time(angle: float, *, turn_rate: float) -> float:
+    """Seconds to turn in place by `angle` radians, the short way round."""
+    return abs(math.remainder(angle, math.tau)) / turn_rate
+
+
+def straight_time(length: float, *, speed: float, acceleration: float) -> float:
+    """Seconds for `length` metres from rest to rest: trapezoid, or triangle when speed is not reached."""
+    if length >= speed**2 / acceleration:
+        return length / speed + speed / acceleration
+    return 2 * math.sqrt(length / acceleration)
