@@ -1,0 +1,214 @@
+"""Sorts the strokes of a layer into closed shapes and open lines, each once, in an order of their own.
+
+The order is that of the geometry, so that nothing later depends on the order in which a drawing was made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from mission.floor import Finding
+from mission.geometry import FloatArray, polyline_length, ring_area
+from planner.floors.rings import (
+    GAP,
+    SNAP,
+    Region,
+    canonical_line,
+    canonical_ring,
+    closed_ring,
+    distinct,
+    joined,
+    repaired,
+    without_repeats,
+)
+from planner.floors.strokes import Stroke
+
+
+@dataclass(frozen=True)
+class Oddity:
+    """What is odd about a thing that has no id yet."""
+
+    code: str
+    text: str
+    at: tuple[float, float] | None = None
+
+    def about(self, element: str) -> Finding:
+        """The finding, once the thing is called `element`."""
+        return Finding(self.code, f"{element}: {self.text}", element=element, at=self.at)
+
+
+@dataclass(frozen=True, eq=False)
+class Closed:
+    """A closed shape: the polygons of one drawn ring."""
+
+    region: Region
+    layer: str
+    clockwise: bool = False
+    """How the ring was drawn; a hole is drawn against the shape around it."""
+    global_id: str | None = None
+    odd: tuple[Oddity, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Open:
+    """An open line (n, 2)."""
+
+    points: FloatArray
+    layer: str
+    curved: bool = False
+    global_id: str | None = None
+    odd: tuple[Oddity, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """All that is drawn on one layer, duplicates dropped."""
+
+    closed: tuple[Closed, ...] = ()
+    open: tuple[Open, ...] = ()
+
+
+def drawn(strokes: Iterable[Stroke], *, gap: float = SNAP) -> Drawn:
+    """Closed shapes and open lines; a stroke whose ends are within `gap` metres of each other is closed."""
+    closed: list[Closed] = []
+    lines: list[Open] = []
+    for stroke in strokes:
+        shape = _shape(stroke, gap=gap)
+        if isinstance(shape, Closed):
+            closed.append(shape)
+        else:
+            lines.append(shape)
+    closed.sort(key=_closed_key)
+    lines.sort(key=_open_key)
+    return Drawn(_each_closed_once(closed), _each_line_once(lines))
+
+
+def _shape(stroke: Stroke, *, gap: float) -> Closed | Open:
+    points = without_repeats(stroke.points, closed=False)
+    odd = _repeats(stroke, points)
+    ring = closed_ring(points, closed=stroke.closed, gap=gap)
+    if ring is None:
+        return Open(canonical_line(points), stroke.layer, stroke.curved, stroke.global_id, odd)
+    polygons, changed = repaired(ring)
+    if not polygons:
+        flat = Oddity("no_area", "is closed but encloses nothing; kept as a line", place(ring))
+        return Open(canonical_line(ring), stroke.layer, stroke.curved, stroke.global_id, (*odd, flat))
+    if changed:
+        odd = (*odd, _split(polygons, ring))
+    if not stroke.closed:
+        odd = (*odd, *_gap(points))
+    region = polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
+    return Closed(region, stroke.layer, ring_area(ring) < 0, stroke.global_id, odd)
+
+
+def _repeats(stroke: Stroke, points: FloatArray) -> tuple[Oddity, ...]:
+    """Repeated points are dropped; more than the usual closing one is worth telling."""
+    dropped = len(stroke.points) - len(points)
+    if not dropped or len(points) < 2:
+        return ()
+    return (Oddity("repeated_points", f"{dropped} repeated points were dropped", place(points)),)
+
+
+def _split(polygons: Sequence[shapely.Polygon], ring: FloatArray) -> Oddity:
+    area = sum(polygon.area for polygon in polygons)
+    text = f"its ring crosses or touches itself; repaired to {len(polygons)} polygons of {area:.3g} m²"
+    return Oddity("repaired", text, place(ring))
+
+
+def _gap(points: FloatArray) -> tuple[Oddity, ...]:
+    width = float(np.hypot(*(points[-1] - points[0])))
+    if width <= SNAP:
+        return ()
+    return (Oddity("gap_closed", f"a gap of {width * 100:.1f} cm in its ring was closed", place(points)),)
+
+
+def place(points: FloatArray) -> tuple[float, float]:
+    """Where a finding points to: the lexicographically smallest point."""
+    x, y = min(map(tuple, points.tolist()))
+    return (x, y)
+
+
+def _closed_key(shape: Closed) -> tuple:
+    return (
+        *region_key(shape.region),
+        shape.global_id is None,
+        shape.global_id or "",
+        shape.clockwise,
+        shape.layer,
+    )
+
+
+def region_key(region: Region) -> tuple:
+    """An order of regions by place and then by every coordinate."""
+    rings = [canonical_ring(part.exterior).tolist() for part in shapely.get_parts(region)]
+    return (*np.round(region.bounds, 6).tolist(), rings)
+
+
+def _open_key(line: Open) -> tuple:
+    return (line.points.tolist(), line.global_id is None, line.global_id or "", line.layer)
+
+
+def _each_closed_once(shapes: Sequence[Closed]) -> tuple[Closed, ...]:
+    first = distinct([shape.region for shape in shapes])
+    return tuple(
+        replace(shape, odd=(*shape.odd, *_copies(first.count(index), shape.region.bounds[:2])))
+        for index, shape in enumerate(shapes)
+        if first[index] == index
+    )
+
+
+def _each_line_once(lines: Sequence[Open]) -> tuple[Open, ...]:
+    copies: dict[tuple, list[Open]] = {}
+    for line in lines:
+        copies.setdefault(tuple(map(tuple, np.round(line.points, 6).tolist())), []).append(line)
+    return tuple(
+        replace(same[0], odd=(*same[0].odd, *_copies(len(same), same[0].points[0])))
+        for same in copies.values()
+    )
+
+
+def _copies(count: int, at: Iterable[float]) -> tuple[Oddity, ...]:
+    if count == 1:
+        return ()
+    x, y = at
+    return (Oddity("duplicate", f"is drawn {count} times; kept once", (float(x), float(y))),)
+
+
+def hole_indices(
+    shapes: Sequence[Closed], above: Sequence[int | None], is_hole: Callable[[Closed, Closed], bool]
+) -> set[int]:
+    """Which shapes are holes of the one around them; what lies in a hole is solid again."""
+    holes: set[int] = set()
+    for index in sorted(range(len(shapes)), key=lambda item: -shapes[item].region.area):
+        parent = above[index]
+        if parent is not None and parent not in holes and is_hole(shapes[index], shapes[parent]):
+            holes.add(index)
+    return holes
+
+
+def faces_of(
+    lines: Sequence[Open], *, merge: bool, gap: float
+) -> tuple[list[Closed], list[Open], list[Oddity]]:
+    """What open lines enclose together, the lines that enclose nothing, and the gaps that were closed."""
+    enclosed = joined([line.points for line in lines], merge=merge, gap=gap)
+    faces = [Closed(face, lines[0].layer) for face in enclosed.faces]
+    loose = [lines[index] for index in enclosed.loose]
+    gaps = [
+        Oddity("gap_closed", f"a gap of {width * 100:.1f} cm between lines was closed", at)
+        for width, at in enclosed.gaps
+    ]
+    return faces, loose, gaps
+
+
+def outline_faces(lines: Sequence[Open], *, layer: str, merge: bool) -> tuple[list[Closed], list[Finding]]:
+    """Faces on a layer where only areas count, with findings for closed gaps and for loose lines."""
+    faces, loose, odd = faces_of(lines, merge=merge, gap=GAP)
+    if loose:
+        length = sum(polyline_length(line.points) for line in loose)
+        text = f"{len(loose)} open lines ({length:.3g} m) enclose nothing and are ignored"
+        odd = [*odd, Oddity("open_outline", text, place(loose[0].points))]
+    return faces, [item.about(layer) for item in odd]

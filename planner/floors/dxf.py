@@ -1,0 +1,49 @@
+"""Reads a layered DXF: one floor, its layers named FLOOR, ROOMS, WALLS and so on.
+
+The bytes become a drawing, the drawing shapes on layers, these strokes in metres, the strokes a floor plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from ezdxf.document import Drawing
+
+from mission.floor import Finding, FloorPlan
+from planner.floors.drawing import metres_per_unit, open_drawing
+from planner.floors.parts import parts_of
+from planner.floors.shapes import Shape, shapes_of
+from planner.floors.strokes import sketch, strokes_of
+
+
+def read_dxf(data: bytes, *, source: Path, digest: str, d_dis: float) -> FloorPlan:
+    """The floor that the bytes of a DXF hold.
+
+    Raises
+    ------
+    InputError
+        When the bytes are no complete DXF, or no closed outline lies on layer FLOOR.
+    """
+    drawing, odd_file = open_drawing(data, source=source)
+    shapes, odd_shapes = shapes_of(drawing, source=source)
+    scale, odd_units = _scale(drawing, shapes)
+    strokes, words, odd_strokes = strokes_of(shapes, scale=scale, chord=d_dis)
+    parts = parts_of(strokes, words, source=source, layers=[shape.layer for shape in shapes])
+    return FloorPlan(
+        name=source.stem,
+        digest=digest,
+        outline=parts.outline,
+        rooms=parts.rooms,
+        openings=parts.openings,
+        elements=parts.elements,
+        findings=(*odd_file, *odd_units, *odd_shapes, *odd_strokes, *parts.findings),
+    )
+
+
+def _scale(drawing: Drawing, shapes: Sequence[Shape]) -> tuple[float, list[Finding]]:
+    floor = sketch(shape for shape in shapes if shape.role == "floor" and not shape.is_text)
+    doors = sketch(shape for shape in shapes if shape.role == "doors" and shape.entity.dxftype() == "LINE")
+    widths = [float(np.hypot(*(line[-1] - line[0]))) for line in doors]
+    return metres_per_unit(drawing, floor=np.vstack(floor) if floor else np.empty((0, 2)), doors=widths)

@@ -1,0 +1,168 @@
+"""Makes the elements: filled shapes with their holes, and open lines, one element per thing drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from mission.floor import KINDS, Element, Finding, Room
+from mission.geometry import FloatArray, Polygon, frozen
+from planner.floors.drawn import Closed, Drawn, Oddity, Open, faces_of, hole_indices, place
+from planner.floors.rings import SNAP, Region, canonical_region, parents, to_shapely
+
+_NEAR = 1.0
+"""An unknown shape farther than this from the floor, in metres, is not part of the plan."""
+_OUTLINES = ("walls", "windows", "railings", "other")
+"""Kinds that people also draw as a ring around something that is not solid."""
+_ROOM = 1.0
+"""Least area in m² of a room that no solid fills."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """An element before it has an id."""
+
+    region: Region | None = None
+    lines: tuple[FloatArray, ...] = ()
+    global_id: str | None = None
+    odd: tuple[Oddity, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Spaces:
+    """The floor and the rooms in it, which no wall fills."""
+
+    outline: Region
+    rooms: tuple[Region, ...]
+
+    def filled_by(self, region: Region) -> bool:
+        """Whether a shape would fill a whole room or more than half of the floor: then it is an outline."""
+        if region.intersection(self.outline).area > self.outline.area / 2:
+            return True
+        large = [room for room in self.rooms if _ROOM <= room.area <= region.area * 1.05]
+        return any(
+            region.intersection(room).area > 0.95 * room.area for room in large if region.intersects(room)
+        )
+
+
+def elements_of(
+    on: Mapping[str, Drawn], *, outline: Region, rooms: Sequence[Room]
+) -> tuple[tuple[Element, ...], list[Finding]]:
+    """Elements kind by kind, in the order of their place; ids count within a kind."""
+    spaces = _Spaces(outline, tuple(_region(room) for room in rooms))
+    elements: list[Element] = []
+    findings: list[Finding] = []
+    for kind in KINDS:
+        if kind in on:
+            made, odd = _of_kind(kind, on[kind], spaces)
+            elements += made
+            findings += odd
+    return tuple(elements), findings
+
+
+def _region(room: Room) -> Region:
+    return shapely.union_all([to_shapely(part) for part in room.polygons])
+
+
+def _of_kind(kind: str, drawn: Drawn, spaces: _Spaces) -> tuple[list[Element], list[Finding]]:
+    closed, lines = _closed_and_lines(kind, drawn)
+    findings: list[Finding] = []
+    if kind == "other":
+        closed, findings = _on_the_floor(closed, spaces)
+    parts = [
+        *_bodies(kind, closed, spaces),
+        *(_Part(None, (line.points,), line.global_id, line.odd) for line in lines),
+    ]
+    elements: list[Element] = []
+    for number, part in enumerate(sorted(parts, key=_place_key), start=1):
+        elements.append(_element(f"{kind}-{number:03d}", kind, part))
+        findings += [odd.about(elements[-1].id) for odd in part.odd]
+    return elements, findings
+
+
+def _closed_and_lines(kind: str, drawn: Drawn) -> tuple[list[Closed], list[Open]]:
+    """Columns drawn line by line are filled; rooms between walls drawn as lines are not."""
+    if kind == "other":
+        return list(drawn.closed), []
+    if kind != "columns":
+        return list(drawn.closed), list(drawn.open)
+    faces, loose, _ = faces_of(drawn.open, merge=True, gap=SNAP)
+    return [*drawn.closed, *faces], loose
+
+
+def _on_the_floor(closed: Sequence[Closed], spaces: _Spaces) -> tuple[list[Closed], list[Finding]]:
+    """Unknown shapes that may stand on the floor; frames around it and things beside it are left out."""
+    kept: list[Closed] = []
+    findings: list[Finding] = []
+    for shape in closed:
+        at = place(shapely.get_coordinates(shape.region))
+        if shape.region.distance(spaces.outline) > _NEAR:
+            findings.append(
+                Finding("off_floor", f"layer {shape.layer}: a shape beside the floor is ignored", at=at)
+            )
+        elif spaces.filled_by(shape.region):
+            text = f"layer {shape.layer}: a ring around rooms ({shape.region.area:.3g} m²) is ignored"
+            findings.append(Finding("outline_not_solid", text, at=at))
+        else:
+            kept.append(shape)
+    return kept, findings
+
+
+def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Part]:
+    """Solids without their holes; a ring around rooms becomes a line, and what lies in it its own solid."""
+    above = parents([shape.region for shape in closed])
+    holes = hole_indices(closed, above, _is_hole)
+    parts: list[_Part] = []
+    for index in (item for item in range(len(closed)) if item not in holes):
+        inner = [closed[item] for item in sorted(holes) if above[item] == index]
+        body = closed[index].region.difference(shapely.union_all([hole.region for hole in inner]))
+        if kind in _OUTLINES and spaces.filled_by(body):
+            parts += [_body_or_outline(kind, shape, spaces) for shape in (closed[index], *inner)]
+        else:
+            odd = tuple(item for shape in (closed[index], *inner) for item in shape.odd)
+            parts.append(_Part(body, (), closed[index].global_id, odd))
+    return parts
+
+
+def _is_hole(inner: Closed, outer: Closed) -> bool:
+    same = inner.global_id is not None and inner.global_id == outer.global_id
+    return same or inner.clockwise != outer.clockwise
+
+
+def _body_or_outline(kind: str, shape: Closed, spaces: _Spaces) -> _Part:
+    if not spaces.filled_by(shape.region):
+        return _Part(shape.region, (), shape.global_id, shape.odd)
+    lines = tuple(
+        frozen(np.vstack((ring, ring[:1])))
+        for polygon in canonical_region(shape.region)
+        for ring in polygon.rings
+    )
+    text = f"its ring around {shape.region.area:.3g} m² of floor is read as a line, not as solid {kind}"
+    odd = Oddity("outline_not_solid", text, place(lines[0]))
+    return _Part(None, lines, shape.global_id, (*shape.odd, odd))
+
+
+def _place_key(part: _Part) -> tuple:
+    rings = [polygon.exterior.tolist() for polygon in _solids(part)]
+    return (*rings, *(line.tolist() for line in part.lines)), part.global_id or ""
+
+
+def _solids(part: _Part) -> tuple[Polygon, ...]:
+    return () if part.region is None else canonical_region(part.region)
+
+
+def _element(name: str, kind: str, part: _Part) -> Element:
+    means = KINDS[kind]
+    return Element(
+        name,
+        kind,
+        solids=_solids(part),
+        lines=part.lines,
+        global_id=part.global_id,
+        occludes=means.occludes,
+        obstacle=means.obstacle,
+        target=means.target,
+    )

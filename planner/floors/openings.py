@@ -1,0 +1,65 @@
+"""Makes the openings: each line on DOORS or PASSAGES lies across one."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from mission.floor import Finding, Opening
+from mission.geometry import FloatArray, frozen
+from planner.floors.drawn import Closed, Drawn, Oddity, Open, place
+from planner.floors.rings import SNAP, canonical_line
+
+Across = tuple[FloatArray, str | None, tuple[Oddity, ...]]
+"""A line (2, 2) across an opening, its GlobalId, and what is odd about it."""
+
+
+def openings_of(*, doors: Drawn, passages: Drawn) -> tuple[tuple[Opening, ...], list[Finding]]:
+    """Doors, then passages, in the order of their place; lines without length are dropped."""
+    openings: list[Opening] = []
+    findings: list[Finding] = []
+    for kind, drawn in (("door", doors), ("passage", passages)):
+        lines, dropped = _across(drawn, kind=kind)
+        findings += dropped
+        for number, (line, global_id, odd) in enumerate(lines, start=1):
+            openings.append(Opening(f"{kind}-{number:03d}", kind, line, global_id))
+            findings += [item.about(openings[-1].id) for item in odd]
+    return tuple(openings), findings
+
+
+def _across(drawn: Drawn, *, kind: str) -> tuple[list[Across], list[Finding]]:
+    lines: list[Across] = []
+    findings: list[Finding] = []
+    shapes: list[Open | Closed] = [*drawn.open, *drawn.closed]
+    for shape in shapes:
+        if isinstance(shape, Open) and shape.curved:
+            findings.append(
+                Finding(
+                    "not_an_opening", f"{kind}: a curve is not read as an opening", at=place(shape.points)
+                )
+            )
+            continue
+        line, odd = _line(shape)
+        if float(np.hypot(*(line[1] - line[0]))) <= SNAP:
+            findings.append(
+                Finding("no_length", f"{kind}: a line without length was dropped", at=place(line))
+            )
+            continue
+        lines.append((line, shape.global_id, (*shape.odd, *odd)))
+    return sorted(lines, key=lambda item: item[0].tolist()), findings
+
+
+def _line(shape: Open | Closed) -> tuple[FloatArray, tuple[Oddity, ...]]:
+    if isinstance(shape, Open):
+        return canonical_line(shape.points[[0, -1]]), ()
+    odd = Oddity("closed_opening", "is drawn as a closed shape; read as the line along its middle")
+    return _middle(shape), (odd,)
+
+
+def _middle(shape: Closed) -> FloatArray:
+    """The longer middle line of the smallest rectangle around a shape."""
+    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(shape.region))[:4]
+    middles = (corners + np.roll(corners, -1, axis=0)) / 2
+    one, other = middles[[0, 2]], middles[[1, 3]]
+    longer = one if np.hypot(*(one[1] - one[0])) >= np.hypot(*(other[1] - other[0])) else other
+    return canonical_line(frozen(longer))

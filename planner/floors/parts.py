@@ -1,0 +1,114 @@
+"""Makes the parts of a floor of strokes and words: its outline, rooms, openings and elements."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mission.errors import InputError
+from mission.floor import Element, Finding, Opening, Room
+from mission.geometry import Polygon
+from planner.floors.drawn import Drawn, drawn, outline_faces
+from planner.floors.elements import elements_of
+from planner.floors.openings import openings_of
+from planner.floors.rings import GAP, SNAP, Region, canonical_region, even_odd
+from planner.floors.rooms import rooms_of
+from planner.floors.strokes import Stroke, Word
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What a floor plan is made of."""
+
+    outline: tuple[Polygon, ...]
+    rooms: tuple[Room, ...]
+    openings: tuple[Opening, ...]
+    elements: tuple[Element, ...]
+    findings: tuple[Finding, ...]
+
+
+def parts_of(
+    strokes: Sequence[Stroke], words: Sequence[Word], *, source: Path, layers: Iterable[str]
+) -> Parts:
+    """The parts that strokes and words on the known layers draw.
+
+    Raises
+    ------
+    InputError
+        When nothing on layer FLOOR is closed; `layers` are the names of those that are present.
+    """
+    on = _drawn_by_role(strokes)
+    outline, odd_outline = _outline(on["floor"])
+    if outline.is_empty:
+        why = _why_no_outline(on["floor"])
+        raise InputError(
+            f"{source}: {why}; layers present: {_listed(layers)} (draw one as a closed polyline)"
+        )
+    rooms, odd_rooms = rooms_of(on["rooms"], _room_names(words), outline=outline)
+    openings, odd_openings = openings_of(doors=on["doors"], passages=on["passages"])
+    elements, odd_elements = elements_of(on, outline=outline, rooms=rooms)
+    odd_layers = _unknown_layers(on["other"], words)
+    findings = (*odd_outline, *odd_rooms, *odd_openings, *odd_elements, *odd_layers)
+    return Parts(canonical_region(outline), rooms, openings, elements, _in_order(findings))
+
+
+def _drawn_by_role(strokes: Iterable[Stroke]) -> defaultdict[str, Drawn]:
+    sorted_out: defaultdict[str, list[Stroke]] = defaultdict(list)
+    for stroke in strokes:
+        sorted_out[stroke.role].append(stroke)
+    on: defaultdict[str, Drawn] = defaultdict(Drawn)
+    for role, own in sorted_out.items():
+        on[role] = drawn(own, gap=GAP if role in ("floor", "rooms") else SNAP)
+    return on
+
+
+def _outline(floor: Drawn) -> tuple[Region, list[Finding]]:
+    """The region on layer FLOOR: rings in rings are holes, overlapping parts are one."""
+    faces, findings = outline_faces(floor.open, layer="FLOOR", merge=True)
+    rings = (*floor.closed, *faces)
+    findings += [odd.about("FLOOR") for ring in rings for odd in ring.odd]
+    return even_odd([ring.region for ring in rings]), findings
+
+
+def _why_no_outline(floor: Drawn) -> str:
+    if not floor.open:
+        return "no closed outline on layer FLOOR"
+    return (
+        f"no closed outline on layer FLOOR, only {len(floor.open)} open lines with gaps over {GAP * 100:g} cm"
+    )
+
+
+def _listed(layers: Iterable[str], *, most: int = 20) -> str:
+    names = sorted(set(layers), key=str.casefold)
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return (", ".join(names[:most]) or "none") + more
+
+
+def _room_names(words: Iterable[Word]) -> list[Word]:
+    return sorted((word for word in words if word.role == "rooms" and word.text and word.at), key=_word_key)
+
+
+def _word_key(word: Word) -> tuple:
+    return (word.at, word.text)
+
+
+def _unknown_layers(other: Drawn, words: Iterable[Word]) -> list[Finding]:
+    closed = Counter(shape.layer for shape in other.closed)
+    lines = Counter(line.layer for line in other.open)
+    texts = Counter(word.layer for word in words if word.role == "other")
+    return [
+        Finding(
+            "unknown_layer",
+            f"layer {layer} is not one of a floor's: {closed[layer]} closed shapes are obstacles, "
+            f"{lines[layer]} open lines and {texts[layer]} texts or dimensions are ignored",
+        )
+        for layer in sorted({*closed, *lines, *texts})
+    ]
+
+
+def _in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    return tuple(
+        sorted(findings, key=lambda item: (item.code, item.element or "", item.at or (), item.message))
+    )

@@ -1,0 +1,214 @@
+"""Makes sound polygons of drawn rings and lines: repairs, joins, tells holes, and writes each in one way.
+
+Everything is in metres. Results do not depend on the order, direction or starting point of what is drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+from shapely.geometry.base import BaseGeometry
+
+from mission.geometry import FloatArray, Polygon, frozen, ring_area
+
+SNAP = 1e-3
+"""Ends closer than this, in metres, meet."""
+GAP = 0.05
+"""The widest gap, in metres, that is closed in an outline."""
+SLIVER = 1e-6
+"""Least area in m² of a solid."""
+
+Region: TypeAlias = BaseGeometry
+"""A shapely polygon or multipolygon."""
+
+
+def closed_ring(points: FloatArray, *, closed: bool, gap: float = SNAP) -> FloatArray | None:
+    """The ring (n, 2) that a polyline draws, first point not repeated; None if it is open."""
+    if len(points) < 3:
+        return None
+    ends = float(np.hypot(*(points[-1] - points[0])))
+    if not closed and ends > gap:
+        return None
+    return points[:-1] if ends <= SNAP else points
+
+
+def without_repeats(points: FloatArray, *, closed: bool, within: float = 1e-6) -> FloatArray:
+    """The polyline without points that repeat the one before."""
+    if len(points) < 2:
+        return points
+    before = np.roll(points, 1, axis=0)
+    moved = np.hypot(*(points - before).T) > within
+    if not closed:
+        moved[0] = True
+    return points[moved] if moved.any() else points[:1]
+
+
+def repaired(ring: FloatArray) -> tuple[list[shapely.Polygon], bool]:
+    """Sound polygons that cover what `ring` encloses, and whether it had to be changed."""
+    if len(ring) < 3:
+        return [], True
+    drawn = shapely.Polygon(ring)
+    if drawn.is_valid:
+        return ([drawn], False) if drawn.area > SLIVER else ([], True)
+    return polygons_of(shapely.make_valid(drawn)), True
+
+
+def polygons_of(region: Region) -> list[shapely.Polygon]:
+    """The polygons of any geometry, without slivers; what is a line or a point is left out."""
+    parts = shapely.get_parts(shapely.get_parts(region))
+    return [part for part in parts if isinstance(part, shapely.Polygon) and part.area > SLIVER]
+
+
+def canonical(polygon: shapely.Polygon) -> Polygon:
+    """The one way to write a polygon: rings start at their smallest vertex, holes are sorted."""
+    holes = [canonical_ring(hole, clockwise=True) for hole in polygon.interiors]
+    return Polygon(canonical_ring(polygon.exterior), tuple(sorted(holes, key=lambda hole: hole.tolist())))
+
+
+def canonical_ring(ring: shapely.LinearRing, *, clockwise: bool = False) -> FloatArray:
+    """A ring's points (n, 2) from its lexicographically smallest one, the first not repeated."""
+    points = shapely.get_coordinates(ring)[:-1]
+    if (ring_area(points) < 0) != clockwise:
+        points = points[::-1]
+    first = int(np.lexsort((points[:, 1], points[:, 0]))[0])
+    return frozen(np.roll(points, -first, axis=0))
+
+
+def canonical_region(region: Region) -> tuple[Polygon, ...]:
+    """All polygons of a region, each written in the one way, sorted."""
+    return tuple(sorted(map(canonical, polygons_of(region)), key=lambda part: part.exterior.tolist()))
+
+
+def canonical_line(points: FloatArray) -> FloatArray:
+    """The one way to write an open line: from its lexicographically smaller end."""
+    return frozen(points[::-1] if points[::-1].tolist() < points.tolist() else points)
+
+
+def to_shapely(polygon: Polygon) -> shapely.Polygon:
+    return shapely.Polygon(polygon.exterior, polygon.holes)
+
+
+def distinct(polygons: Sequence[shapely.Polygon]) -> list[int]:
+    """For each polygon the index of the first that draws the same within `SNAP`, or its own."""
+    tree = shapely.STRtree(polygons)
+    first = list(range(len(polygons)))
+    for index, polygon in enumerate(polygons):
+        for other in sorted(tree.query(polygon)):
+            if other < index and first[other] == other and _same(polygons[other], polygon):
+                first[index] = int(other)
+                break
+    return first
+
+
+def _same(one: shapely.Polygon, other: shapely.Polygon) -> bool:
+    if not np.allclose(one.bounds, other.bounds, rtol=0.0, atol=SNAP):
+        return False
+    return one.symmetric_difference(other).area <= SNAP * max(one.length, other.length) / 2
+
+
+def parents(polygons: Sequence[shapely.Polygon]) -> list[int | None]:
+    """For each polygon the smallest larger one that holds it (within `SNAP`), or None."""
+    tree = shapely.STRtree(polygons)
+    found: list[int | None] = []
+    for index, polygon in enumerate(polygons):
+        around = [int(i) for i in tree.query(polygon) if i != index and polygons[i].area > polygon.area]
+        holding = [i for i in around if _holds(polygons[i], polygon)]
+        found.append(min(holding, key=lambda i: (polygons[i].area, i)) if holding else None)
+    return found
+
+
+def _holds(outer: shapely.Polygon, inner: shapely.Polygon) -> bool:
+    return bool(outer.covers(inner)) or inner.difference(outer).area <= SNAP * inner.length / 2
+
+
+def even_odd(polygons: Sequence[shapely.Polygon]) -> Region:
+    """The region of nested rings: a ring in a ring is a hole, one in a hole is filled. Parts are unioned."""
+    above = parents(polygons)
+    levels: dict[int, list[shapely.Polygon]] = {}
+    for index, polygon in enumerate(polygons):
+        levels.setdefault(_depth(index, above), []).append(polygon)
+    region: Region = shapely.Polygon()
+    for depth in sorted(levels):
+        layer = shapely.union_all(levels[depth])
+        region = region.difference(layer) if depth % 2 else region.union(layer)
+    return region
+
+
+def _depth(index: int, above: Sequence[int | None]) -> int:
+    parent = above[index]
+    return 0 if parent is None else 1 + _depth(parent, above)
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """What open lines enclose together."""
+
+    faces: tuple[shapely.Polygon, ...]
+    """Enclosed areas, without regard to what lies within them."""
+    loose: tuple[int, ...]
+    """Indices of the lines that enclose nothing."""
+    gaps: tuple[tuple[float, tuple[float, float]], ...]
+    """Width and place of each gap that was closed."""
+
+
+def joined(lines: Sequence[FloatArray], *, merge: bool, gap: float = GAP) -> Joined:
+    """The rings that open lines form where their ends meet, or nearly meet.
+
+    Parameters
+    ----------
+    merge
+        Whether areas that share an edge are one (a slab with a joint drawn in it) or several (rooms).
+    """
+    if not lines:
+        return Joined((), (), ())
+    faces: list[shapely.Polygon] = []
+    bridges, gaps = _bridges(lines, gap=gap)
+    drawn = [shapely.LineString(line) for line in (*lines, *bridges)]
+    for group in _connected(drawn):
+        enclosed = shapely.get_parts(shapely.polygonize([shapely.union_all([drawn[i] for i in group])]))
+        whole = polygons_of(shapely.union_all(enclosed)) if merge else list(enclosed)
+        faces += [shapely.Polygon(face.exterior) for face in whole if face.area > SLIVER]
+    edges = shapely.union_all([face.exterior for face in faces]).buffer(SNAP)
+    loose = tuple(i for i in range(len(lines)) if not edges.covers(drawn[i]))
+    return Joined(tuple(faces), loose, tuple(gaps))
+
+
+def _bridges(
+    lines: Sequence[FloatArray], *, gap: float
+) -> tuple[list[FloatArray], list[tuple[float, tuple[float, float]]]]:
+    """Short lines between free ends that are each other's nearest, and those of them longer than `SNAP`."""
+    ends = _free_ends(lines)
+    if len(ends) < 2:
+        return [], []
+    apart, nearest = cKDTree(ends).query(ends, k=[2])
+    nearest = nearest[:, 0]
+    mutual = np.flatnonzero((nearest[nearest] == np.arange(len(ends))) & (apart[:, 0] <= gap))
+    pairs = [(int(i), int(nearest[i])) for i in mutual if i < nearest[i]]
+    bridges = [ends[[i, j]] for i, j in pairs]
+    wide = [(float(apart[i, 0]), _point(ends[i])) for i, _ in pairs if apart[i, 0] > SNAP]
+    return bridges, wide
+
+
+def _free_ends(lines: Sequence[FloatArray]) -> FloatArray:
+    ends = np.array([line[k] for line in lines for k in (0, -1)]).reshape(-1, 2)
+    _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
+    return ends[np.sort(first[count == 1])]
+
+
+def _point(xy: FloatArray) -> tuple[float, float]:
+    return (float(xy[0]), float(xy[1]))
+
+
+def _connected(drawn: Sequence[shapely.LineString]) -> list[list[int]]:
+    """Indices of lines that touch one another, group by group."""
+    touching = shapely.STRtree(drawn).query(drawn, predicate="intersects")
+    links = coo_array((np.ones(touching.shape[1]), tuple(touching)), shape=(len(drawn), len(drawn)))
+    _, group = connected_components(links, directed=False)
+    return [np.flatnonzero(group == index).tolist() for index in np.unique(group)]
