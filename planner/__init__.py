@@ -1,1 +1,65 @@
-"""TODO"""
+"""Floor -> mission: where the scanner must stand, and by which route a robot visits those stops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from mission.document import Mission
+from mission.floor import FloorPlan
+from mission.planning import Candidates, NavigableSpace
+from mission.settings import Settings
+
+Observe = Callable[[Any], None]
+
+
+def plan(floor: FloorPlan, settings: Settings, *, observe: Observe = lambda noun: None) -> Mission:
+    """Plan the part of the floor that holds the start, else the largest.
+
+    Every noun on the way is handed to `observe` as soon as it is made.
+
+    Raises
+    ------
+    AnswerIsNo
+        No target, no candidate, or nothing in sight.
+    InputError
+        A start, an end or a variant that does not fit the floor.
+    """
+    from planner.candidates import candidates
+    from planner.navigable import navigable
+
+    observe(floor)
+    space = navigable(floor, settings)
+    observe(space)
+    return plan_part(candidates(space), observe=observe)
+
+
+def plan_part(found: Candidates, *, observe: Observe, number: int = 0) -> Mission:
+    """Plan from candidates on; `number` tells the missions of one floor apart."""
+    from planner.assemble import assemble
+    from planner.routing import route
+    from planner.selection import select
+    from planner.visibility import visibility
+
+    observe(found)
+    seen = visibility(found)
+    observe(seen)
+    selection = select(seen)
+    observe(selection)
+    driven = route(selection)
+    observe(driven)
+    mission = assemble(driven, part=number)
+    observe(mission)
+    return mission
+
+
+def parts_to_plan(space: NavigableSpace) -> list[Candidates]:
+    """Candidates of every part that has any: the part of `plan` first, then the others by area."""
+    from planner.candidates import candidates
+
+    first = candidates(space)
+    others = sorted({int(part) for part in first.part if part >= 0} - {first.chosen_part})
+    return [first, *(candidates(space, part=part) for part in others)]
+
+
+__all__ = ["Observe", "parts_to_plan", "plan", "plan_part"]

@@ -1,1 +1,143 @@
-"""TODO"""
+"""Navigable space -> candidates: possible scan positions, each dropped one with its reason.
+
+A strategy is a function `(space) -> (xy, room)`: positions (n, 2) in the drawing's metres and the index
+of each one's room in `space.rooms`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+
+import numpy as np
+import shapely
+
+from mission.errors import AnswerIsNo, InputError
+from mission.geometry import FloatArray, IntArray, frozen
+from mission.planning import (
+    AT_EDGE,
+    IN_HOLE,
+    KEPT,
+    OTHER_PART,
+    OUTSIDE,
+    TOO_CLOSE,
+    UNREACHABLE,
+    Candidates,
+    NavigableSpace,
+)
+from planner.candidates.fallback import best_point
+from planner.candidates.grid import grid
+from planner.candidates.place import Place
+from planner.connected import Parts, parts_of
+from planner.shapes import local_origin, to_shape
+
+Strategy = Callable[[NavigableSpace], tuple[FloatArray, IntArray]]
+STRATEGIES: dict[str, Strategy] = {"grid": grid}
+
+
+def candidates(space: NavigableSpace, *, part: int | None = None) -> Candidates:
+    """Candidates of the strategy named in the settings, for one connected part of the floor.
+
+    `part` counts from the largest; None takes the part that holds the start, else the largest that
+    has candidates and a room.
+    """
+    name = space.settings.candidates
+    xy, room = strategy(name)(space)
+    place = Place(space)
+    reason = place.reasons(xy, room)
+    extra = [
+        (k, point) for k in _empty_rooms(space, room, reason) if (point := best_point(place, k)) is not None
+    ]
+    xy = np.concatenate([xy.reshape(-1, 2), np.array([p for _, p in extra]).reshape(-1, 2)])
+    room = np.concatenate([room, np.array([k for k, _ in extra], dtype=np.int64)])
+    reason = np.concatenate([reason, np.full(len(extra), KEPT)])
+    return _of_part(space, xy, room, reason, part, name)
+
+
+def strategy(name: str) -> Strategy:
+    """A strategy by its name, or `package.module:function` of the user's own."""
+    if name in STRATEGIES:
+        return STRATEGIES[name]
+    module, _, function = name.partition(":")
+    if not function:
+        raise InputError(f"candidates = {name}: unknown; known: {', '.join(STRATEGIES)}, or module:function")
+    try:
+        found: Strategy = getattr(import_module(module), function)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"candidates = {name}: {error}") from None
+    return found
+
+
+def _empty_rooms(space: NavigableSpace, room: IntArray, reason: IntArray) -> list[int]:
+    kept = set(room[reason == KEPT].tolist())
+    return [k for k in range(len(space.rooms)) if k not in kept]
+
+
+def _of_part(
+    space: NavigableSpace, xy: FloatArray, room: IntArray, reason: IntArray, part: int | None, name: str
+) -> Candidates:
+    origin = local_origin(space.floor)
+    parts = parts_of(to_shape(space.drive_area, origin), space.gaps - origin)
+    at = np.where(reason == KEPT, parts.part_at(xy - origin), -1)
+    reason = np.where((reason == KEPT) & (at < 0), UNREACHABLE, reason)
+    if not np.any(at >= 0):
+        raise AnswerIsNo(_no_candidate(space, reason))
+    chosen = _chosen_part(space, parts, at, part)
+    reason = np.where((reason == KEPT) & (at != chosen), OTHER_PART, reason)
+    return Candidates(
+        space=space,
+        xy=frozen(xy),
+        room=frozen(room, np.int64),
+        reason=frozen(reason, np.int64),
+        part=frozen(at, np.int64),
+        strategy=name,
+        chosen_part=chosen,
+        part_area=parts.areas,
+    )
+
+
+def _chosen_part(space: NavigableSpace, parts: Parts, at: IntArray, part: int | None) -> int:
+    held = set(at[at >= 0].tolist())
+    if part is not None:
+        return part
+    if space.settings.start is not None:
+        return _part_of_start(space, parts, held)
+    return next(k for k in roomy_parts(space, parts) if k in held)
+
+
+def roomy_parts(space: NavigableSpace, parts: Parts) -> list[int]:
+    """Parts by area, those that hold some of a room first: floor beyond the rooms comes last."""
+    if not space.floor.rooms:
+        return list(range(len(parts.areas)))
+    origin = local_origin(space.floor)
+    rooms = shapely.union_all([to_shape(room.polygons, origin) for room in space.floor.rooms])
+    inside = parts.area_by_part(rooms)
+    return sorted(range(len(parts.areas)), key=lambda k: (inside.get(k, 0.0) < 1e-6, k))
+
+
+def _part_of_start(space: NavigableSpace, parts: Parts, held: set[int]) -> int:
+    assert space.settings.start is not None
+    x, y, _ = space.settings.start
+    found = int(parts.part_at(np.array([[x, y]]) - local_origin(space.floor))[0])
+    if found < 0:
+        raise InputError(
+            f"start = {x:g},{y:g}: the robot (radius {space.settings.radius:g} m) does not fit there; "
+            "choose a place clear of walls and floor edges"
+        )
+    if found not in held:
+        raise AnswerIsNo(f"start = {x:g},{y:g}: no scan position can be reached from there")
+    return found
+
+
+def _no_candidate(space: NavigableSpace, reason: IntArray) -> str:
+    counts = {
+        f"closer than d_sec {space.settings.d_sec:g} m": int(np.sum(reason == TOO_CLOSE)),
+        f"closer than {space.settings.edge:g} m to a floor edge": int(np.sum(reason == AT_EDGE)),
+        "outside or in holes": int(np.sum((reason == OUTSIDE) | (reason == IN_HOLE))),
+        "not reachable": int(np.sum(reason == UNREACHABLE)),
+    }
+    told = ", ".join(f"{n} {why}" for why, n in counts.items() if n)
+    return f"{space.floor.name}: no candidate is left ({told or 'none was made'}); lower --d-sec or --grid"
+
+
+__all__ = ["STRATEGIES", "Strategy", "candidates", "roomy_parts", "strategy"]

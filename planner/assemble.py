@@ -1,0 +1,171 @@
+"""Route -> mission: stops with headings, approaches, tolerances and scans, ready to be sent."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+
+from mission import __version__
+from mission.document import (
+    Frame,
+    Mission,
+    Origin,
+    Point,
+    Policy,
+    RobotSpec,
+    Scan,
+    ScannerSpec,
+    Sees,
+    SiteOrigin,
+    Start,
+    Stop,
+    mission_id,
+    sealed,
+)
+from mission.errors import StopgoError
+from mission.geometry import FloatArray
+from mission.planning import NavigableSpace, Route
+from mission.settings import Settings
+from planner.gaps import Walls, keeps_clear
+from planner.shapes import local_origin, segments_of, to_shape
+
+DECIMALS = 6
+"""Missions hold micrometres: finer would be float noise."""
+CLEAR_SLACK = 2e-6
+"""What rounding to DECIMALS may cost in clearance."""
+SCAN_TIMEOUT = 2.0
+"""A scan may take this many times as long as planned, and at least SCAN_PATIENCE more."""
+SCAN_PATIENCE = 30.0
+
+
+def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
+    """The mission of a route; `part` numbers the missions of a floor with several parts."""
+    space = route.selection.visibility.candidates.space
+    settings, floor = space.settings, space.floor
+    check_legs(route)
+    return sealed(
+        Mission(
+            id=mission_id(floor.digest, settings, __version__, part),
+            revision=revision,
+            name=floor.name if part == 0 else f"{floor.name}-{part + 1}",
+            digest="",
+            frame=Frame(name="site"),
+            georeference=_georeference(space),
+            robot=_robot(settings),
+            scanner=ScannerSpec(profile=settings.profile, range=settings.range),
+            start=Start(
+                x=_rounded(route.start[0]),
+                y=_rounded(route.start[1]),
+                heading=_rounded(route.start[2]),
+                reason=route.start_reason,
+            ),
+            stops=_stops(route, settings),
+            return_=None if route.return_leg is None else _line(route.return_leg),
+            policy=Policy(
+                link_loss=settings.link_loss,
+                link_loss_after_s=settings.link_loss_after,
+                battery_min=settings.battery_min,
+            ),
+            origin=Origin(
+                floor=floor.name, floor_digest=floor.digest, parameters=settings, stopgo=__version__
+            ),
+        )
+    )
+
+
+def _georeference(space: NavigableSpace) -> SiteOrigin | None:
+    given, known = space.settings.origin, space.floor.georeference
+    if given is not None:
+        return SiteOrigin(lat=given[0], lon=given[1], alt=given[2], heading_deg=given[3])
+    if known is None:
+        return None
+    return SiteOrigin(lat=known.lat, lon=known.lon, alt=known.alt, heading_deg=known.heading_deg)
+
+
+def _robot(settings: Settings) -> RobotSpec:
+    return RobotSpec(
+        radius=settings.radius,
+        speed=settings.speed,
+        turn_rate=_rounded(math.radians(settings.turn_rate)),
+        acceleration=settings.acceleration,
+    )
+
+
+def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
+    visibility = route.selection.visibility
+    rows = route.selection.chosen[route.order]
+    seen = np.zeros(visibility.targets.total, dtype=bool)
+    width = max(2, len(str(len(rows))))
+    stops = []
+    heading = _rounded(route.start[2])
+    for number, (row, approach) in enumerate(zip(rows, route.approaches, strict=True), start=1):
+        units = visibility.seen_by(int(row))
+        new = int(np.count_nonzero(~seen[units]))
+        seen[units] = True
+        heading = _arrival_heading(approach, heading)
+        sees = Sees(units=len(units), new_units=new)
+        stops.append(_stop(f"s{number:0{width}d}", approach, heading, sees, settings))
+    return tuple(stops)
+
+
+def _arrival_heading(approach: FloatArray, before: float) -> float:
+    """Direction of the approach's last piece; where the robot does not move, it keeps its heading."""
+    if len(approach) < 2:
+        return before
+    step = approach[-1] - approach[-2]
+    return _rounded(math.atan2(step[1], step[0]))
+
+
+def _stop(name: str, approach: FloatArray, heading: float, sees: Sees, settings: Settings) -> Stop:
+    line = _line(approach)
+    return Stop(
+        id=name,
+        x=line[-1][0],
+        y=line[-1][1],
+        heading=heading,
+        doorway=False,
+        tolerance_m=settings.tolerance,
+        settle_s=settings.settle,
+        scan=Scan(
+            profile=settings.profile,
+            duration_s=settings.scan_time,
+            timeout_s=max(SCAN_TIMEOUT * settings.scan_time, settings.scan_time + SCAN_PATIENCE),
+        ),
+        on_failure=settings.on_failure,
+        retries=settings.retries,
+        approach=line,
+        sees=sees,
+    )
+
+
+def _line(points: FloatArray) -> tuple[Point, ...]:
+    return tuple((_rounded(x), _rounded(y)) for x, y in points.tolist())
+
+
+def _rounded(value: float) -> float:
+    """A plain number without float noise, and never minus zero."""
+    return round(float(value), DECIMALS) + 0.0
+
+
+def check_legs(route: Route) -> None:
+    """Every leg as it will be sent keeps the robot's radius from every obstacle and closed opening.
+
+    Raises
+    ------
+    StopgoError
+        If one does not: the route is then not written.
+    """
+    space = route.selection.visibility.candidates.space
+    origin = local_origin(space.floor)
+    solid = np.concatenate([segments_of(to_shape(space.obstacles, origin)), space.barriers - origin])
+    walls = Walls(solid, np.full(len(solid), space.settings.radius - CLEAR_SLACK))
+    tree = shapely.STRtree(walls.shapes())
+    legs = route.approaches if route.return_leg is None else (*route.approaches, route.return_leg)
+    for leg in legs:
+        line = np.round(leg, DECIMALS) - origin
+        shape = shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0])
+        if not keeps_clear(shape, walls, tree):
+            x, y = leg[-1]
+            raise StopgoError(f"{space.floor.name}: the leg to ({x:.3f}, {y:.3f}) does not clear an obstacle")

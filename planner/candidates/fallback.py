@@ -1,0 +1,42 @@
+"""A candidate for rooms too small for the grid: the best point of them, if any point is allowed."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from mission.geometry import FloatArray
+from mission.planning import KEPT
+from planner.candidates.place import Place
+from planner.shapes import polygon_parts
+
+HAIR = 1e-6
+"""Clearances are shortened by this to find strips that are allowed but have no width."""
+
+
+def best_point(place: Place, room: int) -> FloatArray | None:
+    """The allowed point of a room farthest from elements and floor edges, or None if none is allowed."""
+    settings = place.space.settings
+    allowed = place.rooms[room].difference(
+        place.obstacles.buffer(place.element_clearance - HAIR, quad_segs=64)
+    )
+    edges = shapely.boundary(place.outline).buffer(max(settings.edge - HAIR, 0.0), quad_segs=64)
+    pieces = polygon_parts(allowed.intersection(place.outline).difference(edges))
+    points = [xy for piece in pieces for xy in _middles(piece)]
+    if not points:
+        return None
+    local = np.array(points)
+    ok = place.reasons(local + place.origin, np.full(len(local), room)) == KEPT
+    if not ok.any():
+        return None
+    margin = np.minimum(place.to_element(local) - settings.d_sec, place.to_edge(local) - settings.edge)
+    order = np.lexsort((local[:, 1], local[:, 0], -np.round(np.where(ok, margin, -np.inf), 9)))
+    return local[order[0]] + place.origin
+
+
+def _middles(piece: shapely.Polygon) -> list[FloatArray]:
+    """Points likely to be farthest inside: the centroid, a point on the surface, the largest circle's."""
+    shapes = [piece.centroid, piece.representative_point()]
+    if piece.area > 1e-4:
+        shapes.append(shapely.maximum_inscribed_circle(piece, tolerance=1e-3).interpolate(0.0))
+    return [np.array([shape.x, shape.y]) for shape in shapes]

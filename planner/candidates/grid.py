@@ -1,0 +1,48 @@
+"""Grid candidates: the corners of square cells in each room's own axes (paper, 3.2.1)."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from mission.geometry import FloatArray, IntArray
+from mission.planning import NavigableSpace
+from planner.shapes import local_origin, segments_of, to_shape
+
+
+def grid(space: NavigableSpace) -> tuple[FloatArray, IntArray]:
+    """Cell corners of every room's grid that lie in its bounding rectangle, fitted to it."""
+    origin = local_origin(space.floor)
+    per_room = [room_grid(to_shape(room.area, origin), spacing=space.settings.grid) for room in space.rooms]
+    xy = np.concatenate([np.empty((0, 2)), *per_room]) + origin
+    room = np.repeat(np.arange(len(per_room)), [len(points) for points in per_room])
+    return xy, room.astype(np.int64)
+
+
+def room_grid(room: BaseGeometry, *, spacing: float) -> FloatArray:
+    """Corners (n, 2) of cells at most `spacing` wide that divide the room's rectangle evenly."""
+    axes = main_axes(room)
+    low, high = _extent(room, axes)
+    cells = np.maximum(1, np.ceil((high - low) / spacing - 1e-9)).astype(int)
+    u, v = (np.linspace(low[k], high[k], cells[k] + 1) for k in range(2))
+    corners = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
+    return corners @ axes
+
+
+def main_axes(room: BaseGeometry) -> FloatArray:
+    """Rows: the direction most of the room's outline runs in, up to right angles, and its normal."""
+    segments = segments_of(room)
+    along = segments[:, 1] - segments[:, 0]
+    length = np.hypot(*along.T)
+    angle = np.round(np.arctan2(along[:, 1], along[:, 0]) % (np.pi / 2), 9) % round(np.pi / 2, 9)
+    angles, index = np.unique(angle, return_inverse=True)
+    weight = np.bincount(index, weights=length)
+    best = float(angles[int(np.argmax(np.round(weight, 6)))])
+    cosine, sine = np.cos(best), np.sin(best)
+    return np.array([[cosine, sine], [-sine, cosine]])
+
+
+def _extent(room: BaseGeometry, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    turned = shapely.get_coordinates(room) @ axes.T
+    return turned.min(axis=0), turned.max(axis=0)

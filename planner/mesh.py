@@ -1,0 +1,78 @@
+"""A triangle mesh of open space, on the integer grid: what sight lines and roads are looked up in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from mission.geometry import IntArray
+from planner.shapes import GRID, polygon_parts, to_grid
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Constrained Delaunay triangles of a polygonal region, counter-clockwise, in whole grid steps."""
+
+    vertices: IntArray
+    """(v, 2) in grid steps."""
+    corners: IntArray
+    """Vertices of each triangle (t, 3)."""
+    neighbour: IntArray
+    """Triangle across the edge from corner k to corner k + 1, or -1 at the region's boundary (t, 3)."""
+
+    @property
+    def triangles(self) -> int:
+        return len(self.corners)
+
+
+def mesh_of(region: BaseGeometry) -> Mesh:
+    """Triangulate a region whose vertices lie on the grid and whose touching rings share vertices."""
+    parts = [shapely.constrained_delaunay_triangles(part) for part in polygon_parts(region)]
+    triangles = shapely.get_parts(parts) if parts else np.array([])
+    xy = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    vertices, index = np.unique(to_grid(xy.reshape(-1, 2)), axis=0, return_inverse=True)
+    corners = _counter_clockwise(vertices, index.reshape(-1, 3))
+    return Mesh(vertices=vertices, corners=corners, neighbour=_neighbours(corners))
+
+
+def _counter_clockwise(vertices: IntArray, corners: IntArray) -> IntArray:
+    a, b, c = (vertices[corners[:, k]] for k in range(3))
+    turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    corners = np.where((turn < 0)[:, None], corners[:, [0, 2, 1]], corners)[turn != 0]
+    return corners[np.lexsort(corners.T[::-1])]
+
+
+def _neighbours(corners: IntArray) -> IntArray:
+    """Triangles that share an edge run along it in opposite directions."""
+    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    many = int(corners.max(initial=0)) + 1
+    key, twin = start * many + end, end * many + start
+    order = np.argsort(key, kind="stable")
+    at = np.searchsorted(key[order], twin)
+    at = np.minimum(at, max(len(order) - 1, 0))
+    found = key[order][at] == twin if len(order) else np.zeros(0, dtype=bool)
+    return np.where(found, order[at] // 3, -1).reshape(-1, 3)
+
+
+def containing(mesh: Mesh, points: NDArray[np.int64]) -> tuple[IntArray, IntArray]:
+    """(point, triangle) pairs for every triangle, edges included, that holds a grid point."""
+    tree = shapely.STRtree(_triangle_shapes(mesh))
+    point, triangle = tree.query(shapely.points(points * GRID), predicate="dwithin", distance=2 * GRID)
+    inside = np.ones(len(point), dtype=bool)
+    q = points[point]
+    for k in range(3):
+        a = mesh.vertices[mesh.corners[triangle, k]]
+        b = mesh.vertices[mesh.corners[triangle, (k + 1) % 3]]
+        turn = (b[:, 0] - a[:, 0]) * (q[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (q[:, 0] - a[:, 0])
+        inside &= turn >= 0
+    order = np.lexsort((triangle[inside], point[inside]))
+    return point[inside][order], triangle[inside][order]
+
+
+def _triangle_shapes(mesh: Mesh) -> NDArray[np.object_]:
+    xy = mesh.vertices[mesh.corners] * GRID
+    return shapely.polygons(np.concatenate([xy, xy[:, :1]], axis=1))

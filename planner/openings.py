@@ -1,0 +1,124 @@
+"""Doors and passages: which rooms they join, how wide they are, and whether the robot is let through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from mission.floor import FloorPlan, Opening
+from mission.geometry import FloatArray
+from mission.settings import Settings
+from planner.shapes import SLACK, local_origin, to_shape
+
+PROBES = (0.15, 0.25, 0.4, 0.6)
+"""Distances in metres from an opening's line at which its rooms are looked for."""
+THRESHOLD = 0.3
+"""Half the depth of the floor assumed under an opening."""
+END_GAP = 0.1
+"""An opening's line may end this short of its jamb."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """An opening in the local frame, before it is known whether the robot gets to it."""
+
+    opening: Opening
+    clear: BaseGeometry
+    """The widest piece of its line that is free of obstacles; empty if there is none."""
+    rooms: tuple[int | None, int | None]
+    closed_because: str
+    """Why the robot is not let through whatever its size; empty if it is."""
+
+    @property
+    def width(self) -> float:
+        return float(self.clear.length)
+
+
+def crossings_of(floor: FloorPlan, obstacles: BaseGeometry, settings: Settings) -> tuple[Crossing, ...]:
+    """Every opening with its clear width and the rooms on its sides."""
+    origin = local_origin(floor)
+    rooms = [to_shape(room.polygons, origin) for room in floor.rooms]
+    outline = to_shape(floor.outline, origin)
+    return tuple(_crossing(item, origin, obstacles, rooms, outline, settings) for item in floor.openings)
+
+
+def _crossing(
+    opening: Opening,
+    origin: FloatArray,
+    obstacles: BaseGeometry,
+    rooms: list[BaseGeometry],
+    outline: BaseGeometry,
+    settings: Settings,
+) -> Crossing:
+    line = shapely.LineString(opening.line - origin)
+    pieces = [p for p in shapely.get_parts(line.difference(obstacles)) if p.length > SLACK]
+    clear = max(pieces, key=lambda piece: piece.length, default=shapely.LineString())
+    sides = (None, None) if clear.is_empty else _sides(clear, rooms)
+    return Crossing(opening, clear, sides, _closed(clear, sides, rooms, outline, opening, settings))
+
+
+def _sides(clear: BaseGeometry, rooms: list[BaseGeometry]) -> tuple[int | None, int | None]:
+    """The rooms found by probing at right angles from the middle of the clear piece."""
+    middle, across = middle_and_normal(clear)
+    found = []
+    for sign in (1.0, -1.0):
+        points = [shapely.Point(middle + sign * step * across) for step in PROBES]
+        hits = [k for point in points for k, room in enumerate(rooms) if room.intersects(point)]
+        found.append(hits[0] if hits else None)
+    return found[0], found[1]
+
+
+def middle_and_normal(line: BaseGeometry) -> tuple[FloatArray, FloatArray]:
+    """Midpoint of a straight line and the unit vector to its left."""
+    a, b = shapely.get_coordinates(line)[[0, -1]]
+    along = (b - a) / np.hypot(*(b - a))
+    return (a + b) / 2, np.array([-along[1], along[0]])
+
+
+def _closed(
+    clear: BaseGeometry,
+    sides: tuple[int | None, int | None],
+    rooms: list[BaseGeometry],
+    outline: BaseGeometry,
+    opening: Opening,
+    settings: Settings,
+) -> str:
+    if clear.is_empty:
+        return "obstacles fill it"
+    if clear.length < settings.door_access - SLACK:
+        return f"{clear.length:.3f} m clear, less than door_access {settings.door_access:.3f} m"
+    if opening.kind == "door" and _is_exterior(clear, sides, rooms, outline):
+        return "exterior: no room on one side"
+    return ""
+
+
+def _is_exterior(
+    clear: BaseGeometry,
+    sides: tuple[int | None, int | None],
+    rooms: list[BaseGeometry],
+    outline: BaseGeometry,
+) -> bool:
+    if rooms:
+        return None in sides
+    middle, across = middle_and_normal(clear)
+    probes = [shapely.Point(middle + sign * PROBES[-1] * across) for sign in (1.0, -1.0)]
+    return not all(outline.intersects(probe) for probe in probes)
+
+
+def threshold(crossing: Crossing) -> BaseGeometry:
+    """The floor under an opening: its clear piece, as deep as walls are thick."""
+    return crossing.clear.buffer(THRESHOLD, cap_style="flat")
+
+
+def barrier(crossing: Crossing, origin: FloatArray, obstacles: BaseGeometry) -> FloatArray:
+    """The opening's line (2, 2), drawn out to the jambs when it ends just short of them."""
+    a, b = crossing.opening.line - origin
+    along = (b - a) / np.hypot(*(b - a))
+    ends = []
+    for end, way in ((a, -along), (b, along)):
+        reach = shapely.LineString([end, end + END_GAP * way])
+        ends.append(end + END_GAP * way if reach.intersects(obstacles) else end)
+    return np.stack(ends)

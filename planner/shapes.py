@@ -1,0 +1,110 @@
+"""Between the nouns' arrays and shapely: polygons in a local frame, snapped to a grid of 10 µm.
+
+The local frame begins at the lower left corner of the floor, so that coordinates stay small and a
+floor that is moved is planned the same. On the grid, orientation tests are exact integer arithmetic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from mission.errors import InputError
+from mission.floor import FloorPlan
+from mission.geometry import FloatArray, Polygon, bounds, frozen
+
+GRID = 1e-5
+"""Metres per grid step."""
+SLACK = 1e-7
+"""Clearances may fall short by this much: float noise, far below any drawing's precision."""
+LARGEST = 5000.0
+"""Greatest extent of a floor in metres for which all integer arithmetic stays exact."""
+
+
+@lru_cache(maxsize=8)
+def local_origin(floor: FloorPlan) -> FloatArray:
+    """The lower left corner of everything on the floor (2,); refuses floors too large to be exact."""
+    parts = [ring for polygon in floor.outline for ring in polygon.rings]
+    parts += [ring for item in floor.elements for solid in item.solids for ring in solid.rings]
+    parts += [line for item in floor.elements for line in item.lines]
+    low_x, low_y, high_x, high_y = bounds(parts)
+    extent = max(high_x - low_x, high_y - low_y)
+    if extent > LARGEST:
+        raise InputError(
+            f"{floor.name}: {extent:.0f} m across, more than {LARGEST:.0f} m; check the drawing's units"
+        )
+    return frozen([low_x, low_y])
+
+
+def to_shape(polygons: Iterable[Polygon], origin: FloatArray) -> BaseGeometry:
+    """The union of `polygons` as one shapely geometry in the local frame."""
+    return shapely.union_all([one_shape(polygon, origin) for polygon in polygons])
+
+
+def one_shape(polygon: Polygon, origin: FloatArray) -> BaseGeometry:
+    """One polygon in the local frame."""
+    return shapely.Polygon(polygon.exterior - origin, [hole - origin for hole in polygon.holes])
+
+
+def to_polygons(shape: BaseGeometry, origin: FloatArray) -> tuple[Polygon, ...]:
+    """The polygonal parts of `shape` in the drawing's coordinates, in a canonical order."""
+    polygons = [
+        Polygon.of(
+            shapely.get_coordinates(part.exterior) + origin,
+            [shapely.get_coordinates(hole) + origin for hole in part.interiors],
+        )
+        for part in polygon_parts(shape)
+    ]
+    return tuple(sorted(polygons, key=lambda polygon: tuple(polygon.exterior.min(axis=0))))
+
+
+def polygon_parts(shape: BaseGeometry) -> list[shapely.Polygon]:
+    """The polygons of a geometry of any type, empty ones left out."""
+    parts = shapely.get_parts(shapely.get_parts(shape))
+    return [part for part in parts if part.geom_type == "Polygon" and not part.is_empty]
+
+
+def snapped(shape: BaseGeometry) -> BaseGeometry:
+    """The same shape, valid, with every vertex on the grid; later operations are not rounded to it."""
+    return shapely.set_precision(shapely.set_precision(shape, GRID), 0)
+
+
+def snapped_union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
+    """The union of shapes with every vertex on the grid and every crossing a vertex."""
+    return shapely.set_precision(shapely.union_all([snapped(s) for s in shapes], grid_size=GRID), 0)
+
+
+def to_grid(xy: FloatArray) -> NDArray[np.int64]:
+    """Local coordinates in metres as whole grid steps."""
+    return np.rint(np.asarray(xy) / GRID).astype(np.int64)
+
+
+def grown(shape: BaseGeometry, distance: float) -> BaseGeometry:
+    """All points nearer than `distance`, and a little more: arcs are drawn round from outside.
+
+    Whatever lies outside the result is at least `distance` away, and less than 2 % more on its edge.
+    Segments are widened one by one, since widening whole outlines would first simplify them.
+    """
+    if distance <= 0 or shape.is_empty:
+        return shape
+    lines = shapely.linestrings(segments_of(shape)) if shape.area > 0 else shapely.get_parts(shape)
+    wide = shapely.buffer(lines, distance * GROWTH + 2 * GRID, quad_segs=QUARTER)
+    return shapely.union_all([shape, *wide] if shape.area > 0 else wide)
+
+
+QUARTER = 4
+GROWTH = float(1 / np.cos(np.pi / (4 * QUARTER)))
+"""Radius of the polygon round a circle of radius 1 with 4 × QUARTER corners."""
+
+
+def segments_of(shape: BaseGeometry) -> FloatArray:
+    """All boundary segments (n, 2, 2) of a polygonal geometry, in ring order."""
+    rings = [ring for part in polygon_parts(shape) for ring in (part.exterior, *part.interiors)]
+    coordinates = [shapely.get_coordinates(ring) for ring in rings]
+    pairs = [np.stack([ring[:-1], ring[1:]], axis=1) for ring in coordinates]
+    return np.concatenate(pairs) if pairs else np.empty((0, 2, 2))

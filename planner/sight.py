@@ -1,0 +1,177 @@
+"""Lines of sight from many points at once, over a triangle mesh of open space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from mission.geometry import BoolArray, FloatArray, IntArray
+from planner.compiling import compiled
+from planner.mesh import Mesh, containing
+from planner.shapes import GRID, to_grid
+from planner.sight_kernel import HELPERS, look
+
+COMPILE_ABOVE = 2_000_000
+"""Viewpoints × mesh triangles above which loading the compiled kernel pays for itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Things to be seen in a mesh: faces on its boundary, and free segments within it."""
+
+    mesh: Mesh
+    a: IntArray
+    """Start of each segment in grid steps (m, 2)."""
+    b: IntArray
+    units: IntArray
+    face: IntArray
+    """Segment on each mesh edge (t, 3), or -1."""
+    bucket_pointer: IntArray
+    """Range of the bucket of each triangle (t + 1,)."""
+    bucket_segment: IntArray
+    bucket_low: IntArray
+    bucket_high: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """What each viewpoint sees: runs of units on segments, viewpoint by viewpoint."""
+
+    pointer: IntArray
+    segment: IntArray
+    low: IntArray
+    high: IntArray
+
+
+def scene_of(mesh: Mesh, a: FloatArray, b: FloatArray, units: IntArray, on_boundary: BoolArray) -> Scene:
+    """Put target segments (m, 2), local metres, into the mesh: faces on its edges, others into triangles."""
+    start, end = to_grid(a), to_grid(b)
+    pointer, segment, low, high = _buckets(mesh, start, end, units, np.flatnonzero(~on_boundary))
+    return Scene(
+        mesh=mesh,
+        a=start,
+        b=end,
+        units=units,
+        face=_faces(mesh, start, end, np.flatnonzero(on_boundary)),
+        bucket_pointer=pointer,
+        bucket_segment=segment,
+        bucket_low=low,
+        bucket_high=high,
+    )
+
+
+def _faces(mesh: Mesh, a: IntArray, b: IntArray, faces: IntArray) -> IntArray:
+    """The face on each mesh edge, found by its end points."""
+    segment_at = {(*a[k].tolist(), *b[k].tolist()): int(k) for k in faces}
+    found = np.full(mesh.corners.shape, -1, dtype=np.int64)
+    for triangle, edge in np.argwhere(mesh.neighbour < 0):
+        start = mesh.vertices[mesh.corners[triangle, edge]]
+        end = mesh.vertices[mesh.corners[triangle, (edge + 1) % 3]]
+        found[triangle, edge] = segment_at.get((*start.tolist(), *end.tolist()), -1)
+    return found
+
+
+def _buckets(
+    mesh: Mesh, a: IntArray, b: IntArray, units: IntArray, free: IntArray
+) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Free segments by triangle, each with its first and last unit whose midpoint is in the triangle."""
+    unit_segment = np.repeat(free, units[free])
+    unit_number = np.concatenate([np.arange(n) for n in units[free]] or [np.empty(0)]).astype(np.int64)
+    unit, triangle = _units_in_triangles(
+        mesh, a[unit_segment], b[unit_segment], unit_number, units[unit_segment]
+    )
+    segment, number = unit_segment[unit], unit_number[unit]
+    order = np.lexsort((number, segment, triangle))
+    segment, number, triangle = segment[order], number[order], triangle[order]
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (np.diff(segment) != 0) | (np.diff(triangle) != 0) | (np.diff(number) != 1)
+    starts = np.flatnonzero(new)
+    ends = np.append(starts[1:], len(order))[: len(starts)] - 1
+    pointer = np.searchsorted(triangle[starts], np.arange(mesh.triangles + 1)).astype(np.int64)
+    return pointer, segment[starts], number[starts], number[ends]
+
+
+def _units_in_triangles(
+    mesh: Mesh, a: IntArray, b: IntArray, number: IntArray, units: IntArray
+) -> tuple[IntArray, IntArray]:
+    """(unit, triangle) pairs, a triangle's edges included; decided exactly.
+
+    A midpoint is a fraction of a grid step, so orientations are taken in steps × 2 units.
+    """
+    if not len(number) or not mesh.triangles:
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    odd, pieces = 2 * number + 1, 2 * units
+    middle = (a + (odd / pieces)[:, None] * (b - a)) * GRID
+    xy = mesh.vertices[mesh.corners] * GRID
+    tree = shapely.STRtree(shapely.polygons(np.concatenate([xy, xy[:, :1]], axis=1)))
+    unit, triangle = tree.query(shapely.points(middle), predicate="dwithin", distance=2 * GRID)
+    inside = np.ones(len(unit), dtype=bool)
+    for k in range(3):
+        p = mesh.vertices[mesh.corners[triangle, k]]
+        q = mesh.vertices[mesh.corners[triangle, (k + 1) % 3]]
+        at_a, at_b = _turns(p, q, a[unit]), _turns(p, q, b[unit])
+        inside &= _side_not_negative(at_a, at_b, odd[unit], pieces[unit])
+    return unit[inside], triangle[inside]
+
+
+def _turns(p: IntArray, q: IntArray, r: IntArray) -> IntArray:
+    return (q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0])
+
+
+def _side_not_negative(at_a: IntArray, at_b: IntArray, odd: IntArray, pieces: IntArray) -> BoolArray:
+    """Exact sign test of `side_sign` in the kernel, for arrays."""
+    slope = at_b - at_a
+    estimate = pieces.astype(float) * at_a.astype(float) + odd.astype(float) * slope.astype(float)
+    exact = pieces * at_a + odd * slope  # wraps only where the estimate already decides
+    return np.where(np.abs(estimate) > 2.0**60, estimate > 0, exact >= 0)
+
+
+def sight(scene: Scene, viewpoints: NDArray[np.int64], *, reach: float | None) -> Runs:
+    """Everything each viewpoint (grid steps) sees within `reach` metres (None: no limit)."""
+    point, triangle = containing(scene.mesh, viewpoints)
+    start = np.searchsorted(point, np.arange(len(viewpoints) + 1)).astype(np.int64)
+    steps = -1 if reach is None else round(reach / GRID)
+    arrays = [
+        np.ascontiguousarray(array, dtype=np.int64)
+        for array in (
+            *(viewpoints[:, 0], viewpoints[:, 1], start, triangle),
+            *(scene.mesh.vertices[:, 0], scene.mesh.vertices[:, 1]),
+            *(scene.mesh.corners.ravel(), scene.mesh.neighbour.ravel(), scene.face.ravel()),
+            *(scene.bucket_pointer, scene.bucket_segment, scene.bucket_low, scene.bucket_high),
+            *(scene.a[:, 0], scene.a[:, 1], scene.b[:, 0], scene.b[:, 1], scene.units),
+        )
+    ]
+    if len(viewpoints) * scene.mesh.triangles > COMPILE_ABOVE:
+        return _run(compiled(look, *HELPERS), arrays, len(viewpoints), steps, interpreted=False)
+    return _run(look, [array.tolist() for array in arrays], len(viewpoints), steps, interpreted=True)
+
+
+def _run(kernel: Callable[..., int], arrays: list[Any], rows: int, reach: int, *, interpreted: bool) -> Runs:
+    """Call the kernel for each viewpoint, with more room for its output whenever that may run out."""
+    triangles = len(arrays[8]) // 3
+    stack = _zeros(4 * (2 * triangles + 16), interpreted=interpreted)
+    out = [_zeros(4096, interpreted=interpreted) for _ in range(3)]
+    pointer = [0]
+    while len(pointer) <= rows:
+        end = kernel(len(pointer) - 1, pointer[-1], *arrays, reach, stack, *out)
+        if end < 0:
+            out = [_doubled(column) for column in out]
+        else:
+            pointer.append(int(end))
+    segment, low, high = (np.array(column[: pointer[-1]], dtype=np.int64) for column in out)
+    return Runs(pointer=np.array(pointer, dtype=np.int64), segment=segment, low=low, high=high)
+
+
+def _zeros(size: int, *, interpreted: bool) -> Any:
+    """A list where the kernel is interpreted, since lists index faster there; else an array."""
+    return [0] * size if interpreted else np.zeros(size, dtype=np.int64)
+
+
+def _doubled(column: Any) -> Any:
+    more = _zeros(len(column), interpreted=isinstance(column, list))
+    return column + more if isinstance(column, list) else np.concatenate([column, more])

@@ -1,0 +1,168 @@
+"""What is to be scanned: element boundaries, solids that touch unioned, cut into units (paper, 3.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from mission.floor import Element, FloorPlan
+from mission.geometry import FloatArray, frozen, polyline_length
+from mission.planning import Targets
+from planner.shapes import GRID, local_origin, one_shape, polygon_parts, snapped, snapped_union
+
+LINE_WALL = 1e-3
+"""Thickness in metres given to an occluding element that is drawn as a single line."""
+
+
+def occluders_of(floor: FloorPlan, closed: FloatArray) -> BaseGeometry:
+    """Everything the laser does not pass, unioned on the grid, in the local frame.
+
+    `closed` are openings it does not pass either, as segments (k, 2, 2) in the local frame.
+    """
+    origin = local_origin(floor)
+    solids = [solid_of(item, origin) for item in floor.elements if item.occludes]
+    solids += [thin_solid(segment) for segment in closed]
+    return without_idle_vertices(snapped_union(solids), floor)
+
+
+def solid_of(element: Element, origin: FloatArray) -> BaseGeometry:
+    """An element's filled plan in the local frame; lines become solids of LINE_WALL thickness."""
+    parts = [one_shape(solid, origin) for solid in element.solids]
+    parts += [thin_solid(line - origin) for line in element.lines]
+    return shapely.union_all([shapely.make_valid(part) for part in parts])
+
+
+def thin_solid(line: FloatArray) -> BaseGeometry:
+    """A line (n, 2) as a solid of LINE_WALL thickness."""
+    return shapely.LineString(line).buffer(LINE_WALL / 2, cap_style="flat", join_style="mitre")
+
+
+def targets_of(floor: FloorPlan, occluders: BaseGeometry, *, d_dis: float) -> Targets:
+    """Units of at most `d_dis` metres on every target element of the floor.
+
+    Faces of occluding solids come from their union, so hidden joint faces are none; what does not
+    occlude (beams) keeps its own outline.
+    """
+    origin = local_origin(floor)
+    faces, owners = _occluding_faces(floor, occluders)
+    free = [
+        (segment, index)
+        for index, item in enumerate(floor.elements)
+        if item.target and not item.occludes
+        for segment in _outline(item, origin)
+    ]
+    segments = np.concatenate([faces, np.array([s for s, _ in free]).reshape(-1, 2, 2)])
+    lengths = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
+    return Targets(
+        a=frozen(segments[:, 0] + origin),
+        b=frozen(segments[:, 1] + origin),
+        units=frozen(units_on(lengths, d_dis=d_dis), np.int64),
+        element=frozen([*owners, *(index for _, index in free)], np.int64),
+        occluding=frozen([True] * len(faces) + [False] * len(free), np.bool_),
+        raw=raw_units(floor, d_dis=d_dis),
+    )
+
+
+def units_on(lengths: FloatArray, *, d_dis: float) -> FloatArray:
+    """Fewest equal pieces of at most `d_dis` that make up each length (paper, 3.1)."""
+    return np.maximum(1, np.ceil(lengths / d_dis - 1e-9)).astype(np.int64)
+
+
+def raw_units(floor: FloorPlan, *, d_dis: float) -> dict[str, int]:
+    """Units per kind, each element by itself, the paper's Table 2; targets and occluders only."""
+    counts: dict[str, int] = {}
+    for item in floor.elements:
+        if item.target or item.occludes:
+            lengths = np.array([polyline_length(np.stack([a, b])) for a, b in _edges(item)])
+            counts[item.kind] = counts.get(item.kind, 0) + int(units_on(lengths, d_dis=d_dis).sum())
+    return dict(sorted(counts.items()))
+
+
+def _edges(element: Element) -> Iterator[tuple[FloatArray, FloatArray]]:
+    for solid in element.solids:
+        for ring in solid.rings:
+            yield from zip(ring, np.roll(ring, -1, axis=0), strict=True)
+    for line in element.lines:
+        yield from pairwise(line)
+
+
+def _outline(element: Element, origin: FloatArray) -> list[FloatArray]:
+    return [np.stack([a, b]) - origin for a, b in _edges(element)]
+
+
+def _occluding_faces(floor: FloorPlan, occluders: BaseGeometry) -> tuple[FloatArray, list[int]]:
+    """Faces (m, 2, 2) of the union that belong to target elements, and their elements."""
+    faces = face_segments(occluders)
+    owners = owners_of(faces, floor)
+    wanted = [k for k, owner in enumerate(owners) if owner >= 0 and floor.elements[owner].target]
+    return faces[wanted], [owners[k] for k in wanted]
+
+
+def face_segments(shape: BaseGeometry) -> FloatArray:
+    """Boundary segments (n, 2, 2) with the solid on the right hand, in a canonical order."""
+    oriented = [shapely.orient_polygons(part, exterior_cw=True) for part in polygon_parts(shape)]
+    rings = [shapely.get_coordinates(r) for part in oriented for r in (part.exterior, *part.interiors)]
+    pairs = [np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings]
+    segments = np.concatenate(pairs) if pairs else np.empty((0, 2, 2))
+    return segments[np.lexsort(segments.reshape(-1, 4).T[::-1])]
+
+
+def owners_of(faces: FloatArray, floor: FloorPlan) -> list[int]:
+    """The element whose boundary each face lies on; a target before another, then the first; else -1."""
+    origin = local_origin(floor)
+    indices = [k for k, item in enumerate(floor.elements) if item.occludes]
+    outlines = [shapely.boundary(snapped(solid_of(floor.elements[k], origin))) for k in indices]
+    tree = shapely.STRtree(outlines)
+    middles = shapely.points(faces.mean(axis=1)) if len(faces) else []
+    face, hit = tree.query(middles, predicate="dwithin", distance=3 * GRID)
+    owners = [-1] * len(faces)
+    for f, h in sorted(zip(face.tolist(), hit.tolist(), strict=True)):
+        element = indices[h]
+        if owners[f] < 0 or (floor.elements[element].target and not floor.elements[owners[f]].target):
+            owners[f] = element
+    return owners
+
+
+def without_idle_vertices(shape: BaseGeometry, floor: FloorPlan) -> BaseGeometry:
+    """The union without vertices on a straight face of one element, left there by crossings inside.
+
+    They would cut a face into pieces and so make more units than the paper's fewest.
+    """
+    faces = face_segments(shape)
+    owner = dict(zip(map(_key, faces), owners_of(faces, floor), strict=True))
+    uses: dict[tuple[float, ...], int] = {}
+    for a, _ in faces:
+        uses[tuple(a)] = uses.get(tuple(a), 0) + 1
+    polygons = []
+    for part in polygon_parts(shape):
+        turned = shapely.orient_polygons(part, exterior_cw=True)
+        outlines = (turned.exterior, *turned.interiors)
+        rings = [_thinned(shapely.get_coordinates(ring), owner, uses) for ring in outlines]
+        polygons.append(shapely.Polygon(rings[0], rings[1:]))
+    return shapely.MultiPolygon(polygons)
+
+
+def _key(segment: FloatArray) -> tuple[float, ...]:
+    return tuple(segment.ravel().tolist())
+
+
+def _thinned(
+    ring: FloatArray, owner: dict[tuple[float, ...], int], uses: dict[tuple[float, ...], int]
+) -> FloatArray:
+    points = ring[:-1]
+    whole = np.rint(points / GRID).astype(np.int64)
+    before, after = np.roll(whole, 1, axis=0), np.roll(whole, -1, axis=0)
+    into, out = whole - before, after - whole
+    straight = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] == 0
+    keep = [
+        not straight[k]
+        or uses[tuple(points[k])] > 1
+        or owner[_key(np.stack([points[k - 1], points[k]]))]
+        != owner[_key(np.stack([points[k], points[(k + 1) % len(points)]]))]
+        for k in range(len(points))
+    ]
+    return points[keep]
