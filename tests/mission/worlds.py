@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from mission.document import (
     Frame,
     Mission,
@@ -17,6 +19,18 @@ from mission.document import (
     Start,
     Stop,
     sealed,
+)
+from mission.floor import KINDS, Element, FloorPlan, Opening, Room
+from mission.geometry import Polygon, frozen
+from mission.planning import (
+    Candidates,
+    NavigableSpace,
+    OpeningState,
+    RoomSpace,
+    Route,
+    Selection,
+    Targets,
+    Visibility,
 )
 from mission.settings import Settings
 
@@ -52,3 +66,115 @@ def square_tour() -> Mission:
         stop("S2", (4.0, 0.0), (4.0, 3.0), heading=math.pi / 2),
         back=((4.0, 3.0), (0.0, 0.0)),
     )
+
+
+def room_floor() -> FloorPlan:
+    """A room of 8 × 4 m in walls 0.2 m thick, two columns of 0.4 m, a window, a door, a passage."""
+    inner = box(0, 0, 8, 4)
+    walls = Polygon.of(box(-0.2, -0.2, 8.2, 4.2), [inner])
+    columns = [Polygon.of(box(x, 1.8, x + 0.4, 2.2)) for x in (2.4, 5.2)]
+    return FloorPlan(
+        name="room",
+        digest="0" * 64,
+        outline=(Polygon.of(box(-0.2, -0.2, 8.2, 4.2)),),
+        rooms=(Room("R1", "Hall <1> & co", (Polygon.of(inner),)),),
+        openings=(
+            Opening("D1", "door", frozen([[3.5, -0.1], [4.5, -0.1]])),
+            Opening("P1", "passage", frozen([[8.1, 1.7], [8.1, 2.3]])),
+        ),
+        elements=(
+            element("W1", "walls", walls, global_id="0LiOMJvJv5Bu0hPkJYEFGw"),
+            *(element(f"C{number}", "columns", column) for number, column in enumerate(columns, 1)),
+            element("N1", "windows", Polygon.of(box(1, -0.2, 2, 0))),
+        ),
+    )
+
+
+def element(name: str, kind: str, solid: Polygon, global_id: str | None = None) -> Element:
+    """An element with the defaults of its kind."""
+    means = KINDS[kind]
+    return Element(
+        name, kind, (solid,), global_id=global_id,
+        occludes=means.occludes, obstacle=means.obstacle, target=means.target,
+    )  # fmt: skip
+
+
+def box(x0: float, y0: float, x1: float, y1: float) -> list[tuple[float, float]]:
+    """A rectangle's corners, counter-clockwise."""
+    return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+
+
+def room_route() -> Route:
+    """Two stops in the room's halves; each sees the 1 m units of its half, the third candidate all."""
+    floor = room_floor()
+    space = NavigableSpace(
+        floor=floor, settings=Settings(d_dis=1.0), rooms=(whole_room(floor),), openings=opening_states(floor),
+        obstacles=(), occluders=(), barriers=frozen(np.empty((0, 2, 2))), drive_area=(),
+        gaps=frozen(np.empty((0, 2, 2))), targets=room_targets(floor),
+    )  # fmt: skip
+    xy = frozen([[1.2, 2.0], [6.8, 2.0], [4.0, 2.0]])
+    zeros = frozen([0, 0, 0], np.int64)
+    candidates = Candidates(space, xy=xy, room=zeros, reason=zeros, part=zeros, strategy="hand")
+    selection = Selection(
+        visibility=halves_seen(candidates), chosen=frozen([1, 0], np.int64),
+        coverage_steps=frozen([0.5, 1.0]), required=0.9, bound=2, method="hand",
+    )  # fmt: skip
+    return Route(
+        selection=selection, order=frozen([1, 0], np.int64), start=(1.2, 1.0, 0.0), start_reason="given",
+        approaches=(frozen([[1.2, 1.0], [1.2, 2.0]]), frozen([[1.2, 2.0], [4.0, 1.2], [6.8, 2.0]])),
+        return_leg=frozen([[6.8, 2.0], [1.2, 1.0]]), tour="closed", bound=10.0, method="hand",
+    )  # fmt: skip
+
+
+def whole_room(floor: FloorPlan) -> RoomSpace:
+    """The floor's only room, where stops may be anywhere."""
+    room = floor.rooms[0]
+    return RoomSpace(0, room.label, area=room.polygons, stop_area=room.polygons)
+
+
+def opening_states(floor: FloorPlan) -> tuple[OpeningState, ...]:
+    """The door is passable, the passage is not."""
+    door, passage = floor.openings
+    return (
+        OpeningState(door, (0, None), clear_width=1.0, passable=True, why=""),
+        OpeningState(passage, (0, None), clear_width=0.6, passable=False, why="narrower than 0.7 m"),
+    )
+
+
+def room_targets(floor: FloorPlan) -> Targets:
+    """The room's four faces in units of 1 m, and one unit on each face of the columns."""
+    rings = [floor.elements[0].solids[0].holes[0]]
+    rings += [solid.exterior for item in floor.elements[1:3] for solid in item.solids]
+    a = np.concatenate(rings)
+    b = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+    units = np.maximum(1, np.rint(np.hypot(*(b - a).T)))
+    owners = np.repeat([0, 1, 2], 4)
+    return Targets(
+        a=frozen(a), b=frozen(b), units=frozen(units, np.int64), element=frozen(owners, np.int64),
+        occluding=frozen(np.ones(12), np.bool_), raw={"walls": 48, "columns": 8},
+    )  # fmt: skip
+
+
+def halves_seen(candidates: Candidates) -> Visibility:
+    """Candidate 0 sees the units left of x = 4, candidate 1 the others, candidate 2 all but the last."""
+    targets = candidates.space.targets
+    left = targets.unit_xy[:, 0] < 4
+    rows = [left, ~left, np.arange(targets.total) < targets.total - 1]
+    runs = [run for row in rows for run in unit_runs(row, targets)]
+    counts = [len(unit_runs(row, targets)) for row in rows]
+    segment, first, last = (frozen(column, np.int64) for column in zip(*runs, strict=True))
+    pointer = frozen(np.concatenate([[0], np.cumsum(counts)]), np.int64)
+    return Visibility(candidates, pointer, segment, first, last, method="hand")
+
+
+def unit_runs(seen: np.ndarray, targets: Targets) -> list[tuple[int, int, int]]:
+    """(segment, unit, unit) of every unit seen."""
+    return [(int(targets.unit_segment[unit]), unit, unit) for unit in np.flatnonzero(seen).tolist()]
+
+
+def room_mission() -> Mission:
+    """The mission of `room_route`."""
+    route = room_route()
+    approaches = [tuple((float(x), float(y)) for x, y in leg) for leg in route.approaches]
+    stops = [stop(f"S{number}", *leg) for number, leg in enumerate(approaches, 1)]
+    return mission_of(*stops, back=((6.8, 2.0), (1.2, 1.0)))
