@@ -1,9 +1,317 @@
-"""Commands of this folder."""
+"""The bridge's commands: each reads its options, calls one verb, and prints what it gave."""
 
 from __future__ import annotations
 
+import json
+import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
 import typer
+
+from mission.errors import InputError
+
+if TYPE_CHECKING:
+    from bridge.protocol import Answer, Verb
+    from bridge.station import Station
+    from mission.document import Mission
+    from mission.events import Pose, StateReport
+
+RobotName = Annotated[str, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
+Connect = Annotated[
+    str, typer.Option("--connect", metavar="ENDPOINT", help="Where it listens, such as tcp/127.0.0.1:7447.")
+]
+Site = Annotated[str | None, typer.Option("--site", metavar="NAME", help="Prefix of the site's keys.")]
+As = Annotated[
+    str | None, typer.Option("--as", metavar="WHO", help="Who gives the order; user@host if not given.")
+]
+Timeout = Annotated[
+    float, typer.Option("--timeout", min=0.1, metavar="S", help="How long to wait, in seconds.")
+]
+Insecure = Annotated[
+    bool, typer.Option("--insecure", help="Allow addresses beyond this machine without keys.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+StopId = Annotated[str | None, typer.Option("--stop", metavar="ID", help="The stop that is meant.")]
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
 def add_commands(app: typer.Typer) -> None:
     """Add this folder's verbs to the front door."""
+    app.command()(robot)
+    app.command()(push)
+    app.command()(start)
+    for verb in ABOUT:
+        app.command(name=verb)(order_of(verb))
+    app.command()(status)
+    app.command()(watch)
+
+
+def robot(
+    *,
+    name: Annotated[str, typer.Option("--name", help="Name of this robot.")],
+    state: Annotated[Path, typer.Option("--state", metavar="DIR", help="Its journal; one per robot.")],
+    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where to listen.")] = DEFAULT_ENDPOINT,
+    site: Site = None,
+    speed_up: Annotated[
+        float, typer.Option("--speed-up", min=0.01, max=1000, help="How much faster simulated time runs.")
+    ] = 1.0,
+    at: Annotated[
+        str | None,
+        typer.Option("--at", metavar="X,Y,HEADING", help="Where it stands (m, degrees); else at the start."),
+    ] = None,
+    insecure: Insecure = False,
+) -> None:
+    """Be a robot, with a simulated base and scanner, until SIGTERM.
+
+    Example: stopgo robot --name r1 --listen tcp/127.0.0.1:7447 --state r1.state --speed-up 20
+    """
+    from bridge.robot import RobotOptions, run_robot
+
+    options = RobotOptions(
+        name=name, listen=listen, state=state, site=site, speed_up=speed_up,
+        at=None if at is None else read_pose(at), insecure=insecure,
+    )  # fmt: skip
+    run_robot(options, ready=lambda: say(f"ready {name} listens on {listen}"))
+
+
+def push(
+    mission: Annotated[Path, typer.Argument(metavar="MISSION.json", help="The mission to send.")],
+    *,
+    robot: RobotName,
+    connect: Connect = DEFAULT_ENDPOINT,
+    site: Site = None,
+    who: As = None,
+    timeout: Timeout = 5.0,
+    insecure: Insecure = False,
+    json_: Json = False,
+) -> None:
+    """Send a mission to a robot, and see it stored there whole, or rejected with the reasons.
+
+    Example: stopgo push out/mission.json --robot r1 --connect tcp/127.0.0.1:7447
+    """
+    document = read_mission(mission)
+    with (
+        reached(robot, connect, site=site, who=who, timeout=timeout, insecure=insecure) as station,
+        Bar("pushing") as bar,
+    ):
+        accepted = station.push(document, progress=bar.show)
+    if json_:
+        print_json({"robot": robot, "mission_id": accepted.mission_id, "revision": accepted.revision,
+                    "digest": accepted.digest, "already": accepted.already})  # fmt: skip
+    else:
+        how = "already held" if accepted.already else "accepted"
+        typer.echo(f"{robot} {how} {document.name} ({document.id[:12]} revision {document.revision})")
+
+
+def start(
+    *,
+    robot: RobotName,
+    connect: Connect = DEFAULT_ENDPOINT,
+    site: Site = None,
+    who: As = None,
+    timeout: Timeout = 5.0,
+    insecure: Insecure = False,
+    again: Annotated[bool, typer.Option("--again", help="Run a mission that was run before.")] = False,
+    from_here: Annotated[
+        bool, typer.Option("--from-here", help="Start at the nearest point of the route.")
+    ] = False,
+    json_: Json = False,
+) -> None:
+    """Start the mission that the robot holds.
+
+    Example: stopgo start --robot r1 --connect tcp/127.0.0.1:7447
+    """
+    with reached(robot, connect, site=site, who=who, timeout=timeout, insecure=insecure) as station:
+        report_answer(station.command("start", again=again, from_here=from_here), robot, json_)
+
+
+ABOUT: dict[Verb, str] = {
+    "pause": "Let the robot stand still; a scan under way is finished. Any station may.",
+    "resume": "Let a paused robot go on, from where it stands.",
+    "skip": "Leave out the stop that the robot works on; its way is still driven.",
+    "retry": "Let a robot that is held try again.",
+    "abort": "End the run where the robot stands. Any station may.",
+    "home": "End the run and drive back along the legs that were driven.",
+}
+
+
+def order_of(verb: Verb) -> Callable[..., None]:
+    """The command that gives the order `verb`."""
+
+    def command(
+        *,
+        robot: RobotName,
+        stop: Annotated[
+            str | None, typer.Option("--stop", metavar="ID", help="The stop that is meant.")
+        ] = None,
+        connect: Connect = DEFAULT_ENDPOINT,
+        site: Site = None,
+        who: As = None,
+        timeout: Timeout = 5.0,
+        insecure: Insecure = False,
+        json_: Json = False,
+    ) -> None:
+        with reached(robot, connect, site=site, who=who, timeout=timeout, insecure=insecure) as station:
+            report_answer(station.command(verb, stop=stop), robot, json_)
+
+    command.__doc__ = f"{ABOUT[verb]}\n\nExample: stopgo {verb} --robot r1 --connect {DEFAULT_ENDPOINT}"
+    return command
+
+
+def status(
+    *,
+    robot: RobotName,
+    connect: Connect = DEFAULT_ENDPOINT,
+    site: Site = None,
+    timeout: Timeout = 5.0,
+    insecure: Insecure = False,
+    json_: Json = False,
+) -> None:
+    """Tell what the robot is doing.
+
+    Example: stopgo status --robot r1 --json
+    """
+    with reached(robot, connect, site=site, who=None, timeout=timeout, insecure=insecure) as station:
+        report = station.status()
+    if json_:
+        print_json({key: getattr(report, key) for key in STATUS_KEYS})
+    else:
+        typer.echo(state_line(report))
+
+
+STATUS_KEYS = (
+    "robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop", "done", "skipped", "battery",
+)  # fmt: skip
+
+
+def watch(
+    *,
+    robot: RobotName,
+    connect: Connect = DEFAULT_ENDPOINT,
+    site: Site = None,
+    timeout: Timeout = 5.0,
+    insecure: Insecure = False,
+    rrd: Annotated[
+        Path | None, typer.Option("--rrd", metavar="FIELD.rrd", help="Record the run for Rerun.")
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Follow the robot's run until it ends, gaps filled from its journal; never touches the robot.
+
+    Ends with 0 when the run finished and 1 when it was aborted.
+
+    Example: stopgo watch --robot r1 --rrd field.rrd
+    """
+    from bridge.watch import watch_run
+
+    with (
+        reached(robot, connect, site=site, who=None, timeout=timeout, insecure=insecure) as station,
+        recording(rrd) as record,
+    ):
+        state = watch_run(station, record, say=say)
+    if json_:
+        print_json({key: getattr(state, key) for key in STATUS_KEYS})
+    raise typer.Exit(0 if state.state == "FINISHED" else 1)
+
+
+def recording(path: Path | None) -> AbstractContextManager[Any]:
+    """The field recording at `path`; nothing of Rerun is loaded without one."""
+    if path is None:
+        return ExitStack()
+    from recordings.field import FieldRecording
+
+    return FieldRecording(path, None)
+
+
+def reached(
+    robot: str, endpoint: str, *, site: str | None, who: str | None, timeout: float, insecure: bool
+) -> AbstractContextManager[Station]:
+    from bridge.station import connect
+
+    return connect(endpoint, robot=robot, site=site, commander=who, timeout_s=timeout, insecure=insecure)
+
+
+def report_answer(answer: Answer, robot: str, json_: bool) -> None:
+    if json_:
+        print_json({"robot": robot, "verb": answer.verb, "outcome": answer.outcome,
+                    "run_id": answer.run_id, "state": answer.state})  # fmt: skip
+    else:
+        typer.echo(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
+
+
+def state_line(report: StateReport) -> str:
+    """The state as one line a person reads."""
+    mission = (
+        f"mission {report.mission_id[:12]} revision {report.revision}" if report.mission_id else "no mission"
+    )
+    stop = f", {report.stop_state} at {report.stop}" if report.stop else ""
+    skipped = f", {len(report.skipped)} skipped" if report.skipped else ""
+    return (
+        f"{report.robot}: {report.state}{stop}; {mission}; {len(report.done)} done{skipped};"
+        f" battery {report.battery:.0%}"
+    )
+
+
+def read_mission(path: Path) -> Mission:
+    """The mission in a file, read strictly."""
+    import msgspec
+
+    from mission.document import Mission, digest_of
+
+    try:
+        mission = msgspec.json.decode(path.read_bytes(), type=Mission)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except msgspec.DecodeError as error:
+        raise InputError(f"{path}: not a mission: {error}") from None
+    if digest_of(mission) != mission.digest:
+        raise InputError(f"{path}: digest {mission.digest[:12]} is not that of its content; plan it again")
+    return mission
+
+
+def read_pose(text: str) -> Pose:
+    """A pose from X,Y,HEADING in metres and degrees."""
+    import math
+
+    from mission.events import Pose
+
+    try:
+        x, y, heading = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--at {text}: write it X,Y,HEADING in metres and degrees, as 1.5,2,90") from None
+    if not all(map(math.isfinite, (x, y, heading))):
+        raise InputError(f"--at {text}: must be finite numbers")
+    return Pose(x=x, y=y, heading=math.radians(heading))
+
+
+class Bar:
+    """A progress bar on stderr, if that is a terminal."""
+
+    def __init__(self, label: str) -> None:
+        self._label = label
+        self._shows = sys.stderr.isatty()
+
+    def __enter__(self) -> Bar:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._shows:
+            print(file=sys.stderr)  # noqa: T201
+
+    def show(self, done: int, total: int) -> None:
+        if self._shows:
+            filled = 30 * done // max(1, total)
+            bar = "█" * filled + "·" * (30 - filled)
+            print(f"\r{self._label} {bar} {done / 1e3:.0f}/{total / 1e3:.0f} kB", end="", file=sys.stderr)  # noqa: T201
+
+
+def say(line: str) -> None:
+    """One line for the person, on stderr."""
+    print(line, file=sys.stderr, flush=True)  # noqa: T201
+
+
+def print_json(document: dict[str, Any]) -> None:
+    print(json.dumps(document))  # noqa: T201

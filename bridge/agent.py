@@ -1,0 +1,169 @@
+"""The robot's end of the link: answers what stations ask, and tells what happens.
+
+Presence is a token, health is the age of the last state: a robot tells its state on every change and at
+least every second, its pose many times a second, and every event as soon as the journal has it.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import msgspec
+
+from bridge.clock import Clock
+from bridge.controller import Controller
+from bridge.inbox import Inbox
+from bridge.journal import Journal
+from bridge.link import Link, Request
+from bridge.protocol import (
+    CHUNK_BYTES,
+    LOG_PAGE,
+    MAX_DOCUMENT_BYTES,
+    VERSION,
+    Command,
+    Info,
+    Keys,
+    LogPage,
+    Malformed,
+    decode,
+    encode,
+)
+from bridge.robots import Base, Scanner
+from mission import __version__
+from mission.events import PoseReport
+
+STATE_EVERY_S = 1.0
+POSE_EVERY_S = 0.05
+LEAST_POSE_PAUSE_S = 0.02
+"""However fast the simulated clock runs, poses go out at most fifty times a second."""
+POSES_KEPT = 3000
+EVENTS_KEPT = 1000
+
+
+class Agent:
+    """One robot on a link."""
+
+    def __init__(
+        self,
+        *,
+        keys: Keys,
+        link: Link,
+        journal: Journal,
+        controller: Controller,
+        base: Base,
+        scanner: Scanner,
+        clock: Clock,
+        command_clock: Clock,
+        speed_up: float = 1.0,
+    ) -> None:
+        self._keys = keys
+        self._link = link
+        self._journal = journal
+        self._controller = controller
+        self._base = base
+        self._clock = clock
+        self._command_clock = command_clock
+        self._profiles = scanner.profiles
+        self._pose_pause_s = max(POSE_EVERY_S / speed_up, LEAST_POSE_PAUSE_S)
+        self._inbox = Inbox(journal, controller, scanner.profiles)
+        self._closing = threading.Event()
+        self._news = threading.Event()
+        self._threads: list[threading.Thread] = []
+
+    def serve(self) -> None:
+        """Answer on every key."""
+        keys, link = self._keys, self._link
+        link.serve(keys.info, self._info)
+        link.serve(keys.log, self._log)
+        link.serve(keys.mission("*", "**"), lambda request: encode(self._inbox.receive(request)))
+        link.serve(keys.command("*"), self._command)
+
+    def open(self) -> None:
+        """Answer, begin to work and to tell, and announce the robot."""
+        self.serve()
+        keys, link = self._keys, self._link
+        self._tell_state = link.publisher(keys.state, kept=1)
+        self._tell_event = link.publisher(keys.event, kept=EVENTS_KEPT)
+        self._tell_pose = link.publisher(keys.pose, kept=POSES_KEPT)
+        self._controller.changed = self._news.set
+        for work in (self._controller.serve, self._tell_news, self._tell_poses):
+            thread = threading.Thread(target=work, name=work.__name__, daemon=True)
+            self._threads.append(thread)
+            thread.start()
+        link.announce(keys.alive)
+
+    def close(self) -> None:
+        self._controller.close()
+        self._closing.set()
+        self._news.set()
+        for thread in self._threads:
+            thread.join()
+
+    def _info(self, request: Request) -> bytes:
+        info = Info(
+            protocol=VERSION,
+            stopgo=__version__,
+            robot=self._keys.robot,
+            boot_id=self._controller.boot_id,
+            clock_ns=self._command_clock.now_ns(),
+            state=self._controller.report(),
+            chunk_bytes=CHUNK_BYTES,
+            document_bytes=MAX_DOCUMENT_BYTES,
+            profiles=self._profiles,
+        )
+        return encode(info)
+
+    def _command(self, request: Request) -> bytes:
+        try:
+            command = decode(request.payload, Command)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            return encode(Malformed(message=f"command: {error}"))
+        if not request.key.endswith(f"/cmd/{command.verb}"):
+            return encode(Malformed(message=f"command {command.verb} on {request.key}"))
+        return encode(self._controller.obey(command))
+
+    def _log(self, request: Request) -> bytes:
+        since = request.parameters.get("since", "0")
+        if not since.isdecimal() or len(since) > 18:
+            return encode(Malformed(message=f"since={since}: a number of an event is wanted"))
+        run_id = request.parameters.get("run")
+        events = self._journal.events(since=int(since), run_id=run_id, limit=LOG_PAGE)
+        return encode(LogPage(events=events, newest=self._journal.newest))
+
+    def _tell_news(self) -> None:
+        """State on every change and every second; each event once, in order."""
+        told = self._journal.newest
+        while not self._closing.is_set():
+            self._news.wait(STATE_EVERY_S)
+            self._news.clear()
+            for event in self._journal.events(since=told):
+                self._tell_event(encode(event))
+                told = event.number
+            self._tell_state(encode(self._controller.report()))
+
+    def _tell_poses(self) -> None:
+        seq = 0
+        while not self._closing.wait(self._pose_pause_s):
+            seq += 1
+            self._tell_pose(encode(self._pose_report(seq)))
+
+    def _pose_report(self, seq: int) -> PoseReport:
+        run, now_ns = self._controller.run, self._clock.now_ns()
+        return PoseReport(
+            robot=self._keys.robot, boot_id=self._controller.boot_id, seq=seq, robot_ns=now_ns,
+            run_id=run.run_id,
+            mission_time_s=(now_ns - run.started_ns) / 1e9 if run.run_id else None,
+            pose=self._base.pose(), speed=self._base.speed(),
+        )  # fmt: skip
+
+
+@contextmanager
+def on_link(agent: Agent) -> Iterator[Agent]:
+    """The agent at work, until the block ends."""
+    agent.open()
+    try:
+        yield agent
+    finally:
+        agent.close()

@@ -1,0 +1,66 @@
+"""Time, which comes from outside: the wall's, sped up for a simulated robot, or a test's own."""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections.abc import Callable
+from threading import Event
+from typing import Protocol
+
+
+class Clock(Protocol):
+    def now_ns(self) -> int:
+        """Nanoseconds since 1970; never goes back."""
+
+    def wait(self, seconds: float, until: Event | None = None) -> bool:
+        """Wait, or return early and true when `until` is set."""
+
+
+class WallClock:
+    """The machine's time from `origin_ns` on, running `speed_up` times as fast.
+
+    It counts on the monotonic clock, so that a correction of the date moves nothing.
+    """
+
+    def __init__(self, *, speed_up: float = 1.0, origin_ns: int | None = None) -> None:
+        self._speed_up = speed_up
+        self._origin_ns = time.time_ns() if origin_ns is None else origin_ns
+        self._began_ns = time.monotonic_ns()
+
+    def now_ns(self) -> int:
+        return self._origin_ns + int((time.monotonic_ns() - self._began_ns) * self._speed_up)
+
+    def wait(self, seconds: float, until: Event | None = None) -> bool:
+        pause = max(0.0, seconds) / self._speed_up
+        if until is None:
+            time.sleep(pause)
+            return False
+        return until.wait(pause)
+
+
+class SimulatedClock:
+    """Time that passes only when somebody waits; what was set for a time happens while it passes."""
+
+    def __init__(self, *, origin_ns: int = 1_700_000_000_000_000_000) -> None:
+        self._now_ns = origin_ns
+        self._due: list[tuple[int, int, Callable[[], object]]] = []
+
+    def now_ns(self) -> int:
+        return self._now_ns
+
+    def at(self, seconds: float, happens: Callable[[], object]) -> None:
+        """Let `happens` be called `seconds` from now, by whoever waits then."""
+        heapq.heappush(self._due, (self._now_ns + round(seconds * 1e9), len(self._due), happens))
+
+    def wait(self, seconds: float, until: Event | None = None) -> bool:
+        if until is not None and until.is_set():
+            return True
+        end_ns = self._now_ns + round(max(0.0, seconds) * 1e9)
+        while self._due and self._due[0][0] <= end_ns:
+            self._now_ns, _, happens = heapq.heappop(self._due)
+            happens()
+            if until is not None and until.is_set():
+                return True
+        self._now_ns = max(self._now_ns, end_ns)
+        return until is not None and until.is_set()

@@ -1,0 +1,347 @@
+"""Drives a mission stop by stop: every step is stored before it is taken, so that a crash repeats none.
+
+Each stop goes WAITING, NAVIGATING, SETTLING, SCANNING, VERIFYING, DONE; `run` says what each outcome leads
+to, `commands` what each order does. This module is where they meet the robot, the journal and the clock.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import threading
+import uuid
+from collections.abc import Callable
+
+import msgspec
+
+from bridge import route
+from bridge import run as runs
+from bridge.clock import Clock
+from bridge.commands import Refused, Situation, decide
+from bridge.journal import Journal
+from bridge.protocol import Answer, Command, Manifest, Rejected, encode
+from bridge.robots import Base, Scanner
+from bridge.run import Change, Run
+from mission.document import Mission, Stop
+from mission.events import Pose, StateReport
+
+STILL_M = 0.002
+"""Greatest motion of a robot that stands still while it settles."""
+STILL_RAD = 0.002
+SETTLE_SAMPLE_S = 0.1
+SETTLE_LIMIT_S = 30.0
+"""How much longer than `settle_s` a robot may take to stand still."""
+
+
+class Controller:
+    """The robot's run, its journal, and the base and scanner that carry it out.
+
+    `step` does one piece of work; `serve` calls it until `close`. Orders come from other threads: they
+    change the run under the lock and interrupt the piece of work that no longer belongs to it.
+    """
+
+    def __init__(
+        self,
+        *,
+        robot: str,
+        journal: Journal,
+        base: Base,
+        scanner: Scanner,
+        clock: Clock,
+        command_clock: Clock | None = None,
+        mission_taken: Callable[[Mission], None] = lambda mission: None,
+    ) -> None:
+        self.robot = robot
+        self.boot_id = uuid.uuid4().hex[:12]
+        self.changed: Callable[[], None] = lambda: None
+        """Called after every stored change."""
+        self._journal = journal
+        self._base = base
+        self._scanner = scanner
+        self._clock = clock
+        self._command_clock = command_clock or clock
+        self._mission_taken = mission_taken
+        self._lock = threading.RLock()
+        self._interrupt = threading.Event()
+        self._wake = threading.Event()
+        self._closing = False
+        self._seq = 0
+        self._mission: Mission | None = None
+        self._run = Run()
+        self._recover()
+
+    @property
+    def run(self) -> Run:
+        return self._run
+
+    def _recover(self) -> None:
+        """Stand still, and wait where the journal says the run was."""
+        self._base.stop()
+        kept = self._journal.fact("run", Run)
+        if kept is None:
+            return
+        self._run = kept
+        self._mission = self._stored(kept.mission_id, kept.revision)
+        if kept.state == "READY" and self._mission is not None:
+            self._mission_taken(self._mission)
+        change = runs.rebooted(kept)
+        if change.run != kept:
+            self._keep(change)
+
+    def _stored(self, mission_id: str | None, revision: int | None) -> Mission | None:
+        held = None if mission_id is None else self._journal.mission(mission_id, revision or 0)
+        return None if held is None else msgspec.json.decode(held[1], type=Mission)
+
+    # Orders and missions, from the link's threads
+
+    def obey(self, command: Command) -> Answer:
+        """Carry out an order once, however often it comes, and remember what was answered."""
+        order = hashlib.sha256(encode(command)).hexdigest()
+        with self._lock:
+            before = self._journal.answer(command.cmd_id)
+            if before is not None:
+                return before[1] if before[0] == order else self._id_reused(command)
+            decision = decide(command, self._situation())
+            answer = self._answer(command, decision)
+            with self._journal.transaction():
+                if isinstance(decision, Change):
+                    self._write(decision)
+                self._journal.store_answer(order, answer)
+            if isinstance(decision, Change):
+                self._adopt(decision.run, ordered=True)
+            return answer
+
+    def _situation(self) -> Situation:
+        mission = self._mission
+        return Situation(
+            run=self._run,
+            mission=mission,
+            has_run=mission is not None and self._journal.has_run(mission.id, mission.revision),
+            pose=self._base.pose(),
+            now_ns=self._clock.now_ns(),
+            command_ns=self._command_clock.now_ns(),
+            new_run_id=uuid.uuid4().hex[:12],
+        )
+
+    def _answer(self, command: Command, decision: Change | Refused) -> Answer:
+        refused = decision if isinstance(decision, Refused) else None
+        run = decision.run if isinstance(decision, Change) else self._run
+        return Answer(
+            cmd_id=command.cmd_id, verb=command.verb, outcome="refused" if refused else "ok",
+            reason=refused.reason if refused else None, message=refused.message if refused else "",
+            run_id=run.run_id, state=run.state,
+        )  # fmt: skip
+
+    def _id_reused(self, command: Command) -> Answer:
+        message = f"command id {command.cmd_id} was used for another order"
+        return self._answer(command, Refused("id_reused", message))
+
+    def take(self, manifest: Manifest, document: bytes, mission: Mission) -> Rejected | None:
+        """Store a whole mission and make it the one to be run; not while another one runs."""
+        with self._lock:
+            current = (self._run.mission_id, self._run.revision) == (mission.id, mission.revision)
+            if not current and not self._run.over:
+                message = f"the robot is {self._run.state} with mission {self._run.mission_id}"
+                return Rejected(reason="running", messages=(message,))
+            run = self._run if current else runs.installed(self._run, mission)
+            with self._journal.transaction():
+                if self._journal.mission(mission.id, mission.revision) is None:
+                    self._journal.store_mission(manifest, document)
+                self._journal.end_transfer(manifest)
+                self._write(Change(run))
+            self._mission = mission
+            if not current:
+                self._mission_taken(mission)
+                self._adopt(run, ordered=True)
+        return None
+
+    # The work, in the controller's own thread
+
+    def serve(self) -> None:
+        """Work until closed."""
+        while not self._closing:
+            self._wake.clear()
+            if not self.step():
+                self._wake.wait()
+
+    def close(self) -> None:
+        """Stop where the robot is; the next boot finds the run as it was."""
+        with self._lock:
+            self._closing = True
+            self._interrupt.set()
+            self._wake.set()
+
+    def step(self) -> bool:
+        """The next piece of work; false if there is none."""
+        with self._lock:
+            run, mission = self._run, self._mission
+            if self._closing or mission is None or not has_work(run):
+                return False
+            self._interrupt.clear()
+        if run.state == "HOMING":
+            self._drive_home(run, mission)
+        else:
+            WORK[run.stop_state](self, run, mission)
+        return True
+
+    def _leave(self, run: Run, mission: Mission) -> None:
+        battery = self._base.battery()
+        if battery < mission.policy.battery_min:
+            reason = f"battery at {battery:.0%}, below {mission.policy.battery_min:.0%}"
+            home = runs.heading_home(run, mission, then="PAUSED", reason=reason)
+            self._advance(run, lambda now: Change(home))
+        else:
+            self._advance(run, runs.leaving)
+
+    def _navigate(self, run: Run, mission: Mission) -> None:
+        """Drive what is left of the leg, or the correction to the stop."""
+        stop, pose = mission.stops[run.at], self._base.pose()
+        at_stop = run.leg > run.at
+        path = ((stop.x, stop.y),) if at_stop else route.forward(mission.stops[run.leg].approach, pose)
+        outcome = "arrived"
+        if not (at_stop and distance(pose, stop) <= stop.tolerance_m):
+            heading = stop.heading if run.leg >= run.at else None
+            outcome = self._base.goto(path, heading=heading, limits=mission.robot, interrupt=self._interrupt)
+        here = self._base.pose()
+        if outcome == "blocked":
+            reason = f"the way to {stop.id} is blocked at ({here.x:.2f}, {here.y:.2f})"
+            self._advance(run, lambda now: runs.held(now, reason))
+        elif outcome == "arrived":
+            self._advance(run, lambda now: runs.reached(now, mission, here, distance(here, stop)))
+
+    def _settle(self, run: Run, mission: Mission) -> None:
+        stop = mission.stops[run.at]
+        still = self._stands_still(stop.settle_s)
+        if still is None:
+            return
+        if not still:
+            reason = f"not still within {stop.settle_s + SETTLE_LIMIT_S:g} s"
+            self._advance(run, lambda now: runs.failed(now, mission, reason))
+            return
+        here = self._base.pose()
+        self._advance(run, lambda now: runs.settled(now, mission, here, distance(here, stop)))
+
+    def _stands_still(self, settle_s: float) -> bool | None:
+        """Whether the robot came to a stand for `settle_s`; `None` if interrupted."""
+        waited, still_for, resting = 0.0, 0.0, self._base.pose()
+        while still_for < settle_s:
+            if waited > settle_s + SETTLE_LIMIT_S:
+                return False
+            pause = min(SETTLE_SAMPLE_S, settle_s - still_for)
+            if self._clock.wait(pause, self._interrupt):
+                return None
+            waited, still_for, pose = waited + pause, still_for + pause, self._base.pose()
+            if moved(resting, pose):
+                still_for, resting = 0.0, pose
+        return True
+
+    def _scan(self, run: Run, mission: Mission) -> None:
+        stop = mission.stops[run.at]
+        label = f"{run.run_id}-{stop.id}-{run.attempt + 1}"
+        result = self._scanner.scan(label, stop.scan, interrupt=self._interrupt)
+        self._advance(run, lambda now: runs.scan_ended(now, mission, result))
+
+    def _verify(self, run: Run, mission: Mission) -> None:
+        here = self._base.pose()
+        self._advance(run, lambda now: runs.verified(now, mission, here))
+
+    def _drive_home(self, run: Run, mission: Mission) -> None:
+        legs, pose = route.legs_of(mission), self._base.pose()
+        returning = run.leg == len(mission.stops)
+        leg = legs[run.leg]
+        path = route.forward(leg, pose) if returning else route.backward(leg, pose)
+        outcome = self._base.goto(path, heading=None, limits=mission.robot, interrupt=self._interrupt)
+        if outcome == "blocked":
+            here = self._base.pose()
+            reason = f"the way home is blocked at ({here.x:.2f}, {here.y:.2f})"
+            self._advance(run, lambda now: runs.held(now, reason))
+        elif outcome == "arrived":
+            self._advance(run, lambda now: runs.came_home_by(now, mission))
+
+    # Storing
+
+    def _advance(self, run: Run, move: Callable[[Run], Change]) -> None:
+        """Store what the work led to, unless an order has meanwhile made it meaningless."""
+        with self._lock:
+            if self._closing or not same_work(run, self._run):
+                return
+            self._keep(move(self._run))
+
+    def _keep(self, change: Change) -> None:
+        self._write(change)
+        self._adopt(change.run)
+
+    def _write(self, change: Change) -> None:
+        now_ns = self._clock.now_ns()
+        run = change.run
+        with self._journal.transaction():
+            self._journal.store_fact("run", run)
+            for telling in change.events:
+                event = telling(
+                    number=0,
+                    robot=self.robot,
+                    boot_id=self.boot_id,
+                    run_id=run.run_id or "",
+                    mission_id=run.mission_id or "",
+                    revision=run.revision or 0,
+                    robot_ns=now_ns,
+                    mission_time_s=(now_ns - run.started_ns) / 1e9,
+                )
+                self._journal.append(event)
+
+    def _adopt(self, run: Run, *, ordered: bool = False) -> None:
+        """What is stored is now what is; an order interrupts the work, except a scan that may end."""
+        self._run = run
+        if ordered and run.stop_state != "SCANNING":
+            self._interrupt.set()
+        self._wake.set()
+        self.changed()
+
+    # What others may know
+
+    def report(self) -> StateReport:
+        with self._lock:
+            self._seq += 1
+            run, stop = self._run, runs.stop_of(self._run, self._mission)
+            return StateReport(
+                robot=self.robot, boot_id=self.boot_id, seq=self._seq, robot_ns=self._clock.now_ns(),
+                state=run.state, run_id=run.run_id, mission_id=run.mission_id, revision=run.revision,
+                stop=stop.id if stop else None, stop_state=run.stop_state if stop else None,
+                done=run.done, skipped=run.skipped, battery=self._base.battery(),
+                last_event=self._journal.newest,
+            )  # fmt: skip
+
+
+WORK: dict[str, Callable[[Controller, Run, Mission], None]] = {
+    "WAITING": Controller._leave,
+    "NAVIGATING": Controller._navigate,
+    "SETTLING": Controller._settle,
+    "SCANNING": Controller._scan,
+    "VERIFYING": Controller._verify,
+}
+
+
+def has_work(run: Run) -> bool:
+    """A paused robot still ends the scan it was in."""
+    if run.state == "PAUSED":
+        return run.stop_state in ("SCANNING", "VERIFYING")
+    return run.state in ("RUNNING", "HOMING")
+
+
+def same_work(then: Run, now: Run) -> bool:
+    """Whether what was begun in `then` still counts: nothing has changed, or the same scan goes on."""
+    if now is then:
+        return True
+    scanning = then.stop_state == now.stop_state == "SCANNING"
+    return scanning and (then.run_id, then.at, then.attempt) == (now.run_id, now.at, now.attempt)
+
+
+def distance(pose: Pose, stop: Stop) -> float:
+    return math.hypot(pose.x - stop.x, pose.y - stop.y)
+
+
+def moved(before: Pose, after: Pose) -> bool:
+    """Whether the robot moved by more than one that stands still may."""
+    if math.hypot(after.x - before.x, after.y - before.y) > STILL_M:
+        return True
+    return abs(math.remainder(after.heading - before.heading, math.tau)) > STILL_RAD

@@ -1,0 +1,196 @@
+"""Where a mission arrives on the robot: announced, in pieces, and then taken whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator
+
+import msgspec
+
+from bridge.controller import Controller
+from bridge.journal import Journal
+from bridge.link import Request
+from bridge.protocol import (
+    CHUNK_BYTES,
+    MAX_CHUNK_BYTES,
+    MAX_DOCUMENT_BYTES,
+    Accepted,
+    ChunkHeld,
+    Malformed,
+    Manifest,
+    Message,
+    MissionPart,
+    Ready,
+    Reason,
+    Rejected,
+    decode,
+)
+from mission.document import Mission, digest_of
+
+ON_LEG_M = 0.01
+"""How far the end of an approach may lie from its stop."""
+
+
+class Inbox:
+    """Receives missions for one controller."""
+
+    def __init__(self, journal: Journal, controller: Controller, profiles: tuple[str, ...] | None) -> None:
+        self._journal = journal
+        self._controller = controller
+        self._profiles = profiles
+
+    def receive(self, request: Request) -> Message:
+        """Answer one question on `…/mission/<id>/<step>`."""
+        mission_id, step = _address(request.key)
+        try:
+            match step:
+                case ["begin"]:
+                    return self._begin(mission_id, decode(request.payload, Manifest))
+                case ["chunk", number]:
+                    return self._chunk(mission_id, int(number), request)
+                case ["commit"]:
+                    return self._commit(mission_id, decode(request.payload, Manifest))
+                case ["part", number]:
+                    return self._part(mission_id, int(number), int(request.parameters.get("revision", "-1")))
+        except (msgspec.DecodeError, ValueError) as error:
+            return Malformed(message=f"{'/'.join(step)}: {error}")
+        return Malformed(message=f"no such step: {'/'.join(step)}")
+
+    def _begin(self, mission_id: str, manifest: Manifest) -> Message:
+        refusal = self._unwelcome(mission_id, manifest)
+        if refusal:
+            return refusal
+        if self._holds(manifest):
+            return Ready(held=tuple(range(manifest.chunks)))
+        if self._journal.transfer(mission_id) != manifest:
+            self._journal.begin_transfer(manifest)
+        return Ready(held=self._journal.chunks_held(manifest.sha256))
+
+    def _unwelcome(self, mission_id: str, manifest: Manifest) -> Rejected | None:
+        if manifest.mission_id != mission_id:
+            return _no("wrong_mission", f"the manifest is for mission {manifest.mission_id}")
+        if not 0 < manifest.size <= MAX_DOCUMENT_BYTES:
+            return _no("too_large", f"{manifest.size} bytes; 1 to {MAX_DOCUMENT_BYTES} are taken")
+        if not 1024 <= manifest.chunk_bytes <= MAX_CHUNK_BYTES:
+            return _no(
+                "too_large", f"chunks of {manifest.chunk_bytes} bytes; 1024 to {MAX_CHUNK_BYTES} are taken"
+            )
+        held = self._journal.newest_revision(mission_id)
+        if held is None or held.revision < manifest.revision or self._holds(manifest):
+            return None
+        if held.revision > manifest.revision:
+            return _no(
+                "older_revision", f"the robot holds revision {held.revision}, newer than {manifest.revision}"
+            )
+        return _no(
+            "revision_taken",
+            f"the robot holds revision {held.revision} with digest {held.digest[:12]},"
+            f" not {manifest.digest[:12]}; push the change as revision {held.revision + 1}",
+        )
+
+    def _holds(self, manifest: Manifest) -> bool:
+        stored = self._journal.mission(manifest.mission_id, manifest.revision)
+        return stored is not None and (stored[0].digest, stored[0].sha256) == (
+            manifest.digest,
+            manifest.sha256,
+        )
+
+    def _chunk(self, mission_id: str, number: int, request: Request) -> Message:
+        manifest = self._journal.transfer(mission_id)
+        if manifest is None or request.parameters.get("of") != manifest.sha256:
+            return _no("incomplete", "no such transfer is under way; begin it again")
+        if not 0 <= number < manifest.chunks:
+            return _no("incomplete", f"chunk {number}: there are {manifest.chunks}")
+        last = manifest.size - manifest.chunk_bytes * (manifest.chunks - 1)
+        expected = last if number == manifest.chunks - 1 else manifest.chunk_bytes
+        if len(request.payload) != expected:
+            return _no("incomplete", f"chunk {number} has {len(request.payload)} bytes, not {expected}")
+        self._journal.store_chunk(manifest.sha256, number, request.payload)
+        return ChunkHeld(index=number, sha256=hashlib.sha256(request.payload).hexdigest())
+
+    def _commit(self, mission_id: str, manifest: Manifest) -> Message:
+        refusal = self._unwelcome(mission_id, manifest)
+        if refusal:
+            return refusal
+        stored = self._journal.mission(mission_id, manifest.revision)
+        document = stored[1] if stored else self._journal.chunks(manifest.sha256)
+        if len(document) != manifest.size:
+            return _no("incomplete", f"{len(document)} of {manifest.size} bytes have arrived")
+        if hashlib.sha256(document).hexdigest() != manifest.sha256:
+            self._journal.end_transfer(manifest)
+            return _no("digest", "what arrived has another sha256 than the manifest; push it again")
+        mission = self._read(document, manifest)
+        if isinstance(mission, Rejected):
+            return mission
+        refusal = self._controller.take(manifest, document, mission)
+        return refusal or Accepted(
+            mission_id=mission.id,
+            revision=mission.revision,
+            digest=mission.digest,
+            already=stored is not None,
+        )
+
+    def _read(self, document: bytes, manifest: Manifest) -> Mission | Rejected:
+        try:
+            mission = msgspec.json.decode(document, type=Mission)
+        except msgspec.DecodeError as error:
+            return _no("malformed", f"mission document: {error}")
+        if (mission.id, mission.revision, mission.digest) != (
+            manifest.mission_id, manifest.revision, manifest.digest,
+        ):  # fmt: skip
+            return _no("digest", "the document's id, revision or digest is not the manifest's")
+        if digest_of(mission) != mission.digest:
+            return _no("digest", "the document does not have the digest it claims")
+        wrong = tuple(what_is_wrong(mission, self._profiles))
+        return Rejected(reason="infeasible", messages=wrong) if wrong else mission
+
+    def _part(self, mission_id: str, number: int, revision: int) -> Message:
+        stored = self._journal.mission(mission_id, revision)
+        if stored is None:
+            return _no("no_mission", f"mission {mission_id} revision {revision} is not on this robot")
+        manifest, document = stored
+        data = document[number * CHUNK_BYTES : (number + 1) * CHUNK_BYTES] if number >= 0 else b""
+        return MissionPart(manifest=manifest, index=number, data=data)
+
+
+def what_is_wrong(mission: Mission, profiles: tuple[str, ...] | None) -> Iterator[str]:
+    """Why this robot cannot run the mission; nothing if it can."""
+    if not mission.stops:
+        yield "the mission has no stops"
+    seen: set[str] = set()
+    before = (mission.start.x, mission.start.y)
+    for stop in mission.stops:
+        if stop.id in seen:
+            yield f"stop {stop.id} is there twice"
+        seen.add(stop.id)
+        if profiles is not None and stop.scan.profile not in profiles:
+            known = ", ".join(profiles)
+            yield f"stop {stop.id}: scan profile {stop.scan.profile!r} is unknown; known: {known}"
+        if not stop.approach:
+            yield f"stop {stop.id} has no approach"
+            continue
+        if (
+            math.dist(stop.approach[0], before) > ON_LEG_M
+            or math.dist(stop.approach[-1], (stop.x, stop.y)) > ON_LEG_M
+        ):
+            yield f"stop {stop.id}: its approach does not lead from the place before to it"
+        before = (stop.x, stop.y)
+    if mission.return_ is not None and (
+        not mission.return_ or math.dist(mission.return_[0], before) > ON_LEG_M
+    ):
+        yield "the return does not begin at the last stop"
+    robot = mission.robot
+    if min(robot.speed, robot.turn_rate, robot.acceleration) <= 0:
+        yield "speed, turn rate and acceleration must be greater than 0"
+
+
+def _address(key: str) -> tuple[str, list[str]]:
+    """Mission id and step of `…/mission/<id>/<step…>`."""
+    parts = key.split("/")
+    at = len(parts) - 1 - parts[::-1].index("mission")
+    return parts[at + 1], parts[at + 2 :]
+
+
+def _no(reason: Reason, message: str) -> Rejected:
+    return Rejected(reason=reason, messages=(message,))

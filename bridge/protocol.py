@@ -1,0 +1,221 @@
+"""What station and robot say to one another: every key and every message, known to this module alone.
+
+Messages are JSON, read strictly; docs/protocol.md tells them to people. Times that end in `_ns` are
+nanoseconds on the robot's clock.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any, Final, Literal, TypeVar
+
+import msgspec
+
+from mission.errors import InputError
+from mission.events import AnyEvent, State, StateReport
+
+VERSION: Final = 1
+CHUNK_BYTES: Final = 48 * 1024
+MAX_CHUNK_BYTES: Final = 256 * 1024
+MAX_DOCUMENT_BYTES: Final = 64 * 1024 * 1024
+LOG_PAGE: Final = 500
+"""Events in one answer of the log."""
+
+Verb = Literal["start", "pause", "resume", "skip", "retry", "abort", "home"]
+Reason = Literal[
+    "malformed", "expired", "id_reused", "wrong_state", "wrong_run", "wrong_mission", "no_mission",
+    "finished_before", "not_at_start", "off_route", "not_at_stop", "not_the_commander", "fenced",
+    "running", "revision_taken", "older_revision", "too_large", "incomplete", "digest", "infeasible",
+    "storage",
+]  # fmt: skip
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_SITE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}(/[A-Za-z0-9][A-Za-z0-9_.-]{0,63})*")
+
+
+@dataclass(frozen=True)
+class Keys:
+    """The key expressions of one robot, `[<site>/]sx/1/<robot>/…`; robot `*` stands for every robot."""
+
+    robot: str
+    site: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.robot != "*" and not _NAME.fullmatch(self.robot):
+            raise InputError(f"robot name {self.robot!r}: use letters, digits, '_', '.' and '-' (at most 64)")
+        if self.site is not None and not _SITE.fullmatch(self.site):
+            raise InputError(
+                f"site {self.site!r}: use letters, digits, '_', '.', '-', with '/' between parts"
+            )
+
+    @property
+    def root(self) -> str:
+        return f"{self.site + '/' if self.site else ''}sx/{VERSION}/{self.robot}"
+
+    @property
+    def alive(self) -> str:
+        return f"{self.root}/alive"
+
+    @property
+    def info(self) -> str:
+        return f"{self.root}/info"
+
+    @property
+    def log(self) -> str:
+        return f"{self.root}/log"
+
+    @property
+    def state(self) -> str:
+        return f"{self.root}/tel/state"
+
+    @property
+    def pose(self) -> str:
+        return f"{self.root}/tel/pose"
+
+    @property
+    def event(self) -> str:
+        return f"{self.root}/tel/event"
+
+    def command(self, verb: str) -> str:
+        return f"{self.root}/cmd/{verb}"
+
+    def mission(self, mission_id: str, step: str) -> str:
+        """`begin`, `chunk/<i>`, `commit` or `part/<i>` of one mission's transfer."""
+        return f"{self.root}/mission/{mission_id}/{step}"
+
+    def robot_of(self, key: str) -> str:
+        """The robot whose key this is."""
+        return key.removeprefix(self.root.removesuffix(self.robot)).partition("/")[0]
+
+
+class Message(
+    msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is", forbid_unknown_fields=True
+):
+    """Base of every message: frozen, says what it is, and is strict about unknown keys."""
+
+
+class Info(Message, frozen=True):
+    """What a robot says of itself on `info`."""
+
+    protocol: int
+    stopgo: str
+    robot: str
+    boot_id: str
+    clock_ns: int
+    """The clock that `valid_for_s` counts on."""
+    state: StateReport
+    chunk_bytes: int
+    document_bytes: int
+    profiles: tuple[str, ...] | None
+    """Scan profiles the scanner knows; `None` if it takes any."""
+
+
+class Manifest(Message, frozen=True):
+    """What is about to be transferred, on `mission/<id>/begin` and again on `commit`."""
+
+    mission_id: str
+    revision: int
+    digest: str
+    """The mission's own digest."""
+    size: int
+    sha256: str
+    """Of the transferred bytes."""
+    chunk_bytes: int
+    commander: str
+
+    @property
+    def chunks(self) -> int:
+        return -(-self.size // self.chunk_bytes)
+
+
+class Ready(Message, frozen=True):
+    """The robot awaits the chunks that are not in `held`."""
+
+    held: tuple[int, ...]
+
+
+class ChunkHeld(Message, frozen=True):
+    index: int
+    sha256: str
+
+
+class Accepted(Message, frozen=True):
+    """The mission is stored on the robot, whole."""
+
+    mission_id: str
+    revision: int
+    digest: str
+    already: bool
+    """Whether the robot held exactly this before."""
+
+
+class Rejected(Message, frozen=True):
+    """The mission was not taken; what the robot held before is unchanged."""
+
+    reason: Reason
+    messages: tuple[str, ...]
+
+
+class MissionPart(Message, frozen=True):
+    """A piece of the stored mission, read back on `mission/<id>/part/<i>`."""
+
+    manifest: Manifest
+    index: int
+    data: bytes
+
+
+class Command(Message, frozen=True):
+    """An order on `cmd/<verb>`; sent again with the same `cmd_id` it is carried out once."""
+
+    cmd_id: str
+    verb: Verb
+    commander: str
+    issued_ns: int
+    valid_for_s: float
+    expect_state: tuple[State, ...] | None = None
+    """Refused in any other state, so that a late order does no harm."""
+    run_id: str | None = None
+    mission_id: str | None = None
+    revision: int | None = None
+    stop: str | None = None
+    """The stop that skip and retry are meant for."""
+    again: bool = False
+    from_here: bool = False
+
+
+class Answer(Message, frozen=True):
+    """What became of a command, stored before it is sent."""
+
+    cmd_id: str
+    verb: str
+    outcome: Literal["ok", "refused"]
+    reason: Reason | None
+    message: str
+    run_id: str | None
+    state: State
+
+
+class Malformed(Message, frozen=True):
+    """The request could not be read; nothing was done."""
+
+    message: str
+
+
+class LogPage(Message, frozen=True):
+    """Events by number from the journal; `newest` tells whether there are more."""
+
+    events: tuple[AnyEvent, ...]
+    newest: int
+
+
+M = TypeVar("M")
+
+
+def encode(message: Any) -> bytes:
+    return msgspec.json.encode(message)
+
+
+def decode(payload: bytes, kind: type[M]) -> M:
+    """The message in `payload`; raises `msgspec.ValidationError` or `DecodeError` with the JSON path."""
+    return msgspec.json.decode(payload, type=kind)

@@ -1,0 +1,71 @@
+"""The robot's process: journal, simulated robot, controller and agent put together on one link."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from bridge.agent import Agent, on_link
+from bridge.clock import WallClock
+from bridge.controller import Controller
+from bridge.journal import open_journal
+from bridge.link import Link
+from bridge.protocol import Keys
+from bridge.simulator import SimulatedBase, SimulatedScanner
+from mission.events import Pose
+
+
+@dataclass(frozen=True)
+class RobotOptions:
+    """How a robot is set up."""
+
+    name: str
+    listen: str
+    state: Path
+    site: str | None = None
+    speed_up: float = 1.0
+    at: Pose | None = None
+    """Where the simulated robot stands; else where it last stood, or its first mission's start."""
+    insecure: bool = False
+
+
+def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
+    """Be a robot until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
+    from bridge.zenoh_link import listening
+
+    signal.signal(signal.SIGTERM, _leave)
+    keys = Keys(options.name, options.site)
+    with listening(options.listen, insecure=options.insecure) as link, robot_on(link, keys, options):
+        ready()
+        threading.Event().wait()
+
+
+@contextmanager
+def robot_on(link: Link, keys: Keys, options: RobotOptions) -> Iterator[Agent]:
+    """A simulated robot on `link`."""
+    with open_journal(options.state, options.name) as journal:
+        # A sped-up clock may have run ahead of the wall's: after a reboot it goes on from there.
+        wall = WallClock()
+        clock = WallClock(speed_up=options.speed_up, origin_ns=max(wall.now_ns(), journal.newest_ns + 1))
+        base = SimulatedBase(clock=clock, keep=options.state / "world.json")
+        scanner = SimulatedScanner(clock=clock, record=options.state / "scans.log")
+        if options.at is not None:
+            base.stand_at(options.at)
+        controller = Controller(
+            robot=options.name, journal=journal, base=base, scanner=scanner, clock=clock, command_clock=wall,
+            mission_taken=lambda mission: base.stand_at_start(mission.start),
+        )  # fmt: skip
+        agent = Agent(
+            keys=keys, link=link, journal=journal, controller=controller, base=base, scanner=scanner,
+            clock=clock, command_clock=wall, speed_up=options.speed_up,
+        )  # fmt: skip
+        with on_link(agent):
+            yield agent
+
+
+def _leave(signum: int, frame: object) -> None:
+    raise SystemExit(0)

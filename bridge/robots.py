@@ -1,0 +1,57 @@
+"""What the controller needs of a robot and of a scanner: two small interfaces, so that each is one class."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from threading import Event
+from typing import Literal, Protocol
+
+import msgspec
+
+from mission.document import Point, RobotSpec, Scan
+from mission.events import Pose
+
+Outcome = Literal["arrived", "interrupted", "blocked"]
+
+
+class ScanResult(msgspec.Struct, frozen=True, kw_only=True):
+    """What the scanner says it has written."""
+
+    file: str
+    """Id of the file, never used twice by a scanner."""
+    size: int
+    sha256: str
+    points: int
+
+
+class ScanFailed(msgspec.Struct, frozen=True, kw_only=True):
+    reason: str
+
+
+class Base(Protocol):
+    """What carries the scanner. Poses are in the mission's frame."""
+
+    def pose(self) -> Pose: ...
+
+    def speed(self) -> float:
+        """Metres per second, now."""
+
+    def battery(self) -> float:
+        """0 to 1."""
+
+    def goto(
+        self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
+    ) -> Outcome:
+        """Drive along `path`, turn to `heading`, and stand still; also when `interrupt` is set meanwhile."""
+
+    def stop(self) -> None:
+        """Stand still, whatever was going on (after a reboot the wheels may still turn)."""
+
+
+class Scanner(Protocol):
+    def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
+        """Scan, and give up when `interrupt` is set or `scan.timeout_s` has passed."""
+
+    @property
+    def profiles(self) -> tuple[str, ...] | None:
+        """Scan profiles it knows; `None` if it takes any."""

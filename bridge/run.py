@@ -1,0 +1,263 @@
+"""A run of a mission: where the robot is in its work, and how each outcome moves it on.
+
+Nothing here touches a robot, a clock or a disk: every function takes a run and gives the next one with
+the events that tell of it. The controller stores both before anything else happens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
+
+import msgspec
+
+from bridge.robots import ScanFailed, ScanResult
+from mission.document import Mission, Stop
+from mission.events import (
+    Aborted,
+    AnyEvent,
+    Arrived,
+    Failed,
+    Finished,
+    Held,
+    Paused,
+    Pose,
+    Scanned,
+    Settled,
+    Skipped,
+    State,
+    StopState,
+)
+
+After = Literal["FINISHED", "ABORTED", "PAUSED"]
+
+
+class Run(msgspec.Struct, frozen=True, kw_only=True):
+    """The robot's place in its work, as stored before every transition."""
+
+    state: State = "IDLE"
+    mission_id: str | None = None
+    revision: int | None = None
+    run_id: str | None = None
+    started_ns: int = 0
+    leg: int = 0
+    """The leg the robot is on; `len(stops)` is the return."""
+    at: int = 0
+    """The stop that is worked on; `len(stops)` when all are behind."""
+    stop_state: StopState = "WAITING"
+    attempt: int = 0
+    approaches: int = 0
+    """Corrections driven at this stop."""
+    scan: ScanResult | None = None
+    """The scan that waits to be verified."""
+    done: tuple[str, ...] = ()
+    skipped: tuple[str, ...] = ()
+    reason: str = ""
+    """Why it is paused, held or homing."""
+    homing: bool = False
+    """Whether what is paused or held is the way home."""
+    then: After = "FINISHED"
+    """What the run is once the robot is home."""
+
+    @property
+    def over(self) -> bool:
+        return self.state in ("IDLE", "READY", "FINISHED", "ABORTED")
+
+
+Telling = Callable[..., AnyEvent]
+"""An event that lacks its envelope (number, robot, times)."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """The next run and what is told of the step to it."""
+
+    run: Run
+    events: tuple[Telling, ...] = ()
+
+
+changed = msgspec.structs.replace
+
+REAPPROACHES = 3
+"""Corrections driven to a stop before its place counts as not reached."""
+
+
+def installed(run: Run, mission: Mission) -> Run:
+    """A mission lies ready; there was no run, or it is over."""
+    return Run(state="READY", mission_id=mission.id, revision=mission.revision)
+
+
+def rebooted(run: Run) -> Change:
+    """After a reboot nothing moves until somebody resumes; an unfinished scan will be taken again."""
+    if run.over:
+        return Change(run)
+    stop_state = "VERIFYING" if run.stop_state == "VERIFYING" else "WAITING"
+    halted = changed(
+        run,
+        state="PAUSED",
+        stop_state=stop_state,
+        reason="reboot",
+        homing=run.homing or run.state == "HOMING",
+    )
+    if run.state == "PAUSED":
+        return Change(changed(halted, reason=run.reason))
+    return Change(halted, (partial(Paused, reason="reboot"),))
+
+
+def leaving(run: Run) -> Change:
+    """The robot is about to drive."""
+    return Change(changed(run, stop_state="NAVIGATING"))
+
+
+def reached(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Change:
+    """The end of the leg, or the stop after a correction, has been reached."""
+    if run.leg < run.at:
+        return Change(changed(run, leg=run.leg + 1))
+    stop = mission.stops[run.at]
+    if deviation_m > stop.tolerance_m:
+        if run.approaches < REAPPROACHES:
+            return Change(
+                changed(run, leg=run.at + 1, stop_state="NAVIGATING", approaches=run.approaches + 1)
+            )
+        return failed(
+            changed(run, leg=run.at + 1),
+            mission,
+            f"{deviation_m:.3f} m from the stop after {REAPPROACHES} corrections;"
+            f" tolerance is {stop.tolerance_m:g} m",
+        )
+    arrived = partial(Arrived, stop=stop.id, pose=pose, deviation_m=deviation_m)
+    return Change(changed(run, leg=run.at + 1, stop_state="SETTLING"), (arrived,))
+
+
+def settled(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Change:
+    """The robot stands still; if not where it should, it goes there again."""
+    if deviation_m > mission.stops[run.at].tolerance_m:
+        return reached(run, mission, pose, deviation_m)
+    telling = partial(Settled, stop=mission.stops[run.at].id, pose=pose)
+    return Change(changed(run, stop_state="SCANNING"), (telling,))
+
+
+def scan_ended(run: Run, mission: Mission, result: ScanResult | ScanFailed) -> Change:
+    if isinstance(result, ScanFailed):
+        return failed(run, mission, f"scan: {result.reason}")
+    return Change(changed(run, stop_state="VERIFYING", scan=result))
+
+
+def verified(run: Run, mission: Mission, pose: Pose) -> Change:
+    """Whether the scanner's result is one; then the stop is done."""
+    stop, scan = mission.stops[run.at], run.scan
+    if scan is None:
+        return Change(changed(run, stop_state="WAITING"))
+    wrong = what_is_wrong(scan)
+    if wrong:
+        return failed(changed(run, scan=None), mission, f"scan not confirmed: {wrong}")
+    telling = partial(
+        Scanned, stop=stop.id, pose=pose,
+        file=scan.file, size=scan.size, sha256=scan.sha256, points=scan.points,
+    )  # fmt: skip
+    done = next_stop(changed(run, done=(*run.done, stop.id)), mission)
+    return Change(done.run, (telling, *done.events))
+
+
+def what_is_wrong(scan: ScanResult) -> str:
+    """Why a scanner's result is no scan; empty if it is one."""
+    if not scan.file:
+        return "no file id"
+    if scan.size <= 0 or scan.points <= 0:
+        return f"{scan.file} has {scan.size} bytes and {scan.points} points"
+    if len(scan.sha256) != 64:
+        return f"{scan.file} has no sha256"
+    return ""
+
+
+def next_stop(run: Run, mission: Mission) -> Change:
+    """On to the next stop, the way back, or the end."""
+    onward = changed(run, at=run.at + 1, stop_state="WAITING", attempt=0, approaches=0, scan=None)
+    if onward.at < len(mission.stops):
+        return Change(onward)
+    if mission.return_ is None:
+        return ended(onward, "FINISHED")
+    return Change(heading_home(onward, mission, then="FINISHED", reason="all stops are behind"))
+
+
+def heading_home(run: Run, mission: Mission, *, then: After, reason: str) -> Run:
+    """On the way home; a robot that is paused stays so, and goes home when it is resumed."""
+    state: State = "PAUSED" if run.state == "PAUSED" else "HOMING"
+    last_leg = len(mission.stops) - (mission.return_ is None)
+    return changed(
+        run, state=state, homing=True, then=then, leg=min(run.leg, last_leg),
+        stop_state="WAITING", scan=None, reason=reason,
+    )  # fmt: skip
+
+
+def came_home_by(run: Run, mission: Mission) -> Change:
+    """One leg of the way home is behind."""
+    if run.leg == len(mission.stops) or run.leg == 0:
+        return ended(run, run.then)
+    return Change(changed(run, leg=run.leg - 1))
+
+
+def ended(run: Run, then: After) -> Change:
+    over = changed(run, state=then, stop_state="WAITING", scan=None, homing=False)
+    if then == "FINISHED":
+        return Change(changed(over, reason=""), (Finished,))
+    if then == "ABORTED":
+        return Change(over, (partial(Aborted, reason=run.reason),))
+    return Change(over, (partial(Paused, reason=run.reason),))
+
+
+def held(run: Run, reason: str) -> Change:
+    """Somebody must decide: retry, skip, home or abort."""
+    waiting = changed(
+        run, state="HELD", stop_state="RETRIABLE", reason=reason, homing=run.homing or run.state == "HOMING"
+    )
+    return Change(waiting, (partial(Held, reason=reason),))
+
+
+def failed(run: Run, mission: Mission, reason: str) -> Change:
+    """An attempt at a stop has failed: again while tries are left, then as the stop's `on_failure` says."""
+    stop = mission.stops[run.at]
+    if run.attempt < stop.retries:
+        again = changed(run, stop_state="WAITING", attempt=run.attempt + 1, approaches=0, scan=None)
+        return Change(again)
+    telling = partial(Failed, stop=stop.id, reason=reason)
+    change = ON_FAILURE[stop.on_failure](changed(run, scan=None), mission, f"{stop.id}: {reason}")
+    return Change(change.run, (telling, *change.events))
+
+
+def skipped(run: Run, mission: Mission, reason: str) -> Change:
+    """The stop is left out; its approach is still followed, for it is part of the way."""
+    stop = mission.stops[run.at]
+    onward = next_stop(changed(run, skipped=(*run.skipped, stop.id)), mission)
+    return Change(onward.run, (partial(Skipped, stop=stop.id, reason=reason), *onward.events))
+
+
+def _ask(run: Run, mission: Mission, reason: str) -> Change:
+    return held(run, reason)
+
+
+def _abort(run: Run, mission: Mission, reason: str) -> Change:
+    return ended(changed(run, reason=reason), "ABORTED")
+
+
+def _home(run: Run, mission: Mission, reason: str) -> Change:
+    return Change(heading_home(run, mission, then="ABORTED", reason=reason))
+
+
+ON_FAILURE: dict[str, Callable[[Run, Mission, str], Change]] = {
+    "retry": _ask,
+    "ask": _ask,
+    "skip": skipped,
+    "abort": _abort,
+    "home": _home,
+}
+"""What is done when a stop's tries are used up; `retry` has nothing left but to ask."""
+
+
+def stop_of(run: Run, mission: Mission | None) -> Stop | None:
+    """The stop that is worked on."""
+    if mission is None or run.state in ("IDLE", "READY") or run.at >= len(mission.stops):
+        return None
+    return mission.stops[run.at]

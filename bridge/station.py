@@ -1,0 +1,255 @@
+"""This end of the link: pushes a mission, gives orders, asks for the state, and follows a run.
+
+Every request may be sent again with the same effect, so it is, until it is answered or the time is up;
+an answer that never came is reported as unknown, never as failed.
+"""
+
+from __future__ import annotations
+
+import getpass
+import hashlib
+import socket
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import msgspec
+
+from bridge import follow
+from bridge.link import Link
+from bridge.protocol import (
+    CHUNK_BYTES,
+    VERSION,
+    Accepted,
+    Answer,
+    ChunkHeld,
+    Command,
+    Info,
+    Keys,
+    LogPage,
+    Malformed,
+    Manifest,
+    Message,
+    MissionPart,
+    Ready,
+    Rejected,
+    Verb,
+    encode,
+)
+from mission.document import Mission, digest_of
+from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from mission.events import AnyEvent, StateReport
+
+TRY_S = 1.0
+"""How long one try waits for its answer."""
+PAUSE_S = 0.05
+"""Between tries: a query just after a reconnect may come back empty at once."""
+TRIES_S = 10.0
+"""How long the steps of a push are tried, each."""
+
+Reply = Info | Ready | ChunkHeld | Accepted | Rejected | Answer | LogPage | MissionPart | Malformed
+Progress = Callable[[int, int], None]
+"""Called with bytes held by the robot and bytes in all."""
+
+
+@contextmanager
+def connect(
+    endpoint: str,
+    *,
+    robot: str,
+    site: str | None = None,
+    commander: str | None = None,
+    timeout_s: float = 5.0,
+    insecure: bool = False,
+) -> Iterator[Station]:
+    """A robot that has been reached at `endpoint`, such as `tcp/127.0.0.1:7447`.
+
+    Raises
+    ------
+    RobotUnreachable
+        If the robot did not show itself within `timeout_s`; nothing was sent.
+    """
+    from bridge.zenoh_link import connecting
+
+    keys = Keys(robot, site)
+    with connecting(endpoint, insecure=insecure) as link:
+        station = Station(link, keys, commander=commander or whoami(), timeout_s=timeout_s)
+        station.reach(endpoint)
+        yield station
+
+
+def whoami() -> str:
+    """Who gives orders, unless said otherwise: user@host."""
+    return f"{getpass.getuser()}@{socket.gethostname()}"
+
+
+class Station:
+    """One robot, seen from here."""
+
+    def __init__(self, link: Link, keys: Keys, *, commander: str, timeout_s: float = 5.0) -> None:
+        self.link = link
+        self.keys = keys
+        self.commander = commander
+        self.timeout_s = timeout_s
+
+    def reach(self, endpoint: str) -> None:
+        """Wait until the robot shows itself: a question sent before comes back empty at once."""
+        seen = threading.Event()
+        self.link.watch_presence(self.keys.alive, lambda key, alive: seen.set() if alive else None)
+        if not seen.wait(self.timeout_s):
+            raise RobotUnreachable(
+                f"{endpoint}: robot {self.keys.robot} did not show itself within {self.timeout_s:g} s"
+                f" (key {self.keys.alive}); nothing was sent. Is it running, under this name and site?"
+            )
+
+    def info(self) -> Info:
+        """What the robot says of itself."""
+        info = self._answered(self._insist(self.keys.info, b"", self.timeout_s), Info, "info")
+        if info.protocol != VERSION:
+            raise InputError(
+                f"robot {info.robot} speaks protocol {info.protocol}, this stopgo {VERSION}; update the older"
+            )
+        return info
+
+    def status(self) -> StateReport:
+        return self.info().state
+
+    def push(self, mission: Mission, *, progress: Progress = lambda held, size: None) -> Accepted:
+        """Transfer a mission and see it stored on the robot; only what is missing is sent.
+
+        Raises
+        ------
+        AnswerIsNo
+            If the robot rejects it; it holds what it held before.
+        OutcomeUnknown
+            If the robot stopped answering; pushing again goes on where this ended.
+        """
+        document = msgspec.json.encode(mission)
+        manifest = Manifest(
+            mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
+            sha256=hashlib.sha256(document).hexdigest(), chunk_bytes=CHUNK_BYTES, commander=self.commander,
+        )  # fmt: skip
+        begun = self._step(manifest, "begin", encode(manifest), Ready)
+        self._send_chunks(manifest, document, set(begun.held), progress)
+        accepted = self._step(manifest, "commit", encode(manifest), Accepted)
+        self._read_back(manifest)
+        return accepted
+
+    def _send_chunks(self, manifest: Manifest, document: bytes, held: set[int], progress: Progress) -> None:
+        for number in range(manifest.chunks):
+            data = document[number * manifest.chunk_bytes : (number + 1) * manifest.chunk_bytes]
+            if number not in held:
+                got = self._step(manifest, f"chunk/{number}", data, ChunkHeld, of=manifest.sha256)
+                if got.sha256 != hashlib.sha256(data).hexdigest():
+                    raise AnswerIsNo(f"chunk {number} arrived damaged at {self.keys.robot}; push again")
+            progress(min(manifest.size, (number + 1) * manifest.chunk_bytes), manifest.size)
+
+    def _read_back(self, manifest: Manifest) -> None:
+        state = self.status()
+        kept = self._part(manifest.mission_id, manifest.revision, 0).manifest
+        if (state.mission_id, state.revision) != (manifest.mission_id, manifest.revision) or (
+            kept.sha256 != manifest.sha256
+        ):
+            raise OutcomeUnknown(
+                f"{self.keys.robot} accepted the mission, but tells of mission {state.mission_id}"
+                f" revision {state.revision}; has somebody else pushed meanwhile?"
+            )
+
+    def mission(self, mission_id: str, revision: int) -> Mission:
+        """The mission as the robot holds it."""
+        parts: list[bytes] = []
+        while True:
+            part = self._part(mission_id, revision, len(parts))
+            parts.append(part.data)
+            if len(parts) * CHUNK_BYTES >= part.manifest.size:
+                break
+        mission = msgspec.json.decode(b"".join(parts), type=Mission)
+        if digest_of(mission) != mission.digest:
+            raise AnswerIsNo(
+                f"mission {mission_id} on {self.keys.robot} does not have its digest; push it again"
+            )
+        return mission
+
+    def command(self, verb: Verb, **details: Any) -> Answer:
+        """Give an order, once, and return the robot's answer.
+
+        Raises
+        ------
+        AnswerIsNo
+            If the robot refuses.
+        OutcomeUnknown
+            If no answer came: the order may or may not have been carried out.
+        """
+        asked = time.monotonic()
+        info = self.info()
+        order = Command(
+            cmd_id=uuid.uuid4().hex, verb=verb, commander=self.commander, valid_for_s=self.timeout_s,
+            issued_ns=info.clock_ns, run_id=None if verb == "start" else info.state.run_id,
+            mission_id=info.state.mission_id, revision=info.state.revision, **details,
+        )  # fmt: skip
+        left = max(TRY_S, self.timeout_s - (time.monotonic() - asked))
+        reply = self._insist(self.keys.command(verb), encode(order), left)
+        answer = self._answered(reply, Answer, verb)
+        if answer.outcome == "refused":
+            raise AnswerIsNo(f"{self.keys.robot} refused {verb}: {answer.reason}: {answer.message}")
+        return answer
+
+    def log(self, *, since: int = 0, run_id: str | None = None) -> tuple[AnyEvent, ...]:
+        """All events of the journal above number `since`, of one run if given."""
+        told: list[AnyEvent] = []
+        while True:
+            page = follow.log_page(self.link, self.keys, since=since, run_id=run_id, timeout_s=self.timeout_s)
+            if page is None:
+                raise OutcomeUnknown(f"{self.keys.robot} stopped answering; its log was not read to the end")
+            told += page.events
+            if not page.events:
+                return tuple(told)
+            since = page.events[-1].number
+
+    def reports(self) -> Iterator[follow.Report]:
+        """States, poses and events of the robot's run as they come, gaps filled, until the run is over.
+
+        If the robot's mission has not been run yet, the next run is waited for.
+        """
+        return follow.reports(self.link, self.keys)
+
+    def _part(self, mission_id: str, revision: int, number: int) -> MissionPart:
+        key = self.keys.mission(mission_id, f"part/{number}")
+        reply = self._insist(key, b"", self.timeout_s, revision=str(revision))
+        return self._answered(reply, MissionPart, "reading the mission back")
+
+    def _step(self, manifest: Manifest, step: str, payload: bytes, kind: type[Any], **parameters: str) -> Any:
+        key = self.keys.mission(manifest.mission_id, step)
+        reply = self._insist(key, payload, TRIES_S, bulk=step.startswith("chunk"), **parameters)
+        return self._answered(reply, kind, f"push ({step})")
+
+    def _insist(
+        self, key: str, payload: bytes, within_s: float, *, bulk: bool = False, **parameters: str
+    ) -> bytes | None:
+        """Ask the same thing until it is answered or the time is up."""
+        deadline = time.monotonic() + within_s
+        while (left := deadline - time.monotonic()) > 0:
+            reply = self.link.ask(key, payload, timeout_s=min(TRY_S, left), parameters=parameters, bulk=bulk)
+            if reply is not None:
+                return reply
+            time.sleep(min(PAUSE_S, left))
+        return None
+
+    def _answered(self, reply: bytes | None, kind: type[Any], what: str) -> Any:
+        """The reply if it is of `kind`; every other is an error that says what it means."""
+        robot = self.keys.robot
+        if reply is None:
+            raise OutcomeUnknown(
+                f"{robot} did not answer {what} in time: whether it was carried out is unknown;"
+                " see stopgo status"
+            )
+        message: Message = msgspec.json.decode(reply, type=Reply)
+        if isinstance(message, Rejected):
+            raise AnswerIsNo(f"{robot} rejected {what}: {message.reason}: {'; '.join(message.messages)}")
+        if not isinstance(message, kind):
+            said = message.message if isinstance(message, Malformed) else type(message).__name__
+            raise AnswerIsNo(f"{robot} could not make sense of {what}: {said}")
+        return message

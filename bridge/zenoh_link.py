@@ -1,0 +1,191 @@
+"""A link over zenoh. Everything that zenoh must be told, and every trap it has, is in this module.
+
+The robot listens as a router and stations connect as peers without scouting. Shared memory is off, for it
+drops queries silently; the lease is set at both ends, for each end's governs the other; a session is
+always closed, for one with callbacks hangs the interpreter's exit.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import zenoh
+import zenoh.ext
+
+from bridge.link import Answering, Hearing, Presence, Publish, Request
+from mission.errors import InputError
+
+LEASE_MS = 2000
+MAX_MESSAGE_BYTES = 1_000_000
+JSON = zenoh.Encoding.APPLICATION_JSON
+
+COMMON: dict[str, Any] = {
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": False,
+    "scouting/delay": 0,
+    "transport/shared_memory/enabled": False,
+    "transport/link/tx/lease": LEASE_MS,
+    "transport/link/rx/max_message_size": MAX_MESSAGE_BYTES,
+    "adminspace/enabled": False,
+}
+RETRY = {"period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 1.5}
+
+
+@contextmanager
+def listening(endpoint: str, *, insecure: bool = False) -> Iterator[ZenohLink]:
+    """A link on which others connect to `endpoint`, such as `tcp/127.0.0.1:7447`."""
+    check_endpoint(endpoint, option="--listen", insecure=insecure)
+    with _opened({"mode": "router", "listen/endpoints": [endpoint]}, endpoint) as link:
+        yield link
+
+
+@contextmanager
+def connecting(endpoint: str, *, insecure: bool = False) -> Iterator[ZenohLink]:
+    """A link to `endpoint`; it is returned at once and connects, again and again, in the background."""
+    check_endpoint(endpoint, option="--connect", insecure=insecure)
+    settings = {
+        "mode": "peer",
+        "connect/endpoints": [endpoint],
+        "listen/endpoints": [],
+        "connect/retry": RETRY,
+    }
+    with _opened(settings, endpoint) as link:
+        yield link
+
+
+@contextmanager
+def _opened(settings: dict[str, Any], endpoint: str) -> Iterator[ZenohLink]:
+    config = zenoh.Config()
+    for key, value in {**COMMON, **settings}.items():
+        config.insert_json5(key, json.dumps(value))
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(f"{endpoint}: cannot be opened ({reason}); is the address free and yours?") from None
+    with session:
+        link = ZenohLink(session)
+        try:
+            yield link
+        finally:
+            link.close()
+
+
+class ZenohLink:
+    """One open zenoh session."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+        # A token or subscriber that nobody refers to is collected, and gone.
+        self._declared: list[Any] = []
+
+    def serve(self, key: str, answer: Answering) -> None:
+        def answered(query: zenoh.Query) -> None:
+            with query:
+                payload = b"" if query.payload is None else query.payload.to_bytes()
+                request = Request(str(query.key_expr), payload, _parameters(query.parameters))
+                query.reply(query.key_expr, answer(request), encoding=JSON)
+
+        self._declared.append(self._session.declare_queryable(key, answered, complete=True))
+
+    def publisher(self, key: str, *, kept: int = 0) -> Publish:
+        publisher = zenoh.ext.declare_advanced_publisher(
+            self._session,
+            key,
+            encoding=JSON,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            cache=zenoh.ext.CacheConfig(max(1, kept)),
+            sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=0.5),
+            publisher_detection=True,
+        )
+        self._declared.append(publisher)
+        return publisher.put
+
+    def announce(self, key: str) -> None:
+        self._declared.append(self._session.liveliness().declare_token(key))
+
+    def ask(
+        self,
+        key: str,
+        payload: bytes = b"",
+        *,
+        timeout_s: float,
+        parameters: Mapping[str, str] | None = None,
+        bulk: bool = False,
+    ) -> bytes | None:
+        selector = zenoh.Selector(key, dict(parameters or {}))
+        priority = zenoh.Priority.BACKGROUND if bulk else zenoh.Priority.INTERACTIVE_HIGH
+        replies = self._session.get(
+            selector,
+            payload=payload,
+            encoding=JSON,
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=timeout_s,
+            priority=priority,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            express=not bulk,
+        )
+        for reply in replies:
+            if reply.ok is not None:
+                return reply.ok.payload.to_bytes()
+        return None
+
+    def hear(self, key: str, heard: Hearing, *, late: int = 0) -> None:
+        self._declared.append(
+            zenoh.ext.declare_advanced_subscriber(
+                self._session,
+                key,
+                lambda sample: heard(str(sample.key_expr), sample.payload.to_bytes()),
+                history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=late)
+                if late
+                else None,
+                recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
+            )
+        )
+
+    def watch_presence(self, key: str, changed: Presence) -> None:
+        def noticed(sample: zenoh.Sample) -> None:
+            changed(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+        self._declared.append(self._session.liveliness().declare_subscriber(key, noticed, history=True))
+
+    def close(self) -> None:
+        for declared in reversed(self._declared):
+            declared.undeclare()
+        self._declared.clear()
+
+
+def check_endpoint(endpoint: str, *, option: str, insecure: bool) -> None:
+    """Refuse what is not an endpoint, and addresses beyond this machine unless `insecure`.
+
+    Raises
+    ------
+    InputError
+        Naming the option, the endpoint and the way out.
+    """
+    protocol, _, rest = endpoint.partition("/")
+    address = rest.partition("?")[0].partition("#")[0]
+    host, _, port = address.rpartition(":")
+    if protocol not in ("tcp", "udp", "ws", "tls", "quic") or not host or not port.isdecimal():
+        raise InputError(f"{option} {endpoint}: not an endpoint; write it like tcp/127.0.0.1:7447")
+    if not insecure and not is_loopback(host):
+        raise InputError(
+            f"{option} {endpoint}: leaves this machine without keys; use 127.0.0.1, or add --insecure"
+        )
+
+
+def is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _parameters(parameters: zenoh.Parameters) -> dict[str, str]:
+    pairs = (pair.partition("=") for pair in str(parameters).split(";") if pair)
+    return {name: value for name, _, value in pairs}

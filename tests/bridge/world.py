@@ -1,0 +1,121 @@
+"""The smallest world of the bridge's tests: a corridor mission, and a robot in simulated time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from bridge.agent import Agent
+from bridge.clock import SimulatedClock
+from bridge.controller import Controller
+from bridge.inbox import Inbox
+from bridge.journal import Journal, memory_journal
+from bridge.link import MemoryLink, Switchboard
+from bridge.protocol import Answer, Command, Keys, Verb
+from bridge.simulator import SimulatedBase, SimulatedScanner, Wear
+from bridge.station import Station
+from mission.document import (
+    Frame,
+    Mission,
+    Origin,
+    Point,
+    Policy,
+    RobotSpec,
+    Scan,
+    ScannerSpec,
+    Sees,
+    Start,
+    Stop,
+    sealed,
+)
+from mission.settings import Settings
+
+EXACT = Wear(noise_m=0.0, noise_rad=0.0)
+WALKING = RobotSpec(radius=0.35, speed=0.5, turn_rate=math.radians(45), acceleration=0.5)
+
+
+def corridor(*, stops: int = 3, revision: int = 1, closed: bool = True, **stop_details: Any) -> Mission:
+    """Stops every 2 m along the x axis from a start at the origin, and the way straight back."""
+    made = tuple(_stop(index, **stop_details) for index in range(stops))
+    end: Point = (2.0 * stops, 0.0)
+    return sealed(
+        Mission(
+            id="c0ffee00c0ffee00c0ffee00c0ffee00", revision=revision, name="corridor", digest="",
+            frame=Frame(name="site"), georeference=None, robot=WALKING,
+            scanner=ScannerSpec(profile="default", range=5.0),
+            start=Start(x=0.0, y=0.0, heading=0.0, reason="given"), stops=made,
+            return_=(end, (0.0, 0.0)) if closed else None,
+            policy=Policy(link_loss="continue", link_loss_after_s=30.0, battery_min=0.15),
+            origin=Origin(floor="corridor.dxf", floor_digest="0" * 64, parameters=Settings(), stopgo="0.1.0"),
+        )
+    )  # fmt: skip
+
+
+def _stop(index: int, **details: Any) -> Stop:
+    x = 2.0 * (index + 1)
+    plain = Stop(
+        id=f"s{index + 1}", x=x, y=0.0, heading=0.0, doorway=False, tolerance_m=0.05, settle_s=2.0,
+        scan=Scan(profile="default", duration_s=60.0, timeout_s=120.0), on_failure="ask", retries=1,
+        approach=((x - 2.0, 0.0), (x, 0.0)), sees=Sees(units=10, new_units=5),
+    )  # fmt: skip
+    return msgspec.structs.replace(plain, **details)
+
+
+@dataclass
+class Field:
+    """A simulated robot whose time passes only while it works."""
+
+    journal: Journal = field(default_factory=memory_journal)
+    clock: SimulatedClock = field(default_factory=SimulatedClock)
+    wear: Wear = EXACT
+    keep: Path | None = None
+    ids: Any = field(default_factory=count)
+
+    def __post_init__(self) -> None:
+        self.board = Switchboard()
+        self.keys = Keys("r1")
+        self.base = SimulatedBase(clock=self.clock, wear=self.wear, keep=self.keep)
+        self.scanner = SimulatedScanner(clock=self.clock)
+        self.boot()
+
+    def boot(self) -> None:
+        """Start the robot's program (again): all it knows is in the journal, the world stays as it is."""
+        self.controller = Controller(
+            robot="r1", journal=self.journal, base=self.base, scanner=self.scanner, clock=self.clock,
+            mission_taken=lambda mission: self.base.stand_at_start(mission.start),
+        )  # fmt: skip
+        self.inbox = Inbox(self.journal, self.controller, self.scanner.profiles)
+
+    def station(self) -> Station:
+        """A station on a memory link to this robot's agent, which serves but does not work by itself."""
+        link = MemoryLink(self.board)
+        agent = Agent(
+            keys=self.keys, link=link, journal=self.journal, controller=self.controller, base=self.base,
+            scanner=self.scanner, clock=self.clock, command_clock=self.clock,
+        )  # fmt: skip
+        agent.serve()
+        return Station(self.board.link(), self.keys, commander="test", timeout_s=0.3)
+
+    def order(self, verb: Verb, **details: Any) -> Answer:
+        return self.controller.obey(self.command(verb, **details))
+
+    def command(self, verb: Verb, **details: Any) -> Command:
+        given = {"cmd_id": f"c{next(self.ids)}", "commander": "test", "valid_for_s": 5.0} | details
+        return Command(verb=verb, **({"issued_ns": self.clock.now_ns()} | given))
+
+    def work(self, *, most: int = 500) -> int:
+        """Let the robot work until there is nothing to do; how many pieces of work that were."""
+        for done in range(most):
+            if not self.controller.step():
+                return done
+        raise AssertionError(f"the robot still works after {most} steps: {self.controller.run}")
+
+    def told(self, run_id: str | None = None) -> list[str]:
+        """The journal as words: `Scanned s1`."""
+        events = self.journal.events(run_id=run_id)
+        return [f"{type(event).__name__} {getattr(event, 'stop', '')}".strip() for event in events]
