@@ -1,0 +1,1 @@
+"""Inputs that ship with stopgo, drawn by the project itself."""
