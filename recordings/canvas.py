@@ -1,0 +1,134 @@
+"""A Rerun stream to draw on: opened strictly, in metres from a local origin, static or at given times."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from mission.document import Mission
+from mission.geometry import FloatArray
+from recordings import entities, palette
+from recordings.layout import Bounds, blueprint
+
+FAR = 1000.0
+"""Rerun stores float32; beyond this distance a millimetre is lost, and a local origin is used."""
+GRID = 100.0
+
+Origin = tuple[float, float]
+
+
+def local_origin(x: float, y: float) -> Origin:
+    """The drawing's own origin, or for far coordinates a round point near (x, y)."""
+    if max(abs(x), abs(y)) <= FAR:
+        return (0.0, 0.0)
+    return (round(x / GRID) * GRID, round(y / GRID) * GRID)
+
+
+def mission_origin(mission: Mission) -> Origin:
+    """The local origin of every recording of this mission, so that they overlay."""
+    return local_origin(mission.start.x, mission.start.y)
+
+
+def on_screen(points: float) -> float:
+    """A radius in points of the screen, whatever the zoom: Rerun tells them from metres by the sign."""
+    return -points
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """What drawing functions draw on; positions are given in the drawing's metres."""
+
+    stream: rr.RecordingStream
+    origin: Origin
+
+    def local(self, xy: FloatArray) -> NDArray[Any]:
+        """Points (…, 2) relative to the local origin, as Rerun stores them."""
+        return (np.asarray(xy, dtype=np.float64) - self.origin).astype(np.float32)
+
+    def strips(self, strips: Iterable[FloatArray]) -> list[NDArray[Any]]:
+        """Line strips relative to the local origin."""
+        return [self.local(strip) for strip in strips]
+
+    def show(self, entity: str, *archetypes: Any) -> None:
+        """Draw at every time of every timeline."""
+        self.stream.log(entity, *archetypes, static=True)
+
+    def at(
+        self,
+        entity: str,
+        archetype: Any,
+        *,
+        step: int | None = None,
+        mission_s: float | None = None,
+        robot_ns: int | None = None,
+    ) -> None:
+        """Draw at the given times, of which there must be one: Rerun makes rows without a time static."""
+        if step is None and mission_s is None and robot_ns is None:
+            raise ValueError(f"{entity}: no time given")
+        self.stream.reset_time()
+        if step is not None:
+            self.stream.set_time(entities.STEP, sequence=step)
+        if mission_s is not None:
+            self.stream.set_time(entities.MISSION_TIME, duration=mission_s)
+        if robot_ns is not None:
+            self.stream.set_time(entities.ROBOT_TIME, timestamp=np.datetime64(robot_ns, "ns"))
+        self.stream.log(entity, archetype)
+
+    def say(self, text: str, *, level: str = "INFO", step: int = 0) -> None:
+        """One line of the plan's log, at this planning step and at the mission's start."""
+        self.at(entities.LOG_PLAN, rr.TextLog(text, level=level), step=step, mission_s=0.0)
+
+    def describe(self, name: str, values: dict[str, Any]) -> None:
+        """A property of the recording; each value must be of one type wherever this name is used."""
+        self.stream.send_property(name, rr.DynamicArchetype(name, components=values))
+
+    def columns(self, entity: str, index: rr.TimeColumn, *groups: Any) -> None:
+        """Draw many rows at once, one per time of `index`."""
+        self.stream.send_columns(entity, indexes=[index], columns=[c for group in groups for c in group])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sheet:
+    """What a recording is of, known before anything is drawn."""
+
+    recording_id: str
+    name: str
+    origin: Origin
+    extent: Bounds
+    """What 2D views show, in the drawing's metres."""
+
+    @property
+    def local_extent(self) -> Bounds:
+        x, y = self.origin
+        return (self.extent[0] - x, self.extent[1] - y, self.extent[2] - x, self.extent[3] - y)
+
+
+@contextmanager
+def open_canvas(path: Path, sheet: Sheet) -> Iterator[Canvas]:
+    """A recording written to `path`, with the blueprint that all recordings share; leaving closes it."""
+    rr.set_strict_mode(True)
+    with rr.RecordingStream(
+        entities.APPLICATION, recording_id=sheet.recording_id, send_properties=False
+    ) as stream:
+        stream.save(path, default_blueprint=blueprint(sheet.local_extent))
+        stream.set_log_time_enabled(False)
+        stream.send_recording_name(sheet.name)
+        canvas = Canvas(stream, sheet.origin)
+        _prepare(canvas)
+        yield canvas
+
+
+def _prepare(canvas: Canvas) -> None:
+    """The flip that makes 2D views y-up, and the classes."""
+    flip = rr.Transform3D(scale=[1, -1, 1])
+    canvas.show(entities.PLAN, flip)
+    canvas.show(entities.FIELD, flip)
+    canvas.show(entities.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    canvas.show(entities.ROOT, rr.AnnotationContext(palette.class_rows()))

@@ -1,0 +1,126 @@
+"""The blueprint of every recording: what a viewer shows when it opens a plan, a field run, or both."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from recordings import entities as at
+from recordings.entities import under
+
+BACKGROUND = (18, 20, 26, 255)
+
+
+Bounds = tuple[float, float, float, float]
+"""Least x, least y, greatest x, greatest y in local metres, y up."""
+MARGIN = 0.04
+"""Empty space around the drawing, as a share of its size."""
+
+
+def blueprint(bounds: Bounds | None = None, *, tab: int = 0) -> rrb.Blueprint:
+    """Tabs for the mission, its planning stages, the run, and the log; 2D views show `bounds`."""
+    area = None if bounds is None else _visible(bounds)
+    return rrb.Blueprint(
+        rrb.Tabs(_mission(area), _stages(area), _run(), _texts(), active_tab=tab),
+        rrb.TimePanel(timeline=at.MISSION_TIME, play_state="paused", state="collapsed"),
+        auto_views=False,
+        auto_layout=False,
+        collapse_panels=True,
+    )
+
+
+def _mission(area: rrb.VisualBounds2D | None) -> rrb.Horizontal:
+    plan = _flat(
+        "Plan and run",
+        area,
+        *(at.FLOOR, at.COVERAGE, at.ROUTE, at.STOPS, at.PLANNED_ROBOT, at.FIELD),
+        time_ranges=_so_far(),
+    )
+    return rrb.Horizontal(
+        plan,
+        rrb.Vertical(_solid(), rrb.TextDocumentView(origin=at.REPORT, name="Plan report")),
+        column_shares=[3, 2],
+        name="Mission",
+    )
+
+
+def _stages(area: rrb.VisualBounds2D | None) -> rrb.Grid:
+    return rrb.Grid(
+        _flat("Navigable space and candidates", area, at.FLOOR, at.NAVIGABLE, at.TARGETS, at.CANDIDATES),
+        _flat("What a candidate sees (timeline: candidate)", area, at.FLOOR, at.VISIBILITY),
+        _flat("Selection (timeline: stage_step)", area, at.FLOOR, at.SELECTION),
+        _plot("Coverage, %", at.METRIC_COVERAGE, (0.0, 100.0)),
+        grid_columns=2,
+        name="Planning",
+    )
+
+
+def _run() -> rrb.Vertical:
+    return rrb.Vertical(
+        rrb.StateTimelineView(origin=at.FIELD, contents=under(at.FIELD), name="States"),
+        _plot("Distance from the route, m (left positive)", at.METRIC_CROSS_TRACK),
+        _plot("Deviation at each stop, m", at.METRIC_DEVIATION),
+        _plot("Battery, %", at.METRIC_BATTERY, (0.0, 100.0)),
+        name="Run",
+    )
+
+
+def _texts() -> rrb.Horizontal:
+    return rrb.Horizontal(
+        rrb.TextLogView(origin=at.LOG, contents=under(at.LOG), name="Log"),
+        rrb.TextDocumentView(origin=at.FIELD, contents=under(at.FIELD), name="Run report"),
+        name="Log",
+    )
+
+
+def _visible(bounds: Bounds) -> rrb.VisualBounds2D:
+    """Rerun's bounds are y-down."""
+    left, low, right, high = bounds
+    margin = MARGIN * max(right - left, high - low, 1.0)
+    return rrb.VisualBounds2D(
+        x_range=(left - margin, right + margin), y_range=(-high - margin, -low + margin)
+    )
+
+
+def _flat(
+    name: str, area: rrb.VisualBounds2D | None, *contents: str, time_ranges: Any = None
+) -> rrb.Spatial2DView:
+    """A y-up 2D view: its origin lies above the flip."""
+    return rrb.Spatial2DView(
+        origin=at.ROOT,
+        contents=[under(entity) for entity in contents],
+        name=name,
+        background=BACKGROUND,
+        visual_bounds=area,
+        time_ranges=time_ranges,
+    )
+
+
+def _solid() -> rrb.Spatial3DView:
+    return rrb.Spatial3DView(
+        origin=at.WORLD,
+        contents=under(at.WORLD),
+        name="3D",
+        background=BACKGROUND,
+        line_grid=False,
+        time_ranges=_so_far(),
+    )
+
+
+def _plot(name: str, entity: str, span: tuple[float, float] | None = None) -> rrb.TimeSeriesView:
+    axis = None if span is None else rrb.ScalarAxis(range=span, zoom_lock=True)
+    return rrb.TimeSeriesView(origin=entity, contents=under(entity), name=name, axis_y=axis)
+
+
+def _so_far() -> list[rr.VisibleTimeRange]:
+    """The driven path is rows of short pieces: show all of them up to now."""
+    return [
+        rrb.VisibleTimeRange(
+            timeline,
+            start=rrb.TimeRangeBoundary.infinite(),
+            end=rrb.TimeRangeBoundary.cursor_relative(),
+        )
+        for timeline in (at.MISSION_TIME, at.ROBOT_TIME)
+    ]

@@ -1,0 +1,107 @@
+"""A mission in 2D and 3D: stops with numbers and headings, the route, and the planned drive.
+
+Plan and field recordings both draw it, at the same entities.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from mission.document import Mission
+from mission.geometry import FloatArray, bounds
+from recordings import entities, palette, strokes
+from recordings.canvas import Canvas, on_screen
+from recordings.drive import Drive
+from recordings.layout import Bounds
+from recordings.stages import ORDER
+
+ABOVE_FLOOR = 0.05
+ARROW = 0.6
+
+
+def draw_mission(canvas: Canvas, mission: Mission) -> None:
+    """Stops and route; nothing of it changes with time."""
+    _draw_route(canvas, mission)
+    if mission.stops:
+        _draw_stops(canvas, mission)
+
+
+def mission_extent(mission: Mission) -> Bounds:
+    """Bounds of everything the mission drives along."""
+    start = np.array([(mission.start.x, mission.start.y)])
+    ways = [start, *(np.array(stop.approach).reshape(-1, 2) for stop in mission.stops)]
+    return bounds([*ways, np.array(mission.return_ or ()).reshape(-1, 2)])
+
+
+def draw_drive(canvas: Canvas, drive: Drive, *, radius: float) -> None:
+    """The planned pose over mission time."""
+    index = rr.TimeColumn(entities.MISSION_TIME, duration=drive.seconds)
+    xy = canvas.local(drive.poses[:, :2])
+    turn = quaternions(drive.poses[:, 2])
+    for robot in (entities.PLANNED_ROBOT, entities.WORLD_PLANNED_ROBOT):
+        columns = rr.Transform3D.columns(translation=strokes.level(xy, 0.0), quaternion=turn)
+        canvas.columns(robot, index, columns)
+    draw_robot(canvas, entities.PLANNED_ROBOT, entities.WORLD_PLANNED_ROBOT, radius, palette.PLANNED)
+
+
+def draw_robot(canvas: Canvas, flat: str, solid: str, radius: float, colour: palette.Colour) -> None:
+    """The robot's shape in 2D and 3D; its pose is the transform of the entities `flat` and `solid`."""
+    body, nose = strokes.circle(radius), np.array([[0.0, 0.0], [radius * 1.6, 0.0]])
+    lines = rr.LineStrips2D([body, nose], colors=colour, radii=on_screen(1.5), draw_order=ORDER["robot"])
+    canvas.show(f"{flat}/shape", lines)
+    rings = [strokes.level(body, z) for z in (0.02, 0.25, 0.5)]
+    shape = rr.LineStrips3D([*rings, strokes.level(nose, 0.5)], colors=colour, radii=0.02)
+    canvas.show(f"{solid}/shape", shape)
+
+
+def quaternions(heading: FloatArray) -> FloatArray:
+    """Turns about z as quaternions (n, 4), x y z w."""
+    half = np.asarray(heading) / 2
+    return np.stack([np.zeros_like(half), np.zeros_like(half), np.sin(half), np.cos(half)], axis=-1)
+
+
+def _draw_route(canvas: Canvas, mission: Mission) -> None:
+    legs = [np.array(stop.approach) for stop in mission.stops if len(stop.approach) > 1]
+    colours = [palette.ROUTE] * len(legs)
+    if mission.return_:
+        legs.append(np.array(mission.return_))
+        colours.append(palette.RETURN)
+    if not legs:
+        return
+    flat = rr.LineStrips2D(
+        canvas.strips(legs), colors=colours, radii=on_screen(1.2), draw_order=ORDER["route"]
+    )
+    canvas.show(entities.ROUTE, flat)
+    raised = [strokes.level(canvas.local(leg), ABOVE_FLOOR) for leg in legs]
+    canvas.show(entities.WORLD_ROUTE, rr.LineStrips3D(raised, colors=colours, radii=0.03))
+
+
+def _draw_stops(canvas: Canvas, mission: Mission) -> None:
+    xy = canvas.local(np.array([(stop.x, stop.y) for stop in mission.stops]))
+    labels = [stop.id for stop in mission.stops]
+    heading = np.array([stop.heading for stop in mission.stops])
+    facing = ARROW * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    points = rr.Points2D(
+        xy, labels=labels, colors=palette.STOP, radii=0.14, show_labels=True, draw_order=ORDER["stop"]
+    )
+    details = rr.AnyValues(
+        doorway=[stop.doorway for stop in mission.stops],
+        units=[stop.sees.units for stop in mission.stops],
+        new_units=[stop.sees.new_units for stop in mission.stops],
+    )
+    canvas.show(entities.STOPS, points, details)
+    arrows = rr.Arrows2D(
+        origins=xy,
+        vectors=facing,
+        colors=palette.STOP,
+        radii=on_screen(1.5),
+        draw_order=ORDER["stop"],
+    )
+    canvas.show(f"{entities.STOPS}/heading", arrows)
+    poles = rr.Points3D(
+        strokes.level(xy, 1.5), labels=labels, colors=palette.STOP, radii=0.12, show_labels=True
+    )
+    canvas.show(entities.WORLD_STOPS, poles)
+    legs = np.stack([strokes.level(xy, 0.0), strokes.level(xy, 1.5)], axis=1)
+    canvas.show(f"{entities.WORLD_STOPS}/legs", rr.LineStrips3D(legs, colors=palette.STOP, radii=0.02))

@@ -1,0 +1,109 @@
+"""Colours and classes: one meaning, one colour, in every view of every recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from mission.planning import DROP_REASONS
+
+Colour = tuple[int, int, int, int]
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """A class id of Rerun: hovering shows its label."""
+
+    number: int
+    label: str
+    colour: Colour
+
+
+SEEN = Meaning(10, "target: seen by a stop", (60, 210, 110, 255))
+UNSEEN = Meaning(11, "target: seen by no stop yet", (235, 70, 70, 255))
+HIDDEN = Meaning(12, "target: seen by no candidate", (120, 90, 130, 255))
+NEW = Meaning(13, "target: new in this step", (245, 245, 120, 255))
+TARGET = Meaning(14, "target", (205, 160, 90, 255))
+ARRIVED = Meaning(40, "arrived", (255, 255, 255, 255))
+SCANNED = Meaning(41, "scanned", (90, 255, 150, 255))
+SKIPPED = Meaning(42, "skipped", (255, 190, 60, 255))
+FAILED = Meaning(43, "failed", (255, 70, 70, 255))
+
+_FIRST_REASON = 20
+_REASON_COLOURS: tuple[Colour, ...] = (
+    (245, 215, 80, 255),  # kept
+    (120, 75, 75, 255),  # outside the room
+    (135, 60, 110, 255),  # in a hole
+    (190, 70, 60, 255),  # closer than d_sec
+    (200, 105, 60, 255),  # closer than the edge distance
+    (150, 60, 60, 255),  # not reachable
+    (110, 95, 150, 255),  # in another part
+)
+
+
+def reason(number: int) -> Meaning:
+    """The class of candidates whose reason is `DROP_REASONS[number]`."""
+    label = DROP_REASONS[number]
+    verb = "candidate" if number == 0 else "dropped candidate"
+    return Meaning(_FIRST_REASON + number, f"{verb}: {label}", _REASON_COLOURS[number])
+
+
+MEANINGS = (
+    *(SEEN, UNSEEN, HIDDEN, NEW, TARGET, ARRIVED, SCANNED, SKIPPED, FAILED),
+    *(reason(number) for number in range(len(DROP_REASONS))),
+)
+
+KIND_COLOURS: dict[str, Colour] = {
+    "walls": (165, 168, 175, 255),
+    "columns": (240, 150, 50, 255),
+    "beams": (170, 115, 220, 255),
+    "stairs": (40, 165, 150, 255),
+    "windows": (95, 165, 245, 255),
+    "railings": (110, 135, 225, 255),
+    "other": (150, 130, 105, 255),
+}
+"""Every element kind of `mission.floor.KINDS`."""
+
+OUTLINE: Colour = (110, 118, 135, 255)
+HOLE: Colour = (230, 110, 150, 255)
+ROOM: Colour = (58, 64, 78, 255)
+ROOM_NAME: Colour = (150, 158, 175, 255)
+PASSABLE: Colour = (90, 225, 140, 255)
+BLOCKED: Colour = (230, 85, 85, 255)
+DRIVE: Colour = (50, 95, 140, 255)
+STOP_AREA: Colour = (70, 140, 95, 255)
+GAP: Colour = (255, 120, 220, 255)
+RAY: Colour = (235, 215, 110, 70)
+EYE: Colour = (255, 235, 120, 255)
+STOP: Colour = (70, 255, 110, 255)
+ROUTE: Colour = (40, 210, 240, 255)
+RETURN: Colour = (35, 115, 140, 255)
+PLANNED: Colour = (140, 225, 255, 255)
+DRIVEN: Colour = (255, 130, 225, 255)
+SLAB: Colour = (62, 68, 80, 255)
+
+STATE_COLOURS: dict[str, Colour] = {
+    "IDLE": (110, 110, 120, 255),
+    "READY": (90, 140, 220, 255),
+    "RUNNING": (60, 190, 110, 255),
+    "PAUSED": (230, 190, 70, 255),
+    "HELD": (240, 130, 50, 255),
+    "HOMING": (150, 120, 230, 255),
+    "FINISHED": (70, 220, 230, 255),
+    "ABORTED": (230, 70, 70, 255),
+    "WAITING": (110, 110, 120, 255),
+    "NAVIGATING": (60, 160, 220, 255),
+    "SETTLING": (200, 190, 90, 255),
+    "SCANNING": (70, 220, 120, 255),
+    "VERIFYING": (120, 220, 190, 255),
+    "DONE": (70, 140, 90, 255),
+    "RETRIABLE": (240, 160, 60, 255),
+    "SKIPPED": (230, 190, 70, 255),
+    "FAILED": (230, 70, 70, 255),
+}
+"""Every state of a robot and of a stop."""
+
+
+def class_rows() -> list[tuple[Any, ...]]:
+    """Rows for Rerun's annotation context: class id, label, colour."""
+    return [(item.number, item.label, item.colour) for item in MEANINGS]

@@ -1,0 +1,132 @@
+"""A plan as a recording: takes each noun as the planner makes it, and writes plan.rrd when the plan ends."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import rerun as rr
+
+from mission import __version__
+from mission.document import Mission
+from mission.errors import AnswerIsNo, StopgoError
+from mission.floor import FloorPlan
+from mission.geometry import bounds
+from mission.planning import Candidates, NavigableSpace, Route, Schedule, Selection, Visibility
+from recordings import entities, stages
+from recordings.canvas import Canvas, Origin, Sheet, local_origin, mission_origin, open_canvas
+from recordings.drive import arrivals, planned_drive
+from recordings.layout import Bounds
+from recordings.mission_drawing import draw_drive, draw_mission, mission_extent
+from recordings.read import check
+from recordings.report import Nouns, parameter_values, parameters, plan_report, plan_results
+from recordings.solid import paint_coverage, raise_floor
+
+Drawing = Callable[[Canvas, Any], None]
+
+DRAWINGS: dict[type, tuple[Drawing, ...]] = {
+    FloorPlan: (stages.draw_floor, raise_floor),
+    NavigableSpace: (stages.draw_space,),
+    Candidates: (stages.draw_candidates,),
+    Visibility: (stages.draw_visibility,),
+    Selection: (stages.draw_selection, paint_coverage),
+    Route: (stages.tell_route,),
+    Mission: (draw_mission,),
+}
+"""How each noun is drawn; nouns of other types are left out."""
+
+
+class PlanRecording:
+    """Collects the nouns of one plan; leaving the block draws them.
+
+    Drawing waits for the end because the local origin is the mission's, which is known last and which
+    field recordings of the mission know too. The file appears when it is complete and has been read
+    back; a plan that ends in "no" is recorded as far as it came, a plan that fails leaves no file.
+    """
+
+    def __init__(self, path: Path, recording_id: str) -> None:
+        self.path = path
+        self.recording_id = recording_id
+        self._nouns: Nouns = {}
+
+    def __enter__(self) -> PlanRecording:
+        return self
+
+    def observe(self, noun: object) -> None:
+        """Take one noun; of two of a kind the later one counts."""
+        self._nouns[type(noun)] = noun
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None or isinstance(error, AnswerIsNo):
+            write_plan(self.path, self.recording_id, self._nouns, ended_in=error)
+
+
+def write_plan(path: Path, recording_id: str, nouns: Nouns, ended_in: StopgoError | None = None) -> None:
+    """Draw the nouns into `path`, which appears only when it is complete and readable."""
+    unfinished = path.with_name(f"{path.name}.tmp")
+    sheet = Sheet(recording_id=recording_id, name=_name(nouns), origin=_origin(nouns), extent=_extent(nouns))
+    try:
+        with open_canvas(unfinished, sheet) as canvas:
+            for kind, drawings in DRAWINGS.items():
+                for draw in drawings if kind in nouns else ():
+                    draw(canvas, nouns[kind])
+            _draw_planned_drive(canvas, nouns)
+            _tell(canvas, nouns)
+            if ended_in is not None:
+                canvas.say(str(ended_in), level="ERROR")
+        check(unfinished)
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _origin(nouns: Nouns) -> Origin:
+    if Mission in nouns:
+        return mission_origin(nouns[Mission])
+    if FloorPlan in nouns and nouns[FloorPlan].outline:
+        x, y = nouns[FloorPlan].outline[0].exterior[0]
+        return local_origin(float(x), float(y))
+    return (0.0, 0.0)
+
+
+def _extent(nouns: Nouns) -> Bounds:
+    floor, mission = nouns.get(FloorPlan), nouns.get(Mission)
+    if floor is not None:
+        return bounds(polygon.exterior for polygon in floor.outline)
+    return mission_extent(mission) if mission is not None else (0.0, 0.0, 0.0, 0.0)
+
+
+def _name(nouns: Nouns) -> str:
+    for kind in (Mission, FloorPlan):
+        if kind in nouns:
+            return str(nouns[kind].name)
+    return "plan"
+
+
+def _draw_planned_drive(canvas: Canvas, nouns: Nouns) -> None:
+    """The drive of the mission, and the coverage it reaches on the way."""
+    if Mission not in nouns or not nouns[Mission].stops:
+        return
+    mission = nouns[Mission]
+    schedule = nouns.get(Schedule)
+    arrival_s = arrivals(mission, None if schedule is None else schedule.arrival_s)
+    draw_drive(canvas, planned_drive(mission, arrival_s), radius=mission.robot.radius)
+    if Selection in nouns:
+        visible = int(nouns[Selection].visibility.visible.sum())
+        stages.plot_planned_coverage(canvas, mission, arrival_s, visible=visible)
+
+
+def _tell(canvas: Canvas, nouns: Nouns) -> None:
+    """The report, and the properties by which the file says what it is of."""
+    report = rr.TextDocument(plan_report(nouns, canvas.origin), media_type="text/markdown")
+    canvas.show(entities.REPORT, report)
+    results = {"local_origin": list(canvas.origin), "stopgo": __version__, **plan_results(nouns)}
+    canvas.describe(entities.PROPERTY_PLAN, results)
+    settings = parameters(nouns)
+    if settings is not None:
+        canvas.describe(entities.PROPERTY_PARAMETERS, parameter_values(settings))

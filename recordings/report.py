@@ -1,0 +1,160 @@
+"""A plan and a run in words: the markdown reports and the properties that travel inside recordings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from mission.document import Mission
+from mission.floor import FloorPlan
+from mission.planning import Candidates, NavigableSpace, Route, Schedule, Selection, Visibility
+from mission.settings import Settings
+from recordings.canvas import Origin
+
+Nouns = dict[type, Any]
+
+
+def plan_results(nouns: Nouns) -> dict[str, Any]:
+    """What the stages of a plan came to, by name; stages that were not reached are left out."""
+    results: dict[str, Any] = {}
+    for kind, summarise in _RESULTS.items():
+        if kind in nouns:
+            results.update(summarise(nouns[kind]))
+    return results
+
+
+def parameters(nouns: Nouns) -> Settings | None:
+    """The settings the plan was made with, if any noun tells them."""
+    if NavigableSpace in nouns:
+        return nouns[NavigableSpace].settings
+    return nouns[Mission].origin.parameters if Mission in nouns else None
+
+
+def parameter_values(settings: Settings) -> dict[str, str]:
+    """The settings as JSON texts, so that a parameter has one type whatever its value."""
+    values = msgspec.to_builtins(settings)
+    return {name: msgspec.json.encode(value).decode() for name, value in values.items()}
+
+
+def plan_report(nouns: Nouns, origin: Origin) -> str:
+    """The plan in markdown."""
+    results = plan_results(nouns)
+    title = nouns[Mission].name if Mission in nouns else results.get("floor", "plan")
+    lines = [f"# {title}", "", "| | |", "|---|---|"]
+    lines += [f"| {name.replace('_', ' ')} | {_shown(value)} |" for name, value in results.items()]
+    lines += ["", *_stop_table(nouns.get(Mission)), *_findings(nouns)]
+    lines += ["## Looking around", "", *_GUIDE, *_origin_note(origin)]
+    return "\n".join(lines)
+
+
+def _floor(floor: FloorPlan) -> dict[str, Any]:
+    return {
+        "floor": floor.name,
+        "floor_digest": floor.digest,
+        "area_m2": round(float(floor.area), 2),
+        "rooms": len(floor.rooms),
+        "openings": len(floor.openings),
+        "findings": len(floor.findings),
+    }
+
+
+def _space(space: NavigableSpace) -> dict[str, Any]:
+    passable = sum(state.passable for state in space.openings)
+    return {"passable_openings": passable, "target_units": space.targets.total}
+
+
+def _candidates(candidates: Candidates) -> dict[str, Any]:
+    return {
+        "candidates": len(candidates.xy),
+        "reachable_candidates": len(candidates.kept),
+        "strategy": candidates.strategy,
+    }
+
+
+def _visibility(visibility: Visibility) -> dict[str, Any]:
+    return {"visible_units": int(visibility.visible.sum()), "visibility": visibility.method}
+
+
+def _selection(selection: Selection) -> dict[str, Any]:
+    return {
+        "stops": len(selection.chosen),
+        "stops_bound": int(selection.bound),
+        "coverage": round(selection.coverage, 4),
+        "coverage_required": float(selection.required),
+        "selector": selection.method,
+    }
+
+
+def _route(route: Route) -> dict[str, Any]:
+    return {
+        "route_m": round(float(route.length), 3),
+        "route_bound_m": round(float(route.bound), 3),
+        "tour": route.tour,
+        "router": route.method,
+        "begins_at": route.start_reason,
+    }
+
+
+def _schedule(schedule: Schedule) -> dict[str, Any]:
+    return {"planned_s": round(float(schedule.total_s), 1)}
+
+
+def _mission(mission: Mission) -> dict[str, Any]:
+    return {
+        "mission_id": mission.id,
+        "revision": mission.revision,
+        "digest": mission.digest,
+        "stopgo": mission.origin.stopgo,
+    }
+
+
+_RESULTS: dict[type, Any] = {
+    FloorPlan: _floor,
+    NavigableSpace: _space,
+    Candidates: _candidates,
+    Visibility: _visibility,
+    Selection: _selection,
+    Route: _route,
+    Schedule: _schedule,
+    Mission: _mission,
+}
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    text = str(value)
+    return f"`{text[:12]}…`" if len(text) >= 32 else text
+
+
+def _stop_table(mission: Mission | None) -> list[str]:
+    if mission is None or not mission.stops:
+        return []
+    lines = ["## Stops", "", "| stop | x m | y m | units seen | new |", "|---|---|---|---|---|"]
+    for stop in mission.stops:
+        lines.append(
+            f"| {stop.id} | {stop.x:.3f} | {stop.y:.3f} | {stop.sees.units} | {stop.sees.new_units} |"
+        )
+    return [*lines, ""]
+
+
+def _findings(nouns: Nouns) -> list[str]:
+    holder = nouns.get(NavigableSpace) or nouns.get(FloorPlan)
+    if holder is None or not holder.findings:
+        return []
+    return ["## Findings", "", *(f"- **{item.code}** {item.message}" for item in holder.findings), ""]
+
+
+_GUIDE = (
+    "- timeline `mission_time`: the planned drive, and the field run when its recording is open too",
+    "- timeline `candidate`: what each candidate sees (tab *Planning*)",
+    "- timeline `stage_step`: the selection, stop by stop (tab *Planning*)",
+    "- walls in 3D are cut at a nominal 1.2 m: the drawing tells no heights",
+)
+
+
+def _origin_note(origin: Origin) -> list[str]:
+    if origin == (0.0, 0.0):
+        return []
+    return [f"- positions shown are relative to x = {origin[0]:.0f} m, y = {origin[1]:.0f} m of the drawing"]
