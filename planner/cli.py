@@ -1,9 +1,252 @@
-"""Commands of this folder."""
+"""`stopgo plan`: a floor's file in, a mission with its picture, coverage and recording out."""
 
 from __future__ import annotations
 
+import datetime
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
 import typer
+
+from mission.errors import InputError
+from mission.settings import Settings, read_settings, settings_toml
+
+if TYPE_CHECKING:
+    from mission.document import Mission
+    from mission.floor import FloorPlan
+    from mission.planning import Candidates
+    from planner.report import PlanReport
+
+EXAMPLE = "Example: stopgo plan floor.dxf -o plan --range 8 --start 2.5,3.0,90"
 
 
 def add_commands(app: typer.Typer) -> None:
     """Add this folder's verbs to the front door."""
+    app.command(name="plan", epilog=EXAMPLE)(plan_command)
+
+
+def numbers(text: str) -> tuple[float, ...]:
+    """The numbers in `1,2.5,-3`."""
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"{text}: must be numbers separated by commas, such as 2.5,3.0") from None
+
+
+def plan_command(
+    floor: Annotated[
+        Path | None, typer.Argument(help="The floor: a layered .dxf.", show_default=False)
+    ] = None,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")] = Path(),
+    parameters: Annotated[
+        Path | None, typer.Option("-p", "--parameters", help="plan.toml; options override it.")
+    ] = None,
+    candidates: Annotated[str | None, typer.Option(help="grid, or module:function")] = None,
+    visibility: Annotated[str | None, typer.Option(help="exact")] = None,
+    selector: Annotated[str | None, typer.Option(help="default or greedy")] = None,
+    router: Annotated[str | None, typer.Option(help="default")] = None,
+    range_: Annotated[float | None, typer.Option("--range", help="Scanner's range, m.")] = None,
+    coverage: Annotated[float | None, typer.Option(help="Share of the visible units to be seen.")] = None,
+    d_sec: Annotated[float | None, typer.Option(help="Stop to element, m.")] = None,
+    d_dis: Annotated[float | None, typer.Option(help="Length of a unit, m.")] = None,
+    grid: Annotated[float | None, typer.Option(help="Spacing of grid candidates, m.")] = None,
+    door_access: Annotated[float | None, typer.Option(help="Least clear width of an opening, m.")] = None,
+    edge: Annotated[float | None, typer.Option(help="Stops and legs to floor edges, m.")] = None,
+    doors: Annotated[str | None, typer.Option(help="open or closed, for the laser")] = None,
+    targets: Annotated[str | None, typer.Option(help="Kinds to scan, such as walls,columns.")] = None,
+    tour: Annotated[str | None, typer.Option(help="closed or open")] = None,
+    start: Annotated[str | None, typer.Option(help="X,Y,HEADING in m and degrees.")] = None,
+    end: Annotated[str | None, typer.Option(help="X,Y in m.")] = None,
+    origin: Annotated[str | None, typer.Option(help="LAT,LON,ALT,HEADING of the drawing's origin.")] = None,
+    robot_radius: Annotated[float | None, typer.Option(help="m; default half of door_access.")] = None,
+    speed: Annotated[float | None, typer.Option(help="Robot's speed, m/s.")] = None,
+    settle: Annotated[float | None, typer.Option(help="Standing still before a scan, s.")] = None,
+    scan_time: Annotated[float | None, typer.Option(help="Duration of a scan, s.")] = None,
+    tolerance: Annotated[float | None, typer.Option(help="Robot to stop at the start of a scan, m.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the tour search.")] = None,
+    all_parts: Annotated[bool, typer.Option(help="Also plan parts not connected with the first.")] = False,
+    strict: Annotated[bool, typer.Option(help="Exit 1 if a room is not reached.")] = False,
+    print_config: Annotated[bool, typer.Option(help="Print plan.toml with these options and leave.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+) -> int:
+    """Plan where the scanner must stand on a floor, and the route that visits those stops."""
+    options = dict(locals())
+    given = {key.rstrip("_"): value for key, value in options.items() if key not in NOT_SETTINGS}
+    for key in ("start", "end", "origin"):
+        given[key] = None if given[key] is None else numbers(given[key])
+    given["targets"] = None if targets is None else tuple(kind.strip() for kind in targets.split(","))
+    settings = read_settings(parameters, given)
+    if print_config:
+        typer.echo(settings_toml(settings))
+        return 0
+    if floor is None:
+        raise InputError("no floor given; name a file, such as: stopgo plan floor.dxf -o plan")
+    reports = plan_files(floor, out, settings, all_parts=all_parts)
+    _print(reports, as_json=as_json)
+    return 1 if strict and any(report.unreached for report in reports[:1]) else 0
+
+
+NOT_SETTINGS = ("floor", "out", "parameters", "all_parts", "strict", "print_config", "as_json")
+
+
+def _print(reports: list[PlanReport], *, as_json: bool) -> None:
+    if not as_json:
+        typer.echo("\n".join(report.as_text() for report in reports))
+        return
+    told = reports[0].as_json()
+    if len(reports) > 1:
+        told["parts"] = [report.as_json() for report in reports[1:]]
+    typer.echo(json.dumps(told, ensure_ascii=False))
+
+
+def plan_files(floor: Path, out: Path, settings: Settings, *, all_parts: bool = False) -> list[PlanReport]:
+    """Plan a floor's file into a folder; one report per part, the main part first."""
+    from planner import parts_to_plan
+    from planner.floors import read_floor
+    from planner.navigable import navigable
+
+    watch = Stopwatch()
+    read = read_floor(floor, d_dis=settings.d_dis)
+    watch.lap("read")
+    folder = _folder(out)
+    if not all_parts:
+        return [_plan_part(read, folder, settings, watch)]
+    parts = parts_to_plan(navigable(read, settings))
+    return [
+        _plan_part(read, folder, settings, Stopwatch(watch), found=found, number=number)
+        for number, found in enumerate(parts)
+    ]
+
+
+def _folder(out: Path) -> Path:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{out}: cannot be made a folder ({error.strerror}); choose another with -o"
+        ) from None
+    return out
+
+
+def _plan_part(
+    floor: FloorPlan,
+    folder: Path,
+    settings: Settings,
+    watch: Stopwatch,
+    *,
+    found: Candidates | None = None,
+    number: int = 0,
+) -> PlanReport:
+    """Plan one part; its files appear when all of it is done, mission.json last."""
+    from mission.files.plan_svg import plan_svg
+
+    from mission import __version__
+    from mission.document import mission_id
+    from mission.files.coverage_json import coverage_json
+    from mission.files.mission_json import encode
+    from mission.planning import Route
+    from mission.schedule import schedule
+    from planner import plan, plan_part
+    from planner.report import PlanReport
+    from recordings.plan import PlanRecording
+
+    files = _names(folder, number)
+    nouns: dict[type, Any] = {}
+    with PlanRecording(
+        files["recording"], recording_id=mission_id(floor.digest, settings, __version__, number)
+    ) as recording:
+        observe = _observer(recording.observe, nouns, watch)
+        if found is None:
+            made = plan(floor, settings, observe=observe)
+        else:
+            for noun in (floor, found.space):
+                observe(noun)
+            made = plan_part(found, observe=observe, number=number)
+        mission = _revised(made, files["mission"])
+        recording.observe(mission)
+        recording.observe(schedule(mission))
+    watch.lap("recording")
+    route = nouns[Route]
+    _write(files["coverage"], coverage_json(route, mission))
+    _write(files["picture"], plan_svg(route, mission, date=datetime.date.today().isoformat()))
+    _write(files["mission"], encode(mission))
+    watch.lap("files")
+    return PlanReport(route=route, mission=mission, files=files, times_s=watch.times())
+
+
+def _names(folder: Path, number: int) -> dict[str, Path]:
+    suffix = "" if number == 0 else f"-{number + 1}"
+    names = {
+        "mission": "mission.json",
+        "recording": "plan.rrd",
+        "picture": "plan.svg",
+        "coverage": "coverage.json",
+    }
+    paths = {key: folder / name for key, name in names.items()}
+    return {key: path.with_name(f"{path.stem}{suffix}{path.suffix}") for key, path in paths.items()}
+
+
+def _write(path: Path, data: bytes) -> None:
+    from mission.files.atomic import write_atomic
+
+    write_atomic(path, data)
+
+
+def _revised(mission: Mission, path: Path) -> Mission:
+    """The mission with the revision that replaces what is at `path`."""
+    from mission.document import sealed
+    from mission.files.mission_json import next_revision
+
+    return sealed(msgspec.structs.replace(mission, revision=next_revision(path, mission)))
+
+
+def _observer(
+    record: Callable[[Any], None], nouns: dict[type, Any], watch: Stopwatch
+) -> Callable[[Any], None]:
+    """Hand every noun but the mission to the recording, which takes the mission with its revision."""
+    from mission.document import Mission
+
+    def observe(noun: Any) -> None:
+        nouns[type(noun)] = noun
+        if not isinstance(noun, Mission):
+            record(noun)
+        watch.lap(STAGES.get(type(noun).__name__, "other"))
+
+    return observe
+
+
+STAGES = {
+    "FloorPlan": "read",
+    "NavigableSpace": "navigable",
+    "Candidates": "candidates",
+    "Visibility": "visibility",
+    "Selection": "selection",
+    "Route": "route",
+    "Mission": "route",
+}
+"""The stage that ends with each noun."""
+
+
+class Stopwatch:
+    """Seconds per stage; tells on a terminal's stderr which stage has ended."""
+
+    def __init__(self, other: Stopwatch | None = None) -> None:
+        self._laps: dict[str, float] = dict(other._laps) if other is not None else {}
+        self._begin = self._last = time.perf_counter()
+
+    def lap(self, stage: str) -> None:
+        """Count the time since the last lap to a stage."""
+        now = time.perf_counter()
+        self._laps[stage] = self._laps.get(stage, 0.0) + now - self._last
+        self._last = now
+        if sys.stderr.isatty():
+            typer.echo(f"\r\033[K{stage} done, {now - self._begin:.1f} s", err=True, nl=stage == "files")
+
+    def times(self) -> dict[str, float]:
+        """Seconds per stage and in all."""
+        return {**self._laps, "total": time.perf_counter() - self._begin}

@@ -87,9 +87,12 @@ def _check_end(selection: Selection) -> None:
 
 
 def _stop_at_door(selection: Selection) -> tuple[int | None, str]:
-    """The stop nearest the widest exterior door of the floor, if there is one."""
-    space = selection.visibility.candidates.space
+    """The stop nearest the widest exterior door of the planned rooms, if there is one."""
+    candidates = selection.visibility.candidates
+    space = candidates.space
     doors = [item for item in space.openings if item.why.startswith("exterior")]
+    entered = {space.rooms[k].room for k in candidates.room[candidates.kept]} - {None}
+    doors = [item for item in doors if not space.floor.rooms or entered & set(item.rooms)]
     if not doors:
         return None, "the tour's best end"
     widest = max(doors, key=lambda item: (round(item.clear_width, 6), item.opening.id))
