@@ -45,14 +45,18 @@ def stop(name: str, *approach: tuple[float, float], heading: float = 0.0, units:
     )  # fmt: skip
 
 
-def mission_of(*stops: Stop, back: tuple[tuple[float, float], ...] | None = None) -> Mission:
-    """A mission over `stops` from (0, 0), facing +x: 1 m/s, 1 m/s², 90° a second."""
+def mission_of(
+    *stops: Stop,
+    back: tuple[tuple[float, float], ...] | None = None,
+    begin: tuple[float, float] = (0.0, 0.0),
+) -> Mission:
+    """A mission over `stops` from `begin`, facing +x: 1 m/s, 1 m/s², 90° a second."""
     return sealed(Mission(
         id="0123456789abcdef0123456789abcdef", revision=1, name="room", digest="",
         frame=Frame(name="room"), georeference=SiteOrigin(lat=51.5, lon=7.5, alt=100.0, heading_deg=0.0),
         robot=RobotSpec(radius=0.35, speed=1.0, turn_rate=math.pi / 2, acceleration=1.0),
         scanner=ScannerSpec(profile="default", range=5.0),
-        start=Start(x=0.0, y=0.0, heading=0.0, reason="given"),
+        start=Start(x=begin[0], y=begin[1], heading=0.0, reason="given"),
         stops=stops, return_=back,
         policy=Policy(link_loss="continue", link_loss_after_s=30.0, battery_min=0.15),
         origin=Origin(floor="room.dxf", floor_digest="0" * 64, parameters=Settings(), stopgo="0.1.0"),
@@ -177,4 +181,4 @@ def room_mission() -> Mission:
     route = room_route()
     approaches = [tuple((float(x), float(y)) for x, y in leg) for leg in route.approaches]
     stops = [stop(f"S{number}", *leg) for number, leg in enumerate(approaches, 1)]
-    return mission_of(*stops, back=((6.8, 2.0), (1.2, 1.0)))
+    return mission_of(*stops, back=((6.8, 2.0), (1.2, 1.0)), begin=(1.2, 1.0))
