@@ -16,7 +16,6 @@ from mission.errors import InputError
 if TYPE_CHECKING:
     from bridge.protocol import Answer, Verb
     from bridge.station import Station
-    from mission.document import Mission
     from mission.events import Pose, StateReport
 
 RobotName = Annotated[str, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
@@ -92,7 +91,9 @@ def push(
 
     Example: stopgo push out/mission.json --robot r1 --connect tcp/127.0.0.1:7447
     """
-    document = read_mission(mission)
+    from mission.files.mission_json import read
+
+    document = read(mission)
     with (
         reached(robot, connect, site=site, who=who, timeout=timeout, insecure=insecure) as station,
         Bar("pushing") as bar,
@@ -253,23 +254,6 @@ def state_line(report: StateReport) -> str:
         f"{report.robot}: {report.state}{stop}; {mission}; {len(report.done)} done{skipped};"
         f" battery {report.battery:.0%}"
     )
-
-
-def read_mission(path: Path) -> Mission:
-    """The mission in a file, read strictly."""
-    import msgspec
-
-    from mission.document import Mission, digest_of
-
-    try:
-        mission = msgspec.json.decode(path.read_bytes(), type=Mission)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except msgspec.DecodeError as error:
-        raise InputError(f"{path}: not a mission: {error}") from None
-    if digest_of(mission) != mission.digest:
-        raise InputError(f"{path}: digest {mission.digest[:12]} is not that of its content; plan it again")
-    return mission
 
 
 def read_pose(text: str) -> Pose:

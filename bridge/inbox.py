@@ -26,7 +26,9 @@ from bridge.protocol import (
     Rejected,
     decode,
 )
-from mission.document import Mission, digest_of
+from mission.document import Mission
+from mission.errors import InputError
+from mission.files.mission_json import parse
 
 ON_LEG_M = 0.01
 """How far the end of an approach may lie from its stop."""
@@ -133,15 +135,13 @@ class Inbox:
 
     def _read(self, document: bytes, manifest: Manifest) -> Mission | Rejected:
         try:
-            mission = msgspec.json.decode(document, type=Mission)
-        except msgspec.DecodeError as error:
-            return _no("malformed", f"mission document: {error}")
+            mission = parse(document, "the document")
+        except InputError as error:
+            return _no("malformed", str(error))
         if (mission.id, mission.revision, mission.digest) != (
             manifest.mission_id, manifest.revision, manifest.digest,
         ):  # fmt: skip
             return _no("digest", "the document's id, revision or digest is not the manifest's")
-        if digest_of(mission) != mission.digest:
-            return _no("digest", "the document does not have the digest it claims")
         wrong = tuple(what_is_wrong(mission, self._profiles))
         return Rejected(reason="infeasible", messages=wrong) if wrong else mission
 

@@ -39,9 +39,10 @@ from bridge.protocol import (
     Verb,
     encode,
 )
-from mission.document import Mission, digest_of
+from mission.document import Mission
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from mission.events import AnyEvent, StateReport
+from mission.files.mission_json import parse
 
 TRY_S = 1.0
 """How long one try waits for its answer."""
@@ -166,12 +167,7 @@ class Station:
             parts.append(part.data)
             if len(parts) * CHUNK_BYTES >= part.manifest.size:
                 break
-        mission = msgspec.json.decode(b"".join(parts), type=Mission)
-        if digest_of(mission) != mission.digest:
-            raise AnswerIsNo(
-                f"mission {mission_id} on {self.keys.robot} does not have its digest; push it again"
-            )
-        return mission
+        return parse(b"".join(parts), f"mission {mission_id} on {self.keys.robot}")
 
     def command(self, verb: Verb, **details: Any) -> Answer:
         """Give an order, once, and return the robot's answer.

@@ -30,6 +30,8 @@ def watch_run(station: Station, record: Any, *, say: Callable[[str], None]) -> S
     state: StateReport | None = None
     for report in station.reports():
         if isinstance(report, StateReport):
+            if state is None and report.run_id is None:
+                say(f"{report.robot} is {report.state}; waiting for a run")
             if recording and report.run_id and (state is None or state.run_id != report.run_id):
                 recording.mission(station.mission(report.mission_id or "", report.revision or 0))
             state = report

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ipaddress
 import json
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -65,8 +66,7 @@ def _opened(settings: dict[str, Any], endpoint: str) -> Iterator[ZenohLink]:
     try:
         session = zenoh.open(config)
     except zenoh.ZError as error:
-        reason = str(error).splitlines()[0]
-        raise InputError(f"{endpoint}: cannot be opened ({reason}); is the address free and yours?") from None
+        raise InputError(f"{endpoint}: cannot be opened ({_short(error)}); is the address free?") from None
     with session:
         link = ZenohLink(session)
         try:
@@ -189,3 +189,9 @@ def is_loopback(host: str) -> bool:
 def _parameters(parameters: zenoh.Parameters) -> dict[str, str]:
     pairs = (pair.partition("=") for pair in str(parameters).split(";") if pair)
     return {name: value for name, _, value in pairs}
+
+
+def _short(error: zenoh.ZError) -> str:
+    """The part of zenoh's message that a person can use: the operating system's, if there is one."""
+    found = re.search(r"[A-Z][A-Za-z ]+ \(os error \d+\)", str(error))
+    return found.group() if found else str(error).splitlines()[0][:200]
