@@ -66,15 +66,18 @@ class Canvas:
         archetype: Any,
         *,
         step: int | None = None,
+        candidate: int | None = None,
         mission_s: float | None = None,
         robot_ns: int | None = None,
     ) -> None:
         """Draw at the given times, of which there must be one: Rerun makes rows without a time static."""
-        if step is None and mission_s is None and robot_ns is None:
+        if step is candidate is mission_s is robot_ns is None:
             raise ValueError(f"{entity}: no time given")
         self.stream.reset_time()
         if step is not None:
             self.stream.set_time(entities.STEP, sequence=step)
+        if candidate is not None:
+            self.stream.set_time(entities.CANDIDATE, sequence=candidate)
         if mission_s is not None:
             self.stream.set_time(entities.MISSION_TIME, duration=mission_s)
         if robot_ns is not None:

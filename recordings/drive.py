@@ -1,15 +1,18 @@
-"""When the robot is planned to be where: a mission and its schedule as poses over mission time."""
+"""Where the robot is planned to be when: a mission as poses over mission time."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from mission.document import Mission
-from mission.geometry import FloatArray, polyline_length
+from mission.document import Mission, Point
+from mission.geometry import FloatArray
+from mission.schedule import straight_time, turn_time
 
-STEP_M = 0.5
+STEP_M = 0.25
 """Greatest distance between two poses of the planned drive."""
 
 
@@ -19,47 +22,59 @@ class Drive:
 
     seconds: FloatArray
     poses: FloatArray
+    leaving_s: FloatArray
+    """When each stop's scan is done (k,)."""
 
 
-def planned_drive(mission: Mission, arrival_s: FloatArray) -> Drive:
-    """The planned drive through all stops; `arrival_s` as `arrivals` or the schedule gives it."""
-    rows = [(0.0, mission.start.x, mission.start.y, mission.start.heading)]
-    leaving = 0.0
-    for stop, arrival in zip(mission.stops, arrival_s, strict=True):
-        rows += _along(np.array(stop.approach), leaving, float(arrival))
-        rows.append((float(arrival), stop.x, stop.y, stop.heading))
-        leaving = float(arrival) + stop.settle_s + stop.scan.duration_s
-        rows.append((leaving, stop.x, stop.y, stop.heading))
-    if mission.return_:
-        way = np.array(mission.return_)
-        rows += _along(way, leaving, leaving + polyline_length(way) / mission.robot.speed)
-    table = np.array(rows)
-    return Drive(table[:, 0], table[:, 1:])
+def planned_drive(mission: Mission) -> Drive:
+    """The drive that `mission.schedule.schedule` times: turn in place, straight on, settle, scan."""
+    walk = _Walk(mission)
+    leaving = []
+    for stop in mission.stops:
+        walk.along(stop.approach)
+        walk.turn_to(stop.heading)
+        walk.stay(stop.settle_s + stop.scan.duration_s)
+        leaving.append(walk.seconds)
+    walk.along(mission.return_ or ())
+    table = np.array(walk.rows)
+    return Drive(table[:, 0], table[:, 1:], np.array(leaving))
 
 
-def arrivals(mission: Mission, scheduled: FloatArray | None) -> FloatArray:
-    """Arrival at each stop in seconds: as scheduled, else at full speed without turns."""
-    if scheduled is not None and len(scheduled) == len(mission.stops):
-        return scheduled
-    drive = np.array(
-        [polyline_length(np.array(stop.approach)) / mission.robot.speed for stop in mission.stops]
-    )
-    stay = np.array([stop.settle_s + stop.scan.duration_s for stop in mission.stops])
-    return np.cumsum(drive + stay) - stay
+class _Walk:
+    """A robot going through a plan, writing down a pose whenever it has moved."""
 
+    def __init__(self, mission: Mission) -> None:
+        self.robot = mission.robot
+        self.seconds = 0.0
+        self.x, self.y, self.heading = mission.start.x, mission.start.y, mission.start.heading
+        self.rows: list[tuple[float, float, float, float]] = []
+        self._note()
 
-def _along(way: FloatArray, start: float, end: float) -> list[tuple[float, float, float, float]]:
-    """Poses along a polyline (n, 2), evenly from `start` to `end`, facing along it."""
-    vectors = np.diff(way, axis=0)
-    lengths = np.hypot(vectors[:, 0], vectors[:, 1])
-    total = lengths.sum()
-    if total == 0:
-        return []
-    rows, done = [], 0.0
-    for a, vector, length in zip(way[:-1], vectors, lengths, strict=True):
-        heading = float(np.arctan2(vector[1], vector[0]))
-        for t in np.linspace(0.0, 1.0, 1 + max(1, int(np.ceil(length / STEP_M)))):
-            seconds = start + (end - start) * (done + t * length) / total
-            rows.append((float(seconds), *(a + t * vector).tolist(), heading))
-        done += length
-    return rows
+    def along(self, leg: tuple[Point, ...]) -> None:
+        for a, b in pairwise(leg):
+            if a != b:
+                self.turn_to(math.atan2(b[1] - a[1], b[0] - a[0]))
+                self._straight(a, b)
+
+    def turn_to(self, heading: float) -> None:
+        self.seconds += turn_time(heading - self.heading, turn_rate=self.robot.turn_rate)
+        self.heading = heading
+        self._note()
+
+    def stay(self, seconds: float) -> None:
+        self.seconds += seconds
+        self._note()
+
+    def _straight(self, a: Point, b: Point) -> None:
+        """Evenly from a to b; only the time at b is exact, as the robot speeds up and slows down."""
+        begin, length = self.seconds, math.dist(a, b)
+        takes = straight_time(length, speed=self.robot.speed, acceleration=self.robot.acceleration)
+        steps = max(1, math.ceil(length / STEP_M))
+        for step in range(1, steps + 1):
+            t = step / steps
+            self.seconds = begin + t * takes
+            self.x, self.y = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
+            self._note()
+
+    def _note(self) -> None:
+        self.rows.append((self.seconds, self.x, self.y, self.heading))

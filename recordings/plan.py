@@ -15,10 +15,10 @@ from mission.document import Mission
 from mission.errors import AnswerIsNo, StopgoError
 from mission.floor import FloorPlan
 from mission.geometry import bounds
-from mission.planning import Candidates, NavigableSpace, Route, Schedule, Selection, Visibility
+from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
 from recordings import entities, stages
 from recordings.canvas import Canvas, Origin, Sheet, local_origin, mission_origin, open_canvas
-from recordings.drive import arrivals, planned_drive
+from recordings.drive import planned_drive
 from recordings.layout import Bounds
 from recordings.mission_drawing import draw_drive, draw_mission, mission_extent
 from recordings.read import check
@@ -113,12 +113,11 @@ def _draw_planned_drive(canvas: Canvas, nouns: Nouns) -> None:
     if Mission not in nouns or not nouns[Mission].stops:
         return
     mission = nouns[Mission]
-    schedule = nouns.get(Schedule)
-    arrival_s = arrivals(mission, None if schedule is None else schedule.arrival_s)
-    draw_drive(canvas, planned_drive(mission, arrival_s), radius=mission.robot.radius)
+    drive = planned_drive(mission)
+    draw_drive(canvas, drive, radius=mission.robot.radius)
     if Selection in nouns:
         visible = int(nouns[Selection].visibility.visible.sum())
-        stages.plot_planned_coverage(canvas, mission, arrival_s, visible=visible)
+        stages.plot_planned_coverage(canvas, mission, drive, visible=visible)
 
 
 def _tell(canvas: Canvas, nouns: Nouns) -> None:

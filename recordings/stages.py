@@ -22,6 +22,7 @@ from mission.planning import (
 )
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
+from recordings.drive import Drive
 
 # What lies above what; Rerun's own defaults are 20 for lines and 30 for points.
 ORDER = {
@@ -104,8 +105,17 @@ def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
     eye = f"{entities.VISIBILITY}/candidate"
     canvas.columns(eye, index, rr.Points2D.columns(positions=canvas.local(eyes)))
     canvas.show(eye, rr.Points2D.from_fields(colors=palette.EYE, radii=0.15, draw_order=ORDER["stop"]))
+    _plot_sight(canvas, visibility, index)
     visible = int(visibility.visible.sum())
     canvas.say(f"visibility ({visibility.method}): {visible} of {visibility.targets.total} units seen by any")
+
+
+def _plot_sight(canvas: Canvas, visibility: Visibility, index: rr.TimeColumn) -> None:
+    visible = max(1, int(visibility.visible.sum()))
+    seen = [len(visibility.seen_by(row)) / visible * 100 for row in range(visibility.rows)]
+    sight = f"{entities.METRIC_COVERAGE}/candidate"
+    canvas.columns(sight, index, rr.Scalars.columns(scalars=seen))
+    canvas.show(sight, rr.SeriesLines(colors=palette.EYE, names="seen by the candidate", widths=1))
 
 
 def draw_selection(canvas: Canvas, selection: Selection) -> None:
@@ -124,7 +134,8 @@ def draw_selection(canvas: Canvas, selection: Selection) -> None:
     final = np.where(
         classes[-len(lines) :] == palette.NEW.number, palette.SEEN.number, classes[-len(lines) :]
     )
-    canvas.at(targets, rr.LineStrips2D.from_fields(class_ids=final), mission_s=0.0)
+    # The other timelines show what the selection came to.
+    canvas.at(targets, rr.LineStrips2D.from_fields(class_ids=final), mission_s=0.0, candidate=0)
     _draw_chosen(canvas, selection, index)
     canvas.show(
         entities.COVERAGE,
@@ -135,11 +146,10 @@ def draw_selection(canvas: Canvas, selection: Selection) -> None:
     _plot_coverage(canvas, selection, index)
 
 
-def plot_planned_coverage(canvas: Canvas, mission: Mission, arrival_s: FloatArray, *, visible: int) -> None:
+def plot_planned_coverage(canvas: Canvas, mission: Mission, drive: Drive, *, visible: int) -> None:
     """Coverage over mission time, if every scan is done as planned."""
-    stay = np.array([stop.settle_s + stop.scan.duration_s for stop in mission.stops])
     gained = np.cumsum([stop.sees.new_units for stop in mission.stops]) * (100.0 / max(visible, 1))
-    seconds = np.concatenate([[0.0], arrival_s + stay])
+    seconds = np.concatenate([[0.0], drive.leaving_s])
     planned = f"{entities.METRIC_COVERAGE}/planned"
     index = rr.TimeColumn(entities.MISSION_TIME, duration=seconds)
     canvas.columns(planned, index, rr.Scalars.columns(scalars=np.concatenate([[0.0], gained])))
@@ -188,7 +198,7 @@ def _draw_chosen(canvas: Canvas, selection: Selection, index: rr.TimeColumn) -> 
     canvas.columns(stops, index, columns.partition(counts))
     canvas.show(stops, rr.Points2D.from_fields(colors=palette.STOP, radii=0.16, draw_order=ORDER["stop"]))
     final = rr.Points2D.from_fields(positions=xy, labels=[str(number + 1) for number in range(steps)])
-    canvas.at(stops, final, mission_s=0.0)
+    canvas.at(stops, final, mission_s=0.0, candidate=0)
 
 
 def _plot_coverage(canvas: Canvas, selection: Selection, index: rr.TimeColumn) -> None:

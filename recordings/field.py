@@ -1,0 +1,120 @@
+"""A run as a recording: what the robot tells while it drives a mission, beside what was planned."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from mission.document import Mission
+from mission.events import AnyEvent, PoseReport, StateReport
+from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
+from recordings.mission_drawing import draw_mission, mission_extent
+from recordings.run_drawing import RunDrawing
+
+Report = StateReport | PoseReport | AnyEvent
+
+
+class FieldRecording:
+    """Draws the runs of one mission as they are told; leaving the block, however, closes the file.
+
+    A field run cannot be repeated, so what was told is kept: it is written to `NAME.partial.rrd`, which
+    `rerun` opens too and which remains when the writer is killed, and gets its name when it is closed.
+    Reports wait for the mission, because it gives the recording id and the local origin; reports of no
+    run are left out, as is everything when no mission came.
+    """
+
+    def __init__(self, path: Path, mission: Mission | None = None) -> None:
+        self.path = path
+        self._waiting: list[Report] = []
+        self._runs: dict[str, RunDrawing] = {}
+        self._mission: Mission | None = None
+        self._canvas: Canvas | None = None
+        self._partial: Path | None = None
+        self._open = ExitStack()
+        if mission is not None:
+            self.mission(mission)
+
+    def __enter__(self) -> FieldRecording:
+        return self
+
+    def mission(self, mission: Mission) -> None:
+        """Take the mission that is driven; of a second one of the same id the stops are drawn anew."""
+        self._mission = mission
+        if self._canvas is None:
+            self._begin(mission)
+        draw_mission(self.canvas, mission)
+        waiting, self._waiting = self._waiting, []
+        for report in waiting:
+            self._draw(report)
+
+    def state(self, report: StateReport) -> None:
+        """Take a snapshot of the robot's state."""
+        self._draw(report)
+
+    def pose(self, report: PoseReport) -> None:
+        """Take a pose of the robot."""
+        self._draw(report)
+
+    def event(self, event: AnyEvent) -> None:
+        """Take a line of the robot's journal; what was told before it is on disk then."""
+        self._draw(event)
+        if self._canvas is not None:
+            self._canvas.stream.flush()
+
+    @property
+    def canvas(self) -> Canvas:
+        assert self._canvas is not None
+        return self._canvas
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._open.close()
+        if self._partial is not None:
+            os.replace(self._partial, self.path)
+
+    def _begin(self, mission: Mission) -> None:
+        self._partial = _free_name(self.path)
+        sheet = Sheet(
+            recording_id=mission.id,
+            name=mission.name,
+            origin=mission_origin(mission),
+            extent=mission_extent(mission),
+        )
+        self._canvas = self._open.enter_context(open_canvas(self._partial, sheet))
+
+    def _draw(self, report: Report) -> None:
+        if self._mission is None:
+            self._waiting.append(report)
+        elif report.run_id is not None:
+            run = self._runs.get(report.run_id) or self._start(report.run_id)
+            _DRAW[type(report)](run, report)
+
+    def _start(self, run_id: str) -> RunDrawing:
+        assert self._mission is not None
+        self._runs[run_id] = RunDrawing(self.canvas, run_id, self._mission)
+        return self._runs[run_id]
+
+
+class _Draw(dict[type, Callable[[RunDrawing, Any], None]]):
+    """How each report is drawn; every report that is neither state nor pose is an event."""
+
+    def __missing__(self, kind: type) -> Callable[[RunDrawing, Any], None]:
+        return RunDrawing.event
+
+
+_DRAW = _Draw({StateReport: RunDrawing.state, PoseReport: RunDrawing.pose})
+
+
+def _free_name(path: Path) -> Path:
+    """A name beside `path` that is not taken: a partial file of a run before is not overwritten."""
+    partial = path.with_name(f"{path.stem}.partial.rrd")
+    number = 2
+    while partial.exists():
+        partial = path.with_name(f"{path.stem}.partial-{number}.rrd")
+        number += 1
+    return partial

@@ -1,0 +1,114 @@
+"""A run as a robot would tell it: every report of a mission driven as planned, 3 cm to the left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from mission.document import Mission
+from mission.events import (
+    AnyEvent,
+    Arrived,
+    Finished,
+    Pose,
+    PoseReport,
+    Scanned,
+    Settled,
+    Started,
+    State,
+    StateReport,
+    StopState,
+)
+from recordings.drive import planned_drive
+
+BEGAN_NS = 1_795_000_000_000_000_000
+RUN = "run-1"
+OFFSET = 0.03
+"""Metres to the left of the planned pose."""
+
+
+def reports(mission: Mission, *, run: str = RUN) -> Iterator[StateReport | PoseReport | AnyEvent]:
+    """Everything the robot tells, in order; poses are those of the planned drive."""
+    teller = _Teller(mission, run)
+    drive = planned_drive(mission)
+    poses = list(zip(drive.seconds, drive.poses, strict=True))
+    yield teller.event(Started, 0.0, commander="surveyor")
+    yield teller.state(0.0, "RUNNING")
+    for number, stop in enumerate(mission.stops):
+        leaving = float(drive.leaving_s[number])
+        arrival = leaving - stop.settle_s - stop.scan.duration_s
+        begin = 0.0 if number == 0 else float(drive.leaving_s[number - 1])
+        yield teller.state(begin, "RUNNING", stop.id, "NAVIGATING")
+        for seconds, (x, y, heading) in poses:
+            if begin <= seconds <= arrival:
+                yield teller.pose(seconds, x, y, heading)
+        at = teller.pose(arrival, stop.x, stop.y, stop.heading).pose
+        yield teller.event(Arrived, arrival, stop=stop.id, pose=at, deviation_m=OFFSET)
+        yield teller.state(arrival, "RUNNING", stop.id, "SETTLING")
+        yield teller.event(Settled, arrival + stop.settle_s, stop=stop.id, pose=at)
+        yield teller.state(arrival + stop.settle_s, "RUNNING", stop.id, "SCANNING")
+        scan = {"file": f"{stop.id}.e57", "size": 10, "sha256": "0" * 64, "points": 1000}
+        yield teller.event(Scanned, leaving, stop=stop.id, pose=at, **scan)
+        teller.done.append(stop.id)
+    yield teller.event(Finished, float(drive.seconds[-1]))
+    yield teller.state(float(drive.seconds[-1]), "FINISHED")
+
+
+class _Teller:
+    def __init__(self, mission: Mission, run: str) -> None:
+        self.mission, self.run = mission, run
+        self.number = self.seq = 0
+        self.done: list[str] = []
+
+    def event(self, kind, seconds: float, **fields) -> AnyEvent:
+        self.number += 1
+        return kind(
+            number=self.number,
+            robot="r1",
+            boot_id="b1",
+            run_id=self.run,
+            mission_id=self.mission.id,
+            revision=self.mission.revision,
+            robot_ns=_ns(seconds),
+            mission_time_s=seconds,
+            **fields,
+        )
+
+    def state(
+        self, seconds: float, state: State, stop: str | None = None, stop_state: StopState | None = None
+    ) -> StateReport:
+        self.seq += 1
+        return StateReport(
+            robot="r1",
+            boot_id="b1",
+            seq=self.seq,
+            robot_ns=_ns(seconds),
+            state=state,
+            run_id=self.run,
+            mission_id=self.mission.id,
+            revision=self.mission.revision,
+            stop=stop,
+            stop_state=stop_state,
+            done=tuple(self.done),
+            skipped=(),
+            battery=max(0.2, 1.0 - seconds / 1000),
+            last_event=self.number,
+        )
+
+    def pose(self, seconds: float, x: float, y: float, heading: float) -> PoseReport:
+        self.seq += 1
+        left = (-OFFSET * math.sin(heading), OFFSET * math.cos(heading))
+        return PoseReport(
+            robot="r1",
+            boot_id="b1",
+            seq=self.seq,
+            robot_ns=_ns(seconds),
+            run_id=self.run,
+            mission_time_s=seconds,
+            pose=Pose(x=x + left[0], y=y + left[1], heading=heading),
+            speed=0.5,
+        )
+
+
+def _ns(seconds: float) -> int:
+    return BEGAN_NS + round(seconds * 1e9)
