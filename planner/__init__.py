@@ -54,12 +54,16 @@ def plan_part(found: Candidates, *, observe: Observe, number: int = 0) -> Missio
 
 
 def parts_to_plan(space: NavigableSpace) -> list[Candidates]:
-    """Candidates of every part that has any: the part of `plan` first, then the others by area."""
+    """Candidates of every part that has any: the part of `plan` first, then the others by area.
+
+    Parts that hold no room are left out where the floor has rooms: they lie behind exterior doors.
+    """
     from planner.candidates import candidates
 
     first = candidates(space)
-    others = sorted({int(part) for part in first.part if part >= 0} - {first.chosen_part})
-    return [first, *(candidates(space, part=part) for part in others)]
+    in_room = [space.rooms[k].room is not None or not space.floor.rooms for k in first.room]
+    found = {int(part) for part, inside in zip(first.part, in_room, strict=True) if part >= 0 and inside}
+    return [first, *(candidates(space, part=part) for part in sorted(found - {first.chosen_part}))]
 
 
 __all__ = ["Observe", "parts_to_plan", "plan", "plan_part"]

@@ -1,4 +1,4 @@
-"""`stopgo plan`: a floor's file in, a mission with its picture, coverage and recording out."""
+"""`stopgo plan`: a floor's file in, a mission with its picture, coverage and recording out; `stopgo demo`."""
 
 from __future__ import annotations
 
@@ -17,10 +17,14 @@ from mission.errors import InputError
 from mission.settings import Settings, read_settings, settings_toml
 
 if TYPE_CHECKING:
+    from bridge.station import Station
+    from mission.comparison import Comparison
     from mission.document import Mission
+    from mission.events import AnyEvent
     from mission.floor import FloorPlan
     from mission.planning import Candidates
     from planner.report import PlanReport
+    from recordings.field import FieldRecording
 
 EXAMPLE = "Example: stopgo plan floor.dxf -o plan --range 8 --start 2.5,3.0,90"
 
@@ -28,6 +32,7 @@ EXAMPLE = "Example: stopgo plan floor.dxf -o plan --range 8 --start 2.5,3.0,90"
 def add_commands(app: typer.Typer) -> None:
     """Add this folder's verbs to the front door."""
     app.command(name="plan", epilog=EXAMPLE)(plan_command)
+    app.command(name="demo", epilog="Example: stopgo demo -o recordings/demo")(demo_command)
 
 
 def numbers(text: str) -> tuple[float, ...]:
@@ -143,12 +148,11 @@ def _plan_part(
     number: int = 0,
 ) -> PlanReport:
     """Plan one part; its files appear when all of it is done, mission.json last."""
-    from mission.files.plan_svg import plan_svg
-
     from mission import __version__
     from mission.document import mission_id
     from mission.files.coverage_json import coverage_json
     from mission.files.mission_json import encode
+    from mission.files.plan_svg import plan_svg
     from mission.planning import Route
     from mission.schedule import schedule
     from planner import plan, plan_part
@@ -250,3 +254,75 @@ class Stopwatch:
     def times(self) -> dict[str, float]:
         """Seconds per stage and in all."""
         return {**self._laps, "total": time.perf_counter() - self._begin}
+
+
+def demo_command(
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")] = Path(
+        "recordings/demo"
+    ),
+    speed_up: Annotated[float, typer.Option(help="The simulated robot's time goes this much faster.")] = 60.0,
+) -> int:
+    """Plan a sample office, send the mission to a simulated robot in its own process, and follow its run."""
+    import tempfile
+    from importlib.resources import as_file, files
+
+    from bridge.spawn import robot_process
+    from bridge.station import connect
+    from recordings.compare import compare
+
+    with as_file(files("recordings") / "samples" / "office.dxf") as floor:
+        report = plan_files(floor, out, read_settings(None, {}))[0]
+    typer.echo(report.as_text())
+    with (
+        tempfile.TemporaryDirectory() as state,
+        robot_process("demo", Path(state), speed_up=speed_up) as endpoint,
+    ):
+        typer.echo(
+            f"\nrobot demo listens on {endpoint} in a process of its own, {speed_up:g} times faster than time"
+        )
+        with connect(endpoint, robot="demo") as station:
+            station.push(report.mission)
+            typer.echo(f"pushed mission {report.mission.id}, read back from the robot")
+            station.command("start")
+            events, ended = _follow(station, report.mission, out / "field.rrd")
+    return _say_demo(compare(report.mission, events), ended, out)
+
+
+def _follow(station: Station, mission: Mission, path: Path) -> tuple[list[AnyEvent], str]:
+    """Record the run to its end; its events, and the state it ended in."""
+    from bridge.watch import watch_run
+    from recordings.field import FieldRecording
+
+    with FieldRecording(path, mission) as recording:
+        tee = EventTee(recording)
+        last = watch_run(station, tee, say=lambda line: typer.echo(f"  {line}", err=True))
+    return tee.events, last.state
+
+
+class EventTee:
+    """Hands a run to a recording and keeps its events."""
+
+    def __init__(self, recording: FieldRecording) -> None:
+        self.events: list[AnyEvent] = []
+        self.mission, self.state, self.pose = recording.mission, recording.state, recording.pose
+        self._record = recording.event
+
+    def event(self, event: AnyEvent) -> None:
+        """Record an event and keep it."""
+        self.events.append(event)
+        self._record(event)
+
+
+def _say_demo(comparison: Comparison, ended: str, out: Path) -> int:
+    from recordings.compare import comparison_table
+
+    driven = "-" if comparison.driven_s is None else f"{comparison.driven_s:.0f} s"
+    away = comparison.greatest_deviation_m
+    typer.echo(f"\n{comparison_table(comparison)}\n")
+    typer.echo(
+        f"run {comparison.run_id} {ended}: {comparison.scanned} of {len(comparison.stops)} stops scanned, "
+        f"planned {comparison.planned_s:.0f} s, driven {driven}, "
+        f"greatest deviation {'-' if away is None else f'{1000 * away:.0f} mm'}"
+    )
+    typer.echo(f"look at it: rerun {out / 'plan.rrd'} {out / 'field.rrd'}")
+    return 0 if ended == "FINISHED" and comparison.scanned == len(comparison.stops) else 1

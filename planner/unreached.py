@@ -25,6 +25,8 @@ def unreached(candidates: Candidates) -> tuple[Unreached, ...]:
 def _why(candidates: Candidates, index: int, reasons: set[int]) -> str:
     settings = candidates.space.settings
     closed = _closed_openings(candidates, index)
+    if candidates.space.rooms[index].room is None and candidates.space.floor.rooms:
+        return "outside every room, and no inner opening leads there"
     if OTHER_PART in reasons:
         told = f"in another part of the floor ({closed})" if closed else "in another part of the floor"
         return f"{told}; --all-parts plans it too"
