@@ -71,14 +71,17 @@ class Agent:
         self._closing = threading.Event()
         self._news = threading.Event()
         self._threads: list[threading.Thread] = []
+        self._watchers: set[str] = set()
+        self._heard_ns = command_clock.now_ns()
 
     def serve(self) -> None:
         """Answer on every key."""
         keys, link = self._keys, self._link
         link.serve(keys.info, self._info)
         link.serve(keys.log, self._log)
-        link.serve(keys.mission("*", "**"), lambda request: encode(self._inbox.receive(request)))
+        link.serve(keys.mission("*", "**"), self._mission)
         link.serve(keys.command("*"), self._command)
+        link.watch_presence(keys.watcher("*"), self._watcher)
 
     def open(self) -> None:
         """Answer, begin to work and to tell, and announce the robot."""
@@ -101,7 +104,25 @@ class Agent:
         for thread in self._threads:
             thread.join()
 
+    def _watcher(self, key: str, alive: bool) -> None:
+        self._contact()
+        (self._watchers.add if alive else self._watchers.discard)(key)
+
+    def _contact(self) -> None:
+        self._heard_ns = self._command_clock.now_ns()
+
+    def _silent_s(self) -> float:
+        """How long no station has watched or asked."""
+        if self._watchers:
+            self._contact()
+        return (self._command_clock.now_ns() - self._heard_ns) / 1e9
+
+    def _mission(self, request: Request) -> bytes:
+        self._contact()
+        return encode(self._inbox.receive(request))
+
     def _info(self, request: Request) -> bytes:
+        self._contact()
         info = Info(
             protocol=VERSION,
             stopgo=__version__,
@@ -109,6 +130,7 @@ class Agent:
             boot_id=self._controller.boot_id,
             clock_ns=self._command_clock.now_ns(),
             state=self._controller.report(),
+            lease=self._controller.lease,
             chunk_bytes=CHUNK_BYTES,
             document_bytes=MAX_DOCUMENT_BYTES,
             profiles=self._profiles,
@@ -116,6 +138,7 @@ class Agent:
         return encode(info)
 
     def _command(self, request: Request) -> bytes:
+        self._contact()
         try:
             command = decode(request.payload, Command)
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
@@ -138,6 +161,7 @@ class Agent:
         while not self._closing.is_set():
             self._news.wait(STATE_EVERY_S)
             self._news.clear()
+            self._controller.hear_of_link(self._silent_s())
             for event in self._journal.events(since=told):
                 self._tell_event(encode(event))
                 told = event.number

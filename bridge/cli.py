@@ -33,6 +33,7 @@ Insecure = Annotated[
     bool, typer.Option("--insecure", help="Allow addresses beyond this machine without keys.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+TakeOver = Annotated[bool, typer.Option("--take-over", help="Command it though somebody else does.")]
 StopId = Annotated[str | None, typer.Option("--stop", metavar="ID", help="The stop that is meant.")]
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -83,6 +84,7 @@ def push(
     connect: Connect = DEFAULT_ENDPOINT,
     site: Site = None,
     who: As = None,
+    take_over: TakeOver = False,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
     json_: Json = False,
@@ -113,6 +115,7 @@ def start(
     connect: Connect = DEFAULT_ENDPOINT,
     site: Site = None,
     who: As = None,
+    take_over: TakeOver = False,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
     again: Annotated[bool, typer.Option("--again", help="Run a mission that was run before.")] = False,
@@ -126,7 +129,8 @@ def start(
     Example: stopgo start --robot r1 --connect tcp/127.0.0.1:7447
     """
     with reached(robot, connect, site=site, who=who, timeout=timeout, insecure=insecure) as station:
-        report_answer(station.command("start", again=again, from_here=from_here), robot, json_)
+        answer = station.command("start", again=again, from_here=from_here, take_over=take_over)
+    report_answer(answer, robot, json_)
 
 
 ABOUT: dict[Verb, str] = {
@@ -151,12 +155,14 @@ def order_of(verb: Verb) -> Callable[..., None]:
         connect: Connect = DEFAULT_ENDPOINT,
         site: Site = None,
         who: As = None,
+        take_over: TakeOver = False,
         timeout: Timeout = 5.0,
         insecure: Insecure = False,
         json_: Json = False,
     ) -> None:
         with reached(robot, connect, site=site, who=who, timeout=timeout, insecure=insecure) as station:
-            report_answer(station.command(verb, stop=stop), robot, json_)
+            answer = station.command(verb, stop=stop, take_over=take_over)
+        report_answer(answer, robot, json_)
 
     command.__doc__ = f"{ABOUT[verb]}\n\nExample: stopgo {verb} --robot r1 --connect {DEFAULT_ENDPOINT}"
     return command

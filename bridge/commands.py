@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from functools import partial
 
 from bridge import route
-from bridge.protocol import Command, Reason
-from bridge.run import Change, Run, changed, ended, heading_home, skipped, stop_of
+from bridge.lease import FREE_VERBS, Denied, claimed
+from bridge.protocol import LONGEST_VALID_S, Command, Lease, Reason
+from bridge.run import Change, Run, Telling, changed, ended, sent_home, skipped, stop_of
 from mission.document import Mission
-from mission.events import Paused, Pose, Resumed, Skipped, Started
+from mission.events import Paused, Pose, Resumed, Skipped, Started, TakenOver
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class Situation:
     command_ns: int
     """On the clock of commands."""
     new_run_id: str
+    lease: Lease | None
 
 
 @dataclass(frozen=True)
@@ -36,12 +38,46 @@ class Refused:
     message: str
 
 
-def decide(command: Command, situation: Situation) -> Change | Refused:
-    """The change a command makes; late, misdirected and impossible ones are refused."""
-    return _too_late(command, situation) or _misdirected(command, situation) or _verb(command, situation)
+@dataclass(frozen=True)
+class Decision:
+    """What an order leads to, and who commands the robot from then on."""
+
+    change: Change
+    lease: Lease | None
+
+
+def decide(command: Command, situation: Situation) -> Decision | Refused:
+    """What a command leads to; late, foreign, misdirected and impossible ones are refused."""
+    refused = _too_late(command, situation)
+    lease = situation.lease if command.verb in FREE_VERBS else _claim(command, situation)
+    if refused or isinstance(lease, Refused):
+        return refused or lease  # type: ignore[return-value]
+    change = _misdirected(command, situation) or _verb(command, situation)
+    if isinstance(change, Refused):
+        return change
+    return Decision(Change(change.run, (*handed_over(situation.lease, lease), *change.events)), lease)
+
+
+def _claim(command: Command, situation: Situation) -> Lease | Refused:
+    lease = claimed(
+        situation.lease, command.commander,
+        fence=command.fence, take_over=command.take_over, now_ns=situation.command_ns,
+    )  # fmt: skip
+    return Refused(lease.reason, lease.message) if isinstance(lease, Denied) else lease
+
+
+def handed_over(before: Lease | None, after: Lease | None) -> tuple[Telling, ...]:
+    """What is told when the robot changes hands."""
+    if before is None or after is None or before.commander == after.commander:
+        return ()
+    return (partial(TakenOver, commander=after.commander, before=before.commander),)
 
 
 def _too_late(command: Command, situation: Situation) -> Refused | None:
+    if not 0 < command.valid_for_s <= LONGEST_VALID_S:
+        return Refused(
+            "expired", f"valid for {command.valid_for_s:g} s; at most {LONGEST_VALID_S:g} s are taken"
+        )
     age = (situation.command_ns - command.issued_ns) / 1e9
     if not -command.valid_for_s <= age <= command.valid_for_s:
         return Refused(
@@ -174,10 +210,7 @@ def _home(command: Command, mission: Mission, situation: Situation) -> Change | 
     if off:
         return off
     reason = f"sent home by {command.commander}"
-    return Change(
-        heading_home(changed(situation.run, state="RUNNING"), mission, then="ABORTED", reason=reason),
-        (partial(Resumed, commander=command.commander),) if situation.run.state != "RUNNING" else (),
-    )
+    return sent_home(changed(situation.run, state="RUNNING"), mission, then="ABORTED", reason=reason)
 
 
 Verb = Callable[[Command, Mission, Situation], Change | Refused]

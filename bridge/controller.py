@@ -17,9 +17,10 @@ import msgspec
 from bridge import route
 from bridge import run as runs
 from bridge.clock import Clock
-from bridge.commands import Refused, Situation, decide
+from bridge.commands import Decision, Refused, Situation, decide, handed_over
 from bridge.journal import Journal
-from bridge.protocol import Answer, Command, Manifest, Rejected, encode
+from bridge.lease import Denied, claimed
+from bridge.protocol import Answer, Command, Commit, Lease, Rejected, encode
 from bridge.robots import Base, Scanner
 from bridge.run import Change, Run
 from mission.document import Mission, Stop
@@ -65,6 +66,7 @@ class Controller:
         self._interrupt = threading.Event()
         self._wake = threading.Event()
         self._closing = False
+        self._silent_s = 0.0
         self._seq = 0
         self._mission: Mission | None = None
         self._run = Run()
@@ -73,6 +75,11 @@ class Controller:
     @property
     def run(self) -> Run:
         return self._run
+
+    @property
+    def lease(self) -> Lease | None:
+        """Who commands the robot, or was the last to."""
+        return self._journal.fact("lease", Lease)
 
     def _recover(self) -> None:
         """Stand still, and wait where the journal says the run was."""
@@ -104,12 +111,17 @@ class Controller:
             decision = decide(command, self._situation())
             answer = self._answer(command, decision)
             with self._journal.transaction():
-                if isinstance(decision, Change):
-                    self._write(decision)
+                if isinstance(decision, Decision):
+                    self._write(decision.change)
+                    self._store_lease(decision.lease)
                 self._journal.store_answer(order, answer)
-            if isinstance(decision, Change):
-                self._adopt(decision.run, ordered=True)
+            if isinstance(decision, Decision):
+                self._adopt(decision.change.run, ordered=True)
             return answer
+
+    def _store_lease(self, lease: Lease | None) -> None:
+        if lease is not None:
+            self._journal.store_fact("lease", lease)
 
     def _situation(self) -> Situation:
         mission = self._mission
@@ -121,11 +133,12 @@ class Controller:
             now_ns=self._clock.now_ns(),
             command_ns=self._command_clock.now_ns(),
             new_run_id=uuid.uuid4().hex[:12],
+            lease=self.lease,
         )
 
-    def _answer(self, command: Command, decision: Change | Refused) -> Answer:
+    def _answer(self, command: Command, decision: Decision | Refused) -> Answer:
         refused = decision if isinstance(decision, Refused) else None
-        run = decision.run if isinstance(decision, Change) else self._run
+        run = decision.change.run if isinstance(decision, Decision) else self._run
         return Answer(
             cmd_id=command.cmd_id, verb=command.verb, outcome="refused" if refused else "ok",
             reason=refused.reason if refused else None, message=refused.message if refused else "",
@@ -136,9 +149,16 @@ class Controller:
         message = f"command id {command.cmd_id} was used for another order"
         return self._answer(command, Refused("id_reused", message))
 
-    def take(self, manifest: Manifest, document: bytes, mission: Mission) -> Rejected | None:
+    def take(self, commit: Commit, document: bytes, mission: Mission) -> Rejected | None:
         """Store a whole mission and make it the one to be run; not while another one runs."""
         with self._lock:
+            before = self.lease
+            lease = claimed(
+                before, commit.commander,
+                fence=commit.fence, take_over=commit.take_over, now_ns=self._command_clock.now_ns(),
+            )  # fmt: skip
+            if isinstance(lease, Denied):
+                return Rejected(reason=lease.reason, messages=(lease.message,))
             current = (self._run.mission_id, self._run.revision) == (mission.id, mission.revision)
             if not current and not self._run.over:
                 message = f"the robot is {self._run.state} with mission {self._run.mission_id}"
@@ -146,14 +166,33 @@ class Controller:
             run = self._run if current else runs.installed(self._run, mission)
             with self._journal.transaction():
                 if self._journal.mission(mission.id, mission.revision) is None:
-                    self._journal.store_mission(manifest, document)
-                self._journal.end_transfer(manifest)
-                self._write(Change(run))
-            self._mission = mission
+                    self._journal.store_mission(commit.manifest, document)
+                self._journal.end_transfer(commit.manifest)
+                self._store_lease(lease)
+                self._write(Change(run, handed_over(before, lease)))
             if not current:
+                self._mission = mission
                 self._mission_taken(mission)
                 self._adopt(run, ordered=True)
         return None
+
+    def hear_of_link(self, silent_s: float) -> None:
+        """Told how long no station has been heard; the mission's policy may want something of it."""
+        with self._lock:
+            self._silent_s = silent_s
+            run, mission = self._run, self._mission
+            if mission is None or not self._link_is_lost(mission) or run.state != "RUNNING":
+                return
+            at_once = mission.policy.link_loss in ("hold", "home")
+            if at_once and run.stop_state in ("WAITING", "NAVIGATING", "SETTLING"):
+                change = runs.link_lost(run, mission, silent_s)
+                self._write(change)
+                self._adopt(change.run, ordered=True)
+
+    def _link_is_lost(self, mission: Mission) -> bool:
+        """Whether it is, and matters."""
+        policy = mission.policy
+        return policy.link_loss != "continue" and self._silent_s >= policy.link_loss_after_s
 
     # The work, in the controller's own thread
 
@@ -185,11 +224,12 @@ class Controller:
         return True
 
     def _leave(self, run: Run, mission: Mission) -> None:
-        battery = self._base.battery()
-        if battery < mission.policy.battery_min:
+        battery, silent_s = self._base.battery(), self._silent_s
+        if self._link_is_lost(mission):
+            self._advance(run, lambda now: runs.link_lost(now, mission, silent_s))
+        elif battery < mission.policy.battery_min:
             reason = f"battery at {battery:.0%}, below {mission.policy.battery_min:.0%}"
-            home = runs.heading_home(run, mission, then="PAUSED", reason=reason)
-            self._advance(run, lambda now: Change(home))
+            self._advance(run, lambda now: runs.sent_home(now, mission, then="PAUSED", reason=reason))
         else:
             self._advance(run, runs.leaving)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import time
+import uuid
 from collections.abc import Iterator
 
 import msgspec
@@ -32,6 +33,7 @@ Heard = StateReport | PoseReport | AnyEvent
 
 def reports(link: Link, keys: Keys) -> Iterator[Report]:
     """Everything of the robot's run, until it is over; first what was, then what comes."""
+    link.announce(keys.watcher(uuid.uuid4().hex[:12]))
     heard = _listen(link, keys)
     follower = Follower(link, keys)
     last = time.monotonic()

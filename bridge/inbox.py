@@ -17,6 +17,7 @@ from bridge.protocol import (
     MAX_DOCUMENT_BYTES,
     Accepted,
     ChunkHeld,
+    Commit,
     Malformed,
     Manifest,
     Message,
@@ -52,7 +53,7 @@ class Inbox:
                 case ["chunk", number]:
                     return self._chunk(mission_id, int(number), request)
                 case ["commit"]:
-                    return self._commit(mission_id, decode(request.payload, Manifest))
+                    return self._commit(mission_id, decode(request.payload, Commit))
                 case ["part", number]:
                     return self._part(mission_id, int(number), int(request.parameters.get("revision", "-1")))
         except (msgspec.DecodeError, ValueError) as error:
@@ -111,7 +112,8 @@ class Inbox:
         self._journal.store_chunk(manifest.sha256, number, request.payload)
         return ChunkHeld(index=number, sha256=hashlib.sha256(request.payload).hexdigest())
 
-    def _commit(self, mission_id: str, manifest: Manifest) -> Message:
+    def _commit(self, mission_id: str, commit: Commit) -> Message:
+        manifest = commit.manifest
         refusal = self._unwelcome(mission_id, manifest)
         if refusal:
             return refusal
@@ -125,7 +127,7 @@ class Inbox:
         mission = self._read(document, manifest)
         if isinstance(mission, Rejected):
             return mission
-        refusal = self._controller.take(manifest, document, mission)
+        refusal = self._controller.take(commit, document, mission)
         return refusal or Accepted(
             mission_id=mission.id,
             revision=mission.revision,

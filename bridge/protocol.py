@@ -21,6 +21,10 @@ MAX_CHUNK_BYTES: Final = 256 * 1024
 MAX_DOCUMENT_BYTES: Final = 64 * 1024 * 1024
 LOG_PAGE: Final = 500
 """Events in one answer of the log."""
+LEASE_S: Final = 60.0
+"""How long a commander keeps the robot after the last order."""
+LONGEST_VALID_S: Final = 60.0
+"""No order may claim to be valid for longer."""
 
 Verb = Literal["start", "pause", "resume", "skip", "retry", "abort", "home"]
 Reason = Literal[
@@ -77,6 +81,10 @@ class Keys:
     def event(self) -> str:
         return f"{self.root}/tel/event"
 
+    def watcher(self, name: str) -> str:
+        """Token of a station that watches the robot."""
+        return f"{self.root}/watch/{name}"
+
     def command(self, verb: str) -> str:
         return f"{self.root}/cmd/{verb}"
 
@@ -95,6 +103,15 @@ class Message(
     """Base of every message: frozen, says what it is, and is strict about unknown keys."""
 
 
+class Lease(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Who commands a robot."""
+
+    commander: str
+    fence: int
+    """Grows with every change of hands."""
+    until_ns: int
+
+
 class Info(Message, frozen=True):
     """What a robot says of itself on `info`."""
 
@@ -105,6 +122,8 @@ class Info(Message, frozen=True):
     clock_ns: int
     """The clock that `valid_for_s` counts on."""
     state: StateReport
+    lease: Lease | None
+    """The last commander, also when its time is over."""
     chunk_bytes: int
     document_bytes: int
     profiles: tuple[str, ...] | None
@@ -112,7 +131,7 @@ class Info(Message, frozen=True):
 
 
 class Manifest(Message, frozen=True):
-    """What is about to be transferred, on `mission/<id>/begin` and again on `commit`."""
+    """What is about to be transferred, on `mission/<id>/begin`."""
 
     mission_id: str
     revision: int
@@ -122,7 +141,6 @@ class Manifest(Message, frozen=True):
     sha256: str
     """Of the transferred bytes."""
     chunk_bytes: int
-    commander: str
 
     @property
     def chunks(self) -> int:
@@ -138,6 +156,15 @@ class Ready(Message, frozen=True):
 class ChunkHeld(Message, frozen=True):
     index: int
     sha256: str
+
+
+class Commit(Message, frozen=True):
+    """Everything has been sent: verify and store it, on `mission/<id>/commit`."""
+
+    manifest: Manifest
+    commander: str
+    fence: int | None = None
+    take_over: bool = False
 
 
 class Accepted(Message, frozen=True):
@@ -173,6 +200,9 @@ class Command(Message, frozen=True):
     commander: str
     issued_ns: int
     valid_for_s: float
+    fence: int | None = None
+    """The lease number that the commander knew."""
+    take_over: bool = False
     expect_state: tuple[State, ...] | None = None
     """Refused in any other state, so that a late order does no harm."""
     run_id: str | None = None

@@ -22,6 +22,8 @@ from mission.events import (
     Failed,
     Finished,
     Held,
+    Homing,
+    LinkLost,
     Paused,
     Pose,
     Scanned,
@@ -179,7 +181,21 @@ def next_stop(run: Run, mission: Mission) -> Change:
         return Change(onward)
     if mission.return_ is None:
         return ended(onward, "FINISHED")
-    return Change(heading_home(onward, mission, then="FINISHED", reason="all stops are behind"))
+    return sent_home(onward, mission, then="FINISHED", reason="all stops are behind")
+
+
+def sent_home(run: Run, mission: Mission, *, then: After, reason: str) -> Change:
+    return Change(heading_home(run, mission, then=then, reason=reason), (partial(Homing, reason=reason),))
+
+
+def link_lost(run: Run, mission: Mission, silent_s: float) -> Change:
+    """No station has been heard for too long: as the mission's policy says, but no scan is cut short."""
+    policy = mission.policy.link_loss
+    reason = f"no station heard for {silent_s:.0f} s"
+    telling = partial(LinkLost, silent_s=silent_s, policy=policy)
+    goes_home = policy == "home"
+    change = sent_home(run, mission, then="PAUSED", reason=reason) if goes_home else held(run, reason)
+    return Change(change.run, (telling, *change.events))
 
 
 def heading_home(run: Run, mission: Mission, *, then: After, reason: str) -> Run:
@@ -243,7 +259,7 @@ def _abort(run: Run, mission: Mission, reason: str) -> Change:
 
 
 def _home(run: Run, mission: Mission, reason: str) -> Change:
-    return Change(heading_home(run, mission, then="ABORTED", reason=reason))
+    return sent_home(run, mission, then="ABORTED", reason=reason)
 
 
 ON_FAILURE: dict[str, Callable[[Run, Mission, str], Change]] = {

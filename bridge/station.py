@@ -19,6 +19,7 @@ from typing import Any
 import msgspec
 
 from bridge import follow
+from bridge.lease import FREE_VERBS
 from bridge.link import Link
 from bridge.protocol import (
     CHUNK_BYTES,
@@ -27,6 +28,7 @@ from bridge.protocol import (
     Answer,
     ChunkHeld,
     Command,
+    Commit,
     Info,
     Keys,
     LogPage,
@@ -118,7 +120,13 @@ class Station:
     def status(self) -> StateReport:
         return self.info().state
 
-    def push(self, mission: Mission, *, progress: Progress = lambda held, size: None) -> Accepted:
+    def push(
+        self,
+        mission: Mission,
+        *,
+        progress: Progress = lambda held, size: None,
+        take_over: bool = False,
+    ) -> Accepted:
         """Transfer a mission and see it stored on the robot; only what is missing is sent.
 
         Raises
@@ -131,11 +139,16 @@ class Station:
         document = msgspec.json.encode(mission)
         manifest = Manifest(
             mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
-            sha256=hashlib.sha256(document).hexdigest(), chunk_bytes=CHUNK_BYTES, commander=self.commander,
+            sha256=hashlib.sha256(document).hexdigest(), chunk_bytes=CHUNK_BYTES,
         )  # fmt: skip
         begun = self._step(manifest, "begin", encode(manifest), Ready)
         self._send_chunks(manifest, document, set(begun.held), progress)
-        accepted = self._step(manifest, "commit", encode(manifest), Accepted)
+        lease = self.info().lease
+        commit = Commit(
+            manifest=manifest, commander=self.commander, take_over=take_over,
+            fence=lease.fence if lease else None,
+        )  # fmt: skip
+        accepted = self._step(manifest, "commit", encode(commit), Accepted)
         self._read_back(manifest)
         return accepted
 
@@ -170,7 +183,7 @@ class Station:
         return parse(b"".join(parts), f"mission {mission_id} on {self.keys.robot}")
 
     def command(self, verb: Verb, **details: Any) -> Answer:
-        """Give an order, once, and return the robot's answer.
+        """Give an order, once, and return the robot's answer; `details` are fields of `Command`.
 
         Raises
         ------
@@ -180,18 +193,30 @@ class Station:
             If no answer came: the order may or may not have been carried out.
         """
         asked = time.monotonic()
-        info = self.info()
-        order = Command(
-            cmd_id=uuid.uuid4().hex, verb=verb, commander=self.commander, valid_for_s=self.timeout_s,
-            issued_ns=info.clock_ns, run_id=None if verb == "start" else info.state.run_id,
-            mission_id=info.state.mission_id, revision=info.state.revision, **details,
-        )  # fmt: skip
+        order = self._order(verb, self.info(), details)
         left = max(TRY_S, self.timeout_s - (time.monotonic() - asked))
         reply = self._insist(self.keys.command(verb), encode(order), left)
         answer = self._answered(reply, Answer, verb)
         if answer.outcome == "refused":
             raise AnswerIsNo(f"{self.keys.robot} refused {verb}: {answer.reason}: {answer.message}")
         return answer
+
+    def _order(self, verb: Verb, info: Info, details: dict[str, Any]) -> Command:
+        """The order as meant for the robot as it was just seen: late, it meets another and is refused."""
+        state, cautious = info.state, verb not in FREE_VERBS
+        meant: dict[str, Any] = {
+            "run_id": None if verb == "start" else state.run_id,
+            "mission_id": state.mission_id,
+            "revision": state.revision,
+            "expect_state": (state.state,) if cautious else None,
+            "fence": info.lease.fence if info.lease and cautious else None,
+            "stop": state.stop if verb in ("skip", "retry") else None,
+        }
+        given = {key: value for key, value in details.items() if value is not None}
+        return Command(
+            cmd_id=uuid.uuid4().hex, verb=verb, commander=self.commander, valid_for_s=self.timeout_s,
+            issued_ns=info.clock_ns, **(meant | given),
+        )  # fmt: skip
 
     def log(self, *, since: int = 0, run_id: str | None = None) -> tuple[AnyEvent, ...]:
         """All events of the journal above number `since`, of one run if given."""

@@ -90,6 +90,26 @@ class Resumed(Event, frozen=True, kw_only=True):
     commander: str
 
 
+class TakenOver(Event, frozen=True, kw_only=True):
+    """The robot has changed hands; `run_id` is empty when there is no run."""
+
+    commander: str
+    before: str
+
+
+class LinkLost(Event, frozen=True, kw_only=True):
+    """No station has been heard for a time, and the mission's policy says what follows."""
+
+    silent_s: float
+    policy: str
+
+
+class Homing(Event, frozen=True, kw_only=True):
+    """The robot is on its way back, by legs it has driven or by the return."""
+
+    reason: str
+
+
 class Finished(Event, frozen=True, kw_only=True):
     pass
 
@@ -99,7 +119,20 @@ class Aborted(Event, frozen=True, kw_only=True):
 
 
 AnyEvent = (
-    Started | Arrived | Settled | Scanned | Skipped | Failed | Held | Paused | Resumed | Finished | Aborted
+    Started
+    | Arrived
+    | Settled
+    | Scanned
+    | Skipped
+    | Failed
+    | Held
+    | Paused
+    | Resumed
+    | TakenOver
+    | LinkLost
+    | Homing
+    | Finished
+    | Aborted
 )
 
 

@@ -23,7 +23,7 @@ def test_every_stop_is_driven_to_settled_at_and_scanned_in_order() -> None:
     assert field.order("start").outcome == "ok"
     field.work()
     stops = [f"{event} s{n}" for n in (1, 2, 3) for event in ("Arrived", "Settled", "Scanned")]
-    assert field.told() == ["Started", *stops, "Finished"]
+    assert field.told() == ["Started", *stops, "Homing", "Finished"]
     assert field.controller.run.done == ("s1", "s2", "s3")
 
 

@@ -1,0 +1,56 @@
+"""Who may command a robot: one identity at a time, for a minute after its last order.
+
+The lease belongs to an identity, not to a process, and outlives a reboot. Its fencing number grows with
+every change of hands, so that an order given under an older one is recognised however late it comes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import msgspec
+
+from bridge.protocol import LEASE_S, Lease, Reason
+
+FREE_VERBS = ("pause", "abort")
+"""Orders that any station may give at any time."""
+
+
+@dataclass(frozen=True)
+class Denied:
+    reason: Reason
+    message: str
+
+
+def claimed(
+    lease: Lease | None, commander: str, *, fence: int | None, take_over: bool, now_ns: int
+) -> Lease | Denied:
+    """The lease in the hands of `commander`, renewed; denied while another holds it.
+
+    `fence` is the number that the commander last knew; an older one than the robot's is denied unless
+    the order takes over.
+    """
+    if lease is None:
+        return Lease(commander=commander, fence=1, until_ns=now_ns + lasting_ns())
+    if fence is not None and fence < lease.fence and not take_over:
+        return Denied(
+            "fenced", f"the order is of lease {fence}; the robot is at {lease.fence} ({lease.commander})"
+        )
+    if commander == lease.commander:
+        return msgspec.structs.replace(lease, until_ns=now_ns + lasting_ns())
+    left_s = remaining_s(lease, now_ns)
+    if left_s > 0 and not take_over:
+        return Denied(
+            "not_the_commander",
+            f"{lease.commander} commands it for {left_s:.0f} s more; wait, or add --take-over",
+        )
+    return Lease(commander=commander, fence=lease.fence + 1, until_ns=now_ns + lasting_ns())
+
+
+def remaining_s(lease: Lease, now_ns: int) -> float:
+    """Seconds that the lease still holds; never more than its full length, however the clock jumped."""
+    return max(0.0, min(LEASE_S, (lease.until_ns - now_ns) / 1e9))
+
+
+def lasting_ns() -> int:
+    return round(LEASE_S * 1e9)

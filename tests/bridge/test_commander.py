@@ -1,0 +1,126 @@
+"""One commander at a time, and nobody's order carried out twice or too late."""
+
+from __future__ import annotations
+
+import pytest
+
+from bridge.lease import Denied, claimed
+from bridge.protocol import LEASE_S, Lease
+from mission.errors import AnswerIsNo
+from mission.events import TakenOver
+from tests.bridge.world import Field, corridor
+
+ALICE = Lease(commander="alice", fence=3, until_ns=10_000_000_000)
+
+
+def claim(lease: Lease | None, who: str, *, now_s: float = 0.0, **details: object) -> Lease | Denied:
+    given = {"fence": None, "take_over": False} | details
+    return claimed(lease, who, now_ns=round(now_s * 1e9), **given)  # type: ignore[arg-type]
+
+
+def test_a_free_robot_is_anyones() -> None:
+    assert claim(None, "bob") == Lease(commander="bob", fence=1, until_ns=round(LEASE_S * 1e9))
+
+
+def test_an_order_renews_the_lease_and_keeps_its_number() -> None:
+    assert claim(ALICE, "alice", now_s=5) == Lease(
+        commander="alice", fence=3, until_ns=round((5 + LEASE_S) * 1e9)
+    )
+
+
+def test_another_is_denied_until_the_lease_has_run_out() -> None:
+    denied = claim(ALICE, "bob", now_s=4)
+    assert isinstance(denied, Denied)
+    assert "alice commands it for 6 s more" in denied.message
+    assert claim(ALICE, "bob", now_s=10) == Lease(commander="bob", fence=4, until_ns=round(70e9))
+
+
+def test_taking_over_raises_the_fence_and_older_orders_stay_outside() -> None:
+    taken = claim(ALICE, "bob", take_over=True)
+    assert isinstance(taken, Lease)
+    assert (taken.commander, taken.fence) == ("bob", 4)
+    late = claim(taken, "alice", now_s=100, fence=3)
+    assert isinstance(late, Denied)
+    assert late.reason == "fenced"
+
+
+def test_a_clock_that_jumped_back_does_not_lengthen_a_lease() -> None:
+    far = Lease(commander="alice", fence=1, until_ns=round(1e15))
+    denied = claim(far, "bob")
+    assert isinstance(denied, Denied)
+    assert "60 s more" in denied.message
+
+
+def test_pause_and_abort_need_no_lease_but_resume_does() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    assert field.order("pause", commander="bob").outcome == "ok"
+    assert field.order("resume", commander="bob").reason == "not_the_commander"
+    assert field.order("abort", commander="bob").outcome == "ok"
+    assert field.controller.lease == field.journal.fact("lease", Lease)
+    assert field.controller.lease is not None
+    assert field.controller.lease.commander == "test"
+
+
+def test_a_take_over_is_recorded_with_both_names() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    assert field.order("skip", commander="bob", take_over=True).outcome == "ok"
+    events = [event for event in field.journal.events() if isinstance(event, TakenOver)]
+    assert [(event.before, event.commander) for event in events] == [("test", "bob")]
+
+
+def test_the_lease_outlives_a_reboot() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.boot()
+    assert field.order("start", commander="bob").reason == "not_the_commander"
+
+
+def test_a_push_needs_the_lease_too() -> None:
+    field = Field()
+    field.station().push(corridor())
+    station = field.station()
+    station.commander = "bob"
+    with pytest.raises(AnswerIsNo, match="not_the_commander: test commands it"):
+        station.push(corridor(revision=2))
+    assert station.push(corridor(revision=2), take_over=True).revision == 2
+
+
+def test_an_order_is_carried_out_once_though_it_comes_three_times_and_over_a_reboot() -> None:
+    field = Field()
+    field.station().push(corridor())
+    start = field.command("start")
+    first = field.controller.obey(start)
+    field.boot()
+    assert field.controller.obey(start) == first
+    field.clock.wait(3600)
+    assert field.controller.obey(start) == first
+    assert field.told() == ["Started", "Paused"]
+
+
+def test_an_id_used_for_another_order_is_refused() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start", cmd_id="once")
+    assert field.order("pause", cmd_id="once").reason == "id_reused"
+    assert field.controller.run.state == "RUNNING"
+
+
+@pytest.mark.parametrize("valid_for_s", [0.0, -1.0, 61.0, 1e300])
+def test_an_order_may_not_be_valid_for_ever(valid_for_s: float) -> None:
+    field = Field()
+    field.station().push(corridor())
+    assert field.order("start", valid_for_s=valid_for_s).reason == "expired"
+
+
+def test_a_station_sends_orders_for_the_robot_as_it_saw_it() -> None:
+    field = Field()
+    station = field.station()
+    station.push(corridor())
+    assert station.command("start").state == "RUNNING"
+    with pytest.raises(AnswerIsNo, match="wrong_state"):
+        station.command("resume")
+    assert station.command("pause").state == "PAUSED"
