@@ -1,0 +1,121 @@
+"""Draws the building and what the scanner sees of it: the lower layers of plan.svg."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from mission.files.sheet import Sheet
+from mission.files.svg import group, line_data, number, path, ring_data
+from mission.floor import Element, FloorPlan
+from mission.geometry import BoolArray, FloatArray, Polygon
+from mission.planning import NavigableSpace, OpeningState, Selection, Targets
+from mission.seen import runs_of, seen_units
+
+LOOKS: dict[str, dict[str, object]] = {
+    "walls": {"fill": "#9b9b9b", "stroke": "#6f6f6f"},
+    "columns": {"fill": "#4a4a4a", "stroke": "#2e2e2e"},
+    "beams": {"fill": "none", "stroke": "#8a6d3b", "stroke_dasharray": "1.6 0.8"},
+    "stairs": {"fill": "#e3dccf", "stroke": "#94876f"},
+    "windows": {"fill": "#cfe8f5", "stroke": "#4c8fb5"},
+    "railings": {"fill": "#ecdff2", "stroke": "#8b5fa3"},
+    "other": {"fill": "#efe2e2", "stroke": "#a58787"},
+}
+"""How each element kind is filled; kinds not named here look like `other`."""
+SEEN: dict[str, object] = {"stroke": "#1a8f3c", "stroke_width": 0.5}
+UNSEEN: dict[str, object] = {"stroke": "#d7191c", "stroke_width": 0.8}
+HIDDEN: dict[str, object] = {"stroke": "#ee9a7b", "stroke_width": 0.3}
+PASSABLE: dict[str, object] = {"stroke": "#0b63b0", "stroke_width": 0.4}
+BLOCKED: dict[str, object] = {"stroke": "#e07b00", "stroke_width": 0.5}
+
+
+def building(space: NavigableSpace, sheet: Sheet) -> Iterator[str]:
+    """Floor, rooms, elements by kind, and openings."""
+    floor = space.floor
+    outline = "".join(_region(part, sheet) for part in floor.outline)
+    yield group("floor", [path([outline])], fill="#f1f1ee", stroke="#555", stroke_width=0.25, **_EVEN_ODD)
+    rooms = (_region(part, sheet) for room in floor.rooms for part in room.polygons)
+    yield group("rooms", [path(rooms)], fill="#ffffff", stroke="#b5b5b5", stroke_width=0.1, **_EVEN_ODD)
+    for kind in kinds_of(floor):
+        elements = [item for item in floor.elements if item.kind == kind]
+        yield group(kind, _elements(elements, sheet), stroke_width=0.18, **LOOKS.get(kind, LOOKS["other"]))
+    yield from _openings(space.openings, sheet)
+
+
+def targets(selection: Selection, sheet: Sheet) -> Iterator[str]:
+    """Faces out of every candidate's sight, in sight but not seen, and seen: the seen ones on top."""
+    visibility = selection.visibility
+    seen = seen_units(selection)
+    layers = (
+        ("hidden", ~visibility.visible, HIDDEN),
+        ("unseen", visibility.visible & ~seen, UNSEEN),
+        ("seen", seen, SEEN),
+    )
+    for name, units, look in layers:
+        yield group(name, [path(_strokes(visibility.targets, units, sheet))], fill="none", **look)
+
+
+def kinds_of(floor: FloorPlan) -> list[str]:
+    """Kinds on this floor, in the order they are drawn: what lies overhead or is thin comes last."""
+    there = {item.kind for item in floor.elements}
+    known = [kind for kind in _ORDER if kind in there]
+    return known + sorted(there - set(known))
+
+
+_ORDER = ("stairs", "other", "walls", "windows", "columns", "railings", "beams")
+_EVEN_ODD: dict[str, object] = {"fill_rule": "evenodd"}
+
+
+def cross(at: FloatArray, *, size: float) -> str:
+    """Path data of an ×."""
+    x, y = at.tolist()
+    return f"M{number(x - size)} {number(y - size)}l{number(2 * size)} {number(2 * size)}" + (
+        f"M{number(x - size)} {number(y + size)}l{number(2 * size)} {number(-2 * size)}"
+    )
+
+
+def _region(part: Polygon, sheet: Sheet) -> str:
+    return "".join(ring_data(sheet.on_paper(ring)) for ring in part.rings)
+
+
+def _elements(elements: list[Element], sheet: Sheet) -> Iterator[str]:
+    solids = (_region(part, sheet) for item in elements for part in item.solids)
+    yield path(solids, **_EVEN_ODD)
+    yield path((line_data(sheet.on_paper(line)) for item in elements for line in item.lines), fill="none")
+
+
+def _openings(openings: tuple[OpeningState, ...], sheet: Sheet) -> Iterator[str]:
+    """Passable ones as a line from jamb to jamb, the others with an × on it; passages dashed."""
+    for name, passable, look in (("passable", True, PASSABLE), ("blocked", False, BLOCKED)):
+        chosen = [state for state in openings if state.passable == passable]
+        marks = [] if passable else [cross(_middle(state, sheet), size=1.1) for state in chosen]
+        yield group(
+            name,
+            (_lines(chosen, "door", sheet), _lines(chosen, "passage", sheet), path(marks)),
+            fill="none",
+            **look,
+        )
+
+
+def _lines(openings: list[OpeningState], kind: str, sheet: Sheet) -> str:
+    data = [line_data(sheet.on_paper(item.opening.line)) for item in openings if item.opening.kind == kind]
+    return path(data, **({"stroke_dasharray": "1.2 0.7"} if kind == "passage" else {}))
+
+
+def _middle(state: OpeningState, sheet: Sheet) -> FloatArray:
+    return sheet.on_paper(state.opening.line.mean(axis=0))
+
+
+def _strokes(targets: Targets, units: BoolArray, sheet: Sheet) -> Iterator[str]:
+    """Path data of the units of a mask; stretches that meet end to end become one polyline."""
+    runs = runs_of(targets, units)
+    a, b = targets.a[runs.segment], targets.b[runs.segment]
+    begins = sheet.on_paper(a + runs.t0[:, None] * (b - a))
+    ends = sheet.on_paper(a + runs.t1[:, None] * (b - a))
+    apart = np.abs(begins[1:] - ends[:-1]).max(axis=1, initial=0.0) > 0.005
+    breaks = [0, *(np.flatnonzero(apart) + 1).tolist(), len(begins)]
+    for first, last in pairwise(breaks):
+        if first < last:
+            yield line_data(np.concatenate([begins[first : first + 1], ends[first:last]]))

@@ -1,0 +1,256 @@
+"""Fills the columns beside a plan: title block, legend with scale bar and axes, table of stops."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from mission.document import Mission
+from mission.files import floor_drawing as floor_look
+from mission.files import route_drawing as route_look
+from mission.files.sheet import COLUMN, HEADER, ROW, Box, Chunk, Sheet
+from mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
+from mission.planning import Route
+from mission.schedule import schedule
+from mission.table import duration
+
+BODY = 2.3
+LINE = 4.0
+"""Height of a line of the title block and of the legend."""
+TITLE_HEAD = 15.0
+SCALE_AND_AXES = 24.0
+MOST_ROWS = 1500
+"""Stops listed; beyond, the table says how many more there are."""
+
+
+def title_height(facts: list[tuple[str, str]]) -> float:
+    return TITLE_HEAD + LINE * len(facts) + 2.0
+
+
+def title_block(mission: Mission, facts: list[tuple[str, str]], box: Box) -> str:
+    """The plan's name, and what it is of, when, and for which machine."""
+    name = shortened(mission.name, size=5.0, width=box.width - 6)
+    lines = [
+        *(text(box.x + 3, box.y + 7, name, size=5.0, font_weight="bold"),),
+        text(box.x + 3, box.y + 11.5, "Scan plan: stops of a terrestrial laser scanner", size=BODY),
+        line(box.x, box.y + 13.5, box.x + box.width, box.y + 13.5, stroke="#000", stroke_width=0.25),
+    ]
+    for index, (key, value) in enumerate(facts):
+        y = box.y + TITLE_HEAD + LINE * index + 3.0
+        shown = shortened(value, size=BODY, width=box.width - 30)
+        lines.append(text(box.x + 3, y, key, size=BODY, fill="#555555"))
+        lines.append(text(box.x + 27, y, shown, size=BODY))
+    return group("title", (_frame(box), *lines))
+
+
+def facts_of(route: Route, mission: Mission, *, date: str) -> list[tuple[str, str]]:
+    """Lines of the title block; the sheet's own (scale, paper) are put in when it is chosen."""
+    selection, settings, robot = route.selection, mission.origin.parameters, mission.robot
+    digest = mission.origin.floor_digest[:12]
+    return [
+        ("Mission", f"{mission.id[:12]}, revision {mission.revision}"),
+        ("Digest", mission.digest[:12]),
+        ("Floor", f"{mission.origin.floor} ({digest})"),
+        ("Date", date),
+        ("Scanner", f"{mission.scanner.profile}, range {mission.scanner.range:g} m"),
+        ("Stops", f"{len(mission.stops)} (no plan has fewer than {selection.bound})"),
+        (
+            "Coverage",
+            f"{100 * selection.coverage:.1f} % of what is in sight, {_required(selection.required)}",
+        ),
+        ("Clearances", f"d_sec {settings.d_sec:g} m, robot {robot.radius:g} m, edge {settings.edge:g} m"),
+        ("Route", f"{route.length:.1f} m, {route.tour} tour, {robot.speed:g} m/s"),
+        ("Planned time", f"{duration(schedule(mission).total_s)} h:min:s"),
+        ("Made by", f"stopgo {mission.origin.stopgo}"),
+    ]
+
+
+def _required(share: float) -> str:
+    return f"asked {100 * share:g} %"
+
+
+def legend_height(entries: list[tuple[str, str]]) -> float:
+    return 7.0 + LINE * math.ceil(len(entries) / 2) + SCALE_AND_AXES
+
+
+def legend_entries(route: Route, mission: Mission) -> list[tuple[str, str]]:
+    """(symbol, words) for everything that is on this plan, and nothing else."""
+    space = route.selection.visibility.candidates.space
+    openings = {state.passable for state in space.openings}
+    some: list[tuple[str, str, bool]] = [
+        ("seen", "seen by the stops", True),
+        ("unseen", "in sight, not seen", True),
+        ("hidden", "out of sight", True),
+        ("passable", "opening, driven through", True in openings),
+        ("blocked", "opening, not passable", False in openings),
+        ("stop", "stop, facing right", bool(mission.stops)),
+        ("doorway", "stop in a doorway", any(stop.doorway for stop in mission.stops)),
+        ("start", "start", True),
+        ("way", "route", bool(mission.stops)),
+        ("back", _back_words(route), mission.return_ is not None),
+    ]
+    kinds = [(kind, kind) for kind in floor_look.kinds_of(space.floor)]
+    return kinds + [(symbol, words) for symbol, words, there in some if there]
+
+
+def _back_words(route: Route) -> str:
+    return "back to the start" if route.tour == "closed" else "on to the end"
+
+
+def legend(entries: list[tuple[str, str]], mission: Mission, sheet: Sheet) -> str:
+    """Symbols in two columns; below them the scale bar, the axes and north."""
+    box = sheet.legend
+    rows = math.ceil(len(entries) / 2)
+    items = [text(box.x + 3, box.y + 4.6, "Legend", size=2.6, font_weight="bold")]
+    for index, (symbol, words) in enumerate(entries):
+        x = box.x + 3 + (index // rows) * (COLUMN / 2)
+        y = box.y + 8.5 + LINE * (index % rows)
+        items += [_symbol(symbol, x, y), text(x + 9, y + 0.8, words, size=BODY)]
+    foot = box.y + box.height - SCALE_AND_AXES
+    items += [_scale_bar(sheet, x=box.x + 5, y=foot + 14), _axes(mission, x=box.x + 70, y=foot + 15)]
+    return group("legend", (_frame(box), *items))
+
+
+def _symbol(name: str, x: float, y: float) -> str:
+    """A sample 7 mm wide with its middle at height y."""
+    if name in _STROKES:
+        return line(x, y, x + 7, y, **_STROKES[name])
+    place = np.array([x + 3.5, y])
+    if name == "blocked":
+        mark = path([floor_look.cross(place, size=1.1)], fill="none", **floor_look.BLOCKED)
+        return line(x, y, x + 7, y, **floor_look.BLOCKED) + mark
+    if name == "start":
+        return circle(x + 3.5, y, 1.6, fill="#111111") + _centred("S", x + 3.5, y, fill="#ffffff")
+    if name in ("stop", "doorway"):
+        outer = circle(x + 3.5, y, 1.9, fill="#fff", stroke=route_look.INK, stroke_width=0.2)
+        inner = circle(x + 3.5, y, 1.5, fill="#fff", stroke=route_look.INK, stroke_width=0.3)
+        tick = line(x + 5, y, x + 6.2, y, stroke=route_look.INK, stroke_width=0.6)
+        return tick + (outer if name == "doorway" else "") + inner + _centred("1", x + 3.5, y)
+    look = floor_look.LOOKS.get(name, floor_look.LOOKS["other"])
+    return rect(x, y - 1.3, 7.0, 2.6, stroke_width=0.18, **look)
+
+
+def _centred(word: str, x: float, y: float, **style: object) -> str:
+    return text(x, y + 0.65, word, size=1.8, text_anchor="middle", font_weight="bold", **style)
+
+
+_STROKES: dict[str, dict[str, object]] = {
+    "seen": floor_look.SEEN,
+    "unseen": floor_look.UNSEEN,
+    "hidden": floor_look.HIDDEN,
+    "passable": floor_look.PASSABLE,
+    "way": route_look.WAY,
+    "back": route_look.BACK,
+}
+
+
+def _scale_bar(sheet: Sheet, *, x: float, y: float) -> str:
+    """Five alternating fields over a round number of metres, at most 50 mm long."""
+    metres = max(step * 10.0**power for power in range(-1, 7) for step in (1, 2, 5)
+                 if sheet.length(step * 10.0**power) <= 50.01)  # fmt: skip
+    field = sheet.length(metres) / 5
+    fields = [
+        rect(x + index * field, y, field, 1.6, fill=fill, stroke="#000", stroke_width=0.15)
+        for index, fill in enumerate(("#000", "#fff", "#000", "#fff", "#000"))
+    ]
+    ends = [
+        text(x + share * 5 * field, y - 1.2, f"{metres * share:g}", size=BODY, text_anchor="middle")
+        for share in (0, 0.4, 1)
+    ]
+    words = text(x, y - 5.5, f"Scale 1:{sheet.scale}", size=2.8, font_weight="bold")
+    return "".join((*fields, *ends, words, text(x + 5 * field + 3, y - 1.2, "m", size=BODY)))
+
+
+def _axes(mission: Mission, *, x: float, y: float) -> str:
+    """The site's axes; north too where the mission says where on earth it is."""
+    arms = [_arrow(x, y, angle, length=8.0, label=label) for angle, label in ((0.0, "x"), (math.pi / 2, "y"))]
+    if mission.georeference is not None:
+        # +y bears heading_deg clockwise from north, so north lies that much counter-clockwise of +y.
+        north = math.pi / 2 + math.radians(mission.georeference.heading_deg)
+        arms.append(_arrow(x, y, north, length=11.0, label="N", stroke="#b00000"))
+    return group("axes", arms)
+
+
+def _arrow(x: float, y: float, angle: float, *, length: float, label: str, stroke: str = "#000000") -> str:
+    ahead = np.array([math.cos(angle), -math.sin(angle)])
+    tip = np.array([x, y]) + length * ahead
+    word = tip + 2.3 * ahead
+    return (
+        line(x, y, *tip.tolist(), stroke=stroke, stroke_width=0.3)
+        + polygon(route_look.arrowhead(tip, ahead), fill=stroke)
+        + text(word[0], word[1] + 0.8, label, size=BODY, text_anchor="middle", fill=stroke)
+    )
+
+
+TABLE_HEAD = ("no", "x m", "y m", "heading °", "units", "new", "time")
+_RIGHT_EDGES = (7.0, 21.0, 35.0, 48.0, 58.0, 68.0, 82.0)
+
+
+def table_rows(mission: Mission) -> list[tuple[str, ...]]:
+    """A row per stop, as the robot meets them; a doorway stop has a `d` after its number."""
+    arrivals = schedule(mission).arrival_s.tolist()
+    rows: list[tuple[str, ...]] = [
+        (
+            *(f"{number}{'d' if stop.doorway else ''}", f"{stop.x:.3f}", f"{stop.y:.3f}"),
+            *(f"{math.degrees(stop.heading):.1f}", str(stop.sees.units), str(stop.sees.new_units)),
+            duration(arrival),
+        )
+        for number, (stop, arrival) in enumerate(zip(mission.stops, arrivals, strict=True), 1)
+    ]
+    more = len(rows) - MOST_ROWS
+    return rows if more <= 0 else [*rows[:MOST_ROWS], ("", "", "", "", "", "", f"and {more} more")]
+
+
+def table(rows: list[tuple[str, ...]], chunks: tuple[Chunk, ...]) -> str:
+    """The rows, over as many columns of the sheet as they need."""
+    return group("table", (_chunk(rows, chunk) for chunk in chunks), text_anchor="end")
+
+
+def _chunk(rows: list[tuple[str, ...]], chunk: Chunk) -> str:
+    box = chunk.box
+    lines = [_frame(box), _row(TABLE_HEAD, box.x, box.y + HEADER - 1.5, font_weight="bold")]
+    for index, row in enumerate(rows[chunk.first : chunk.first + chunk.count]):
+        top = box.y + HEADER + ROW * index
+        if index % 2 == 0:
+            lines.append(rect(box.x + 0.2, top, box.width - 0.4, ROW, fill="#f1eef7"))
+        lines.append(_row(row, box.x, top + 2.6))
+    return "\n".join(lines)
+
+
+def _row(cells: tuple[str, ...], x: float, y: float, **style: object) -> str:
+    edges = zip(_RIGHT_EDGES, cells, strict=True)
+    spans = "".join(text(x + edge, y, cell, size=2.1) for edge, cell in edges if cell)
+    return f'<g font-weight="{style["font_weight"]}">{spans}</g>' if style else spans
+
+
+def _frame(box: Box) -> str:
+    return rect(box.x, box.y, box.width, box.height, fill="#fff", stroke="#000", stroke_width=0.25)
+
+
+def coordinate_ticks(sheet: Sheet) -> str:
+    """Coordinates of the site along the drawing's lower and left edge, in round metres."""
+    step = next(s * 10.0**p for p in range(-1, 9) for s in (1, 2, 5) if sheet.length(s * 10.0**p) >= 25)
+    items = [*_ticks(sheet, step, axis=0), *_ticks(sheet, step, axis=1)]
+    return group("coordinates", items, fill="#666666", stroke_width=0.15, text_anchor="middle")
+
+
+def _ticks(sheet: Sheet, step: float, *, axis: int) -> Iterator[str]:
+    box = sheet.drawing
+    room = (box.width, box.height)[axis] * sheet.scale / 1000 / 2 - step / 4
+    first = math.ceil((sheet.centre[axis] - room) / step)
+    last = math.floor((sheet.centre[axis] + room) / step)
+    for index in range(first, last + 1):
+        point = list(sheet.centre)
+        point[axis] = index * step
+        x, y = sheet.on_paper(np.array(point)).tolist()
+        label = f"{index * step:.10g}"
+        if axis == 0:
+            bottom = box.y + box.height
+            yield line(x, bottom, x, bottom - 1.5, stroke="#666666")
+            yield text(x, bottom - 2.2, label, size=1.8)
+        else:
+            yield line(box.x, y, box.x + 1.5, y, stroke="#666666")
+            turned = f"rotate(-90 {number(box.x + 3.8)} {number(y)})"
+            yield text(box.x + 3.8, y, label, size=1.8, transform=turned)

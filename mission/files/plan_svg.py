@@ -1,0 +1,110 @@
+"""Draws plan.svg: a mission on its floor, to scale in millimetres, as a surveyor prints it."""
+
+from __future__ import annotations
+
+from itertools import chain
+
+import numpy as np
+
+from mission.document import Mission
+from mission.files import plan_panel as panel
+from mission.files.floor_drawing import building, targets
+from mission.files.room_labels import points_along, room_labels
+from mission.files.route_drawing import STOP, rings, route, stops
+from mission.files.sheet import Box, Contents, Sheet, fit
+from mission.files.svg import FONT, attributes, clean, number, rect
+from mission.geometry import FloatArray, bounds
+from mission.planning import Route
+
+PADDING = 8.0
+"""Millimetres kept free round the floor, for coordinates and what stands on its edge."""
+
+
+def plan_svg(made: Route, mission: Mission, *, date: str, with_range: bool = False) -> bytes:
+    """The plan as SVG; `date` stands in the title block as given, so equal inputs give equal bytes.
+
+    `with_range` adds a faint ring of the scanner's range about each stop.
+    """
+    entries = panel.legend_entries(made, mission)
+    rows = panel.table_rows(mission)
+    facts = panel.facts_of(made, mission, date=date)
+    blocks = (panel.legend_height(entries), panel.title_height([*facts, ("Scale", "")]), len(rows))
+    sheet = fit(Contents(_bounds(made, mission), PADDING, *blocks))
+    drawn = (
+        *_drawing(made, mission, sheet, with_range=with_range),
+        panel.title_block(mission, [*facts, ("Scale", _scale(sheet))], sheet.title),
+        panel.legend(entries, mission, sheet),
+        panel.table(rows, sheet.table),
+    )
+    return _document(sheet, mission, "\n".join(item for item in drawn if item))
+
+
+def _drawing(made: Route, mission: Mission, sheet: Sheet, *, with_range: bool) -> tuple[str, ...]:
+    """Everything to scale, from the floor up to the numbers."""
+    space = made.selection.visibility.candidates.space
+    parts = chain(
+        building(space, sheet),
+        targets(made.selection, sheet),
+        [rings(mission, sheet)] if with_range else [],
+        route(mission, sheet),
+        [room_labels(space.floor.rooms, sheet, avoid=_busy(mission, sheet), reach=0.4)],
+        stops(mission, sheet),
+    )
+    inside = "\n".join(part for part in parts if part)
+    clipped = f'<g id="drawing" clip-path="url(#frame)">\n{inside}\n</g>'
+    return (clipped, _outline(sheet.drawing), panel.coordinate_ticks(sheet))
+
+
+def _busy(mission: Mission, sheet: Sheet) -> FloatArray:
+    """Points on paper that room names keep away from: stops, densely, and the route."""
+    legs = [*(stop.approach for stop in mission.stops), mission.return_ or ()]
+    lines = [sheet.on_paper(np.array(leg, dtype=np.float64).reshape(-1, 2)) for leg in legs]
+    turns = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    disc = (STOP + 0.5) * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    centres = [(mission.start.x, mission.start.y), *((stop.x, stop.y) for stop in mission.stops)]
+    discs = [place + disc for place in sheet.on_paper(np.array(centres))]
+    return np.concatenate([*discs, *points_along(lines, spacing=1.0)])
+
+
+def _bounds(made: Route, mission: Mission) -> tuple[float, float, float, float]:
+    """Bounds in metres of everything that is drawn to scale."""
+    floor = made.selection.visibility.candidates.space.floor
+    solids = [solid.exterior for item in floor.elements for solid in item.solids]
+    lines = [line for item in floor.elements for line in item.lines]
+    rooms = [part.exterior for room in floor.rooms for part in room.polygons]
+    openings = [opening.line for opening in floor.openings]
+    legs = [*(stop.approach for stop in mission.stops), mission.return_ or ()]
+    ways = [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs]
+    start = np.array([[mission.start.x, mission.start.y]])
+    outline = [part.exterior for part in floor.outline]
+    return bounds([*outline, *rooms, *solids, *lines, *openings, *ways, start])
+
+
+def _scale(sheet: Sheet) -> str:
+    lying = "landscape" if sheet.width > sheet.height else "portrait"
+    return f"1:{sheet.scale} on {sheet.paper} {lying}"
+
+
+def _outline(box: Box) -> str:
+    return rect(box.x, box.y, box.width, box.height, fill="none", stroke="#000", stroke_width=0.35)
+
+
+def _document(sheet: Sheet, mission: Mission, content: str) -> bytes:
+    size = {
+        "width": f"{number(sheet.width)}mm",
+        "height": f"{number(sheet.height)}mm",
+        "viewBox": f"0 0 {number(sheet.width)} {number(sheet.height)}",
+        "font_family": FONT,
+    }
+    box = sheet.drawing
+    frame = rect(box.x, box.y, box.width, box.height)
+    lines = (
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<svg xmlns="http://www.w3.org/2000/svg"{attributes(size)}>',
+        f"<title>{clean(mission.name)}: scan plan {clean(mission.id)}</title>",
+        f'<defs><clipPath id="frame">{frame}</clipPath></defs>',
+        rect(0.0, 0.0, sheet.width, sheet.height, fill="#ffffff"),
+        content,
+        "</svg>\n",
+    )
+    return "\n".join(lines).encode("utf-8")

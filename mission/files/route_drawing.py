@@ -1,0 +1,106 @@
+"""Draws the route and its numbered stops: the upper layers of plan.svg."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from mission.document import Mission, Point, Stop
+from mission.files.sheet import Sheet
+from mission.files.svg import circle, group, line, line_data, path, polygon, text
+from mission.geometry import FloatArray
+
+WAY: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.35}
+"""The way to each stop."""
+BACK: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.3, "stroke_dasharray": "2 1"}
+STOP = 2.1
+"""Radius in millimetres of a stop's disc."""
+INK = "#2a0f5c"
+_ARROW_EVERY = 45.0
+"""Millimetres between direction arrows on a long leg."""
+_ARROW_LEAST = 8.0
+"""Shorter legs have no room for an arrow between their stops."""
+
+
+def rings(mission: Mission, sheet: Sheet) -> str:
+    """How far the scanner reaches from each stop, faintly."""
+    reach = sheet.length(mission.scanner.range)
+    circles = [circle(x, y, reach) for x, y in _stops_on_paper(mission, sheet).tolist()]
+    return group("range", circles, fill="none", stroke="#b9a6dd", stroke_width=0.12, stroke_dasharray="1 1.5")
+
+
+def route(mission: Mission, sheet: Sheet) -> Iterator[str]:
+    """Legs with direction arrows; the return leg dashed."""
+    legs = [_on_paper(stop.approach, sheet) for stop in mission.stops]
+    back = _on_paper(mission.return_ or (), sheet)
+    join: dict[str, object] = {"fill": "none", "stroke_linejoin": "round"}
+    yield group("return", [path([line_data(back)] if len(back) > 1 else [])], **join, **BACK)
+    yield group("route", [path(line_data(leg) for leg in legs if len(leg) > 1)], **join, **WAY)
+    arrows = [polygon(head) for leg in (*legs, back) for head in _arrows(leg)]
+    yield group("directions", arrows, fill=WAY["stroke"])
+
+
+def stops(mission: Mission, sheet: Sheet) -> Iterator[str]:
+    """The start, then each stop's disc with its number and a tick where it faces."""
+    yield start_mark(sheet.on_paper(np.array([mission.start.x, mission.start.y])))
+    places = _stops_on_paper(mission, sheet)
+    marks = [
+        stop_mark(place, str(number), heading=stop.heading, doorway=stop.doorway)
+        for number, (stop, place) in enumerate(zip(mission.stops, places, strict=True), 1)
+    ]
+    yield group("stops", marks, font_weight="bold", text_anchor="middle", fill=INK)
+
+
+def start_mark(at: FloatArray) -> str:
+    """A black disc, larger than a stop's: it shows as a thick ring where the route starts at a stop."""
+    x, y = at.tolist()
+    letter = text(x, y + 0.85, "S", size=2.4, fill="#ffffff", text_anchor="middle", font_weight="bold")
+    return group("start", [circle(x, y, STOP + 0.8, fill="#111111"), letter])
+
+
+def stop_mark(at: FloatArray, number: str, *, heading: float, doorway: bool) -> str:
+    """A disc with a number; a doorway stop has a second ring."""
+    x, y = at.tolist()
+    look: dict[str, object] = {"fill": "#ffffff", "stroke": INK, "stroke_width": 0.3}
+    tick = np.array([math.cos(heading), -math.sin(heading)])
+    (x1, y1), (x2, y2) = (at + STOP * tick).tolist(), (at + (STOP + 1.3) * tick).tolist()
+    return "".join((
+        line(x1, y1, x2, y2, stroke=INK, stroke_width=0.6),
+        circle(x, y, STOP + 0.55, fill="#ffffff", stroke=INK, stroke_width=0.2) if doorway else "",
+        circle(x, y, STOP, **look),
+        text(x, y + 0.76, number, size=2.2 if len(number) < 3 else 1.8),
+    ))  # fmt: skip
+
+
+def _stops_on_paper(mission: Mission, sheet: Sheet) -> FloatArray:
+    return sheet.on_paper(_xy(mission.stops))
+
+
+def _xy(stops: Sequence[Stop]) -> FloatArray:
+    return np.array([[stop.x, stop.y] for stop in stops], dtype=np.float64).reshape(-1, 2)
+
+
+def _on_paper(leg: Sequence[Point], sheet: Sheet) -> FloatArray:
+    return sheet.on_paper(np.array(leg, dtype=np.float64).reshape(-1, 2))
+
+
+def _arrows(leg: FloatArray) -> Iterator[FloatArray]:
+    """Arrowheads at even distances along a leg, at least one where there is room."""
+    steps = np.diff(leg, axis=0)
+    lengths = np.hypot(*steps.T)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    if len(lengths) == 0 or along[-1] < _ARROW_LEAST:
+        return
+    count = max(1, int(along[-1] // _ARROW_EVERY))
+    for distance in (np.arange(count) + 0.5) * along[-1] / count:
+        piece = int(np.searchsorted(along, distance, side="right")) - 1
+        ahead = steps[piece] / lengths[piece]
+        yield arrowhead(leg[piece] + (distance - along[piece]) * ahead, ahead)
+
+
+def arrowhead(at: FloatArray, ahead: FloatArray) -> FloatArray:
+    """Corners of an arrowhead about `at`, pointing along the unit vector `ahead`."""
+    side = np.array([-ahead[1], ahead[0]])
+    return np.stack([at + 1.1 * ahead, at - 1.0 * ahead + 0.8 * side, at - 1.0 * ahead - 0.8 * side])

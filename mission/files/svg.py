@@ -1,0 +1,92 @@
+"""Words of SVG: elements as strings, in millimetres on paper, y down."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from html import escape
+
+import numpy as np
+
+from mission.geometry import FloatArray
+
+FONT = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
+SMALLEST_TEXT = 1.8
+"""Millimetres; smaller print is not read on a building site."""
+
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def group(name: str, content: Iterable[str], **style: object) -> str:
+    """A named layer; empty layers are left out."""
+    inside = "\n".join(item for item in content if item)
+    return f'<g id="{name}"{attributes(style)}>\n{inside}\n</g>' if inside else ""
+
+
+def attributes(values: Mapping[str, object]) -> str:
+    """` stroke-width="0.25"` from `stroke_width=0.25`."""
+    return "".join(f' {key.replace("_", "-")}="{_value(value)}"' for key, value in values.items())
+
+
+def text(x: float, y: float, content: str, *, size: float, **style: object) -> str:
+    """A line of text whose baseline begins (or is anchored) at x, y."""
+    place = {"x": x, "y": y, "font_size": max(size, SMALLEST_TEXT)}
+    return f"<text{attributes({**place, **style})}>{clean(content)}</text>"
+
+
+def clean(content: str) -> str:
+    """Text as XML may hold it: escaped, and what XML 1.0 has no place for replaced."""
+    return escape(_NOT_XML.sub("\ufffd", content))
+
+
+def text_width(content: str, size: float) -> float:
+    """About the width of a line of text in the fonts asked for, on the wide side."""
+    return 0.58 * size * len(content)
+
+
+def shortened(content: str, *, size: float, width: float) -> str:
+    """The text, cut with an ellipsis where it would be wider than `width`."""
+    most = max(1, int(width / (0.58 * size)))
+    return content if len(content) <= most else content[: most - 1] + "…"
+
+
+def line(x1: float, y1: float, x2: float, y2: float, **style: object) -> str:
+    return f"<line{attributes({'x1': x1, 'y1': y1, 'x2': x2, 'y2': y2, **style})}/>"
+
+
+def rect(x: float, y: float, width: float, height: float, **style: object) -> str:
+    return f"<rect{attributes({'x': x, 'y': y, 'width': width, 'height': height, **style})}/>"
+
+
+def circle(x: float, y: float, radius: float, **style: object) -> str:
+    return f"<circle{attributes({'cx': x, 'cy': y, 'r': radius, **style})}/>"
+
+
+def polygon(points: FloatArray, **style: object) -> str:
+    return path([ring_data(points)], **style)
+
+
+def path(data: Iterable[str], **style: object) -> str:
+    """One path of many pieces; nothing when there are none."""
+    joined = "".join(data)
+    return f'<path d="{joined}"{attributes(style)}/>' if joined else ""
+
+
+def ring_data(points: FloatArray) -> str:
+    """Path data of a closed ring (n, 2)."""
+    return f"{line_data(points)}Z" if len(points) else ""
+
+
+def line_data(points: FloatArray) -> str:
+    """Path data of a polyline (n, 2)."""
+    return "M" + "L".join(f"{number(x)} {number(y)}" for x, y in np.asarray(points).tolist())
+
+
+def number(value: float) -> str:
+    """A hundredth of a millimetre is finer than any printer."""
+    shown = f"{value:.2f}".rstrip("0").rstrip(".")
+    return "0" if shown == "-0" else shown
+
+
+def _value(value: object) -> str:
+    return number(value) if isinstance(value, float) else escape(str(value))
