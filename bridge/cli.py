@@ -62,6 +62,10 @@ def robot(
         str | None,
         typer.Option("--at", metavar="X,Y,HEADING", help="Where it stands (m, degrees); else at the start."),
     ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="Let something go wrong, as slip@2=0.2."),
+    ] = None,
     insecure: Insecure = False,
 ) -> None:
     """Be a robot, with a simulated base and scanner, until SIGTERM.
@@ -69,10 +73,12 @@ def robot(
     Example: stopgo robot --name r1 --listen tcp/127.0.0.1:7447 --state r1.state --speed-up 20
     """
     from bridge.robot import RobotOptions, run_robot
+    from bridge.simulator import Faults, read_fault
 
     options = RobotOptions(
         name=name, listen=listen, state=state, site=site, speed_up=speed_up,
         at=None if at is None else read_pose(at), insecure=insecure,
+        faults=Faults(tuple(read_fault(text) for text in fault or ())),
     )  # fmt: skip
     run_robot(options, ready=lambda: say(f"ready {name} listens on {listen}"))
 

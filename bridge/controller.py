@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import sqlite3
 import threading
 import uuid
 from collections.abc import Callable
@@ -110,14 +111,20 @@ class Controller:
                 return before[1] if before[0] == order else self._id_reused(command)
             decision = decide(command, self._situation())
             answer = self._answer(command, decision)
-            with self._journal.transaction():
-                if isinstance(decision, Decision):
-                    self._write(decision.change)
-                    self._store_lease(decision.lease)
-                self._journal.store_answer(order, answer)
+            try:
+                self._store_decision(order, decision, answer)
+            except sqlite3.OperationalError as error:
+                return self._answer(command, self._halt_unstored(error))
             if isinstance(decision, Decision):
                 self._adopt(decision.change.run, ordered=True)
             return answer
+
+    def _store_decision(self, order: str, decision: Decision | Refused, answer: Answer) -> None:
+        with self._journal.transaction():
+            if isinstance(decision, Decision):
+                self._write(decision.change)
+                self._store_lease(decision.lease)
+            self._journal.store_answer(order, answer)
 
     def _store_lease(self, lease: Lease | None) -> None:
         if lease is not None:
@@ -200,7 +207,12 @@ class Controller:
         """Work until closed."""
         while not self._closing:
             self._wake.clear()
-            if not self.step():
+            try:
+                worked = self.step()
+            except sqlite3.OperationalError as error:
+                self._halt_unstored(error)
+                worked = False
+            if not worked:
                 self._wake.wait()
 
     def close(self) -> None:
@@ -336,6 +348,15 @@ class Controller:
             self._interrupt.set()
         self._wake.set()
         self.changed()
+
+    def _halt_unstored(self, error: sqlite3.OperationalError) -> Refused:
+        """Stand still, for what cannot be stored must not be done; held until the journal takes it again."""
+        reason = f"the journal cannot be written: {error}"
+        with self._lock:
+            self._base.stop()
+            if not self._run.over:
+                self._adopt(runs.held(self._run, reason).run, ordered=True)
+        return Refused("storage", reason)
 
     # What others may know
 

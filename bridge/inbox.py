@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import sqlite3
 from collections.abc import Iterator
 
 import msgspec
@@ -47,17 +48,22 @@ class Inbox:
         """Answer one question on `…/mission/<id>/<step>`."""
         mission_id, step = _address(request.key)
         try:
-            match step:
-                case ["begin"]:
-                    return self._begin(mission_id, decode(request.payload, Manifest))
-                case ["chunk", number]:
-                    return self._chunk(mission_id, int(number), request)
-                case ["commit"]:
-                    return self._commit(mission_id, decode(request.payload, Commit))
-                case ["part", number]:
-                    return self._part(mission_id, int(number), int(request.parameters.get("revision", "-1")))
+            return self._step(mission_id, step, request)
         except (msgspec.DecodeError, ValueError) as error:
             return Malformed(message=f"{'/'.join(step)}: {error}")
+        except sqlite3.OperationalError as error:
+            return _no("storage", f"the journal cannot be written: {error}")
+
+    def _step(self, mission_id: str, step: list[str], request: Request) -> Message:
+        match step:
+            case ["begin"]:
+                return self._begin(mission_id, decode(request.payload, Manifest))
+            case ["chunk", number]:
+                return self._chunk(mission_id, int(number), request)
+            case ["commit"]:
+                return self._commit(mission_id, decode(request.payload, Commit))
+            case ["part", number]:
+                return self._part(mission_id, int(number), int(request.parameters.get("revision", "-1")))
         return Malformed(message=f"no such step: {'/'.join(step)}")
 
     def _begin(self, mission_id: str, manifest: Manifest) -> Message:

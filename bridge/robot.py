@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,7 +17,7 @@ from bridge.controller import Controller
 from bridge.journal import open_journal
 from bridge.link import Link
 from bridge.protocol import Keys
-from bridge.simulator import SimulatedBase, SimulatedScanner
+from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner
 from mission.events import Pose
 
 
@@ -31,6 +33,8 @@ class RobotOptions:
     at: Pose | None = None
     """Where the simulated robot stands; else where it last stood, or its first mission's start."""
     insecure: bool = False
+    faults: Faults = NO_FAULTS
+    """What the simulated robot is to get wrong."""
 
 
 def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
@@ -51,8 +55,9 @@ def robot_on(link: Link, keys: Keys, options: RobotOptions) -> Iterator[Agent]:
         # A sped-up clock may have run ahead of the wall's: after a reboot it goes on from there.
         wall = WallClock()
         clock = WallClock(speed_up=options.speed_up, origin_ns=max(wall.now_ns(), journal.newest_ns + 1))
-        base = SimulatedBase(clock=clock, keep=options.state / "world.json")
-        scanner = SimulatedScanner(clock=clock, record=options.state / "scans.log")
+        base = SimulatedBase(clock=clock, keep=options.state / "world.json", faults=options.faults)
+        scanner = SimulatedScanner(clock=clock, record=options.state / "scans.log", faults=options.faults)
+        journal.edge = crashing(options.faults)
         if options.at is not None:
             base.stand_at(options.at)
         controller = Controller(
@@ -65,6 +70,18 @@ def robot_on(link: Link, keys: Keys, options: RobotOptions) -> Iterator[Agent]:
         )  # fmt: skip
         with on_link(agent):
             yield agent
+
+
+def crashing(faults: Faults) -> Callable[[str], None]:
+    """What dies at the journal entry that the faults name, as if the power had failed."""
+    seen: Counter[str] = Counter()
+
+    def at_edge(moment: str) -> None:
+        seen[moment] += 1
+        if faults.due("crash" if moment == "commit" else "crashed", seen[moment]):
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    return at_edge
 
 
 def _leave(signum: int, frame: object) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
+from typing import Literal
 
 import msgspec
 
@@ -16,10 +18,12 @@ from bridge.clock import Clock
 from bridge.motion import Brake, Motion, along
 from bridge.robots import Outcome, ScanFailed, ScanResult
 from mission.document import Point, RobotSpec, Scan, Start
+from mission.errors import InputError
 from mission.events import Pose
 
 SLICE_S = 0.5
 """How often a moving robot's place is written down: what a crash can cost."""
+SHAKE_M = 0.005
 POINTS_PER_S = 360_000
 BYTES_PER_POINT = 16
 
@@ -43,11 +47,70 @@ class Wear:
     battery_per_s: float = 1.0 / (6 * 3600)
 
 
+FaultKind = Literal["slip", "blocked", "shaking", "drain", "scanner", "empty", "crash", "crashed"]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something that goes wrong once, at the n-th drive, scan or journal entry of this process."""
+
+    kind: FaultKind
+    at: int
+    amount: float = 0.0
+
+
+FAULTS: dict[FaultKind, str] = {
+    "slip": "drive N ends AMOUNT metres to the left of where it should",
+    "blocked": "drive N meets an obstacle halfway",
+    "shaking": "after drive N the robot shakes for AMOUNT seconds",
+    "drain": "after drive N the battery is at AMOUNT (0 to 1)",
+    "scanner": "scan N fails",
+    "empty": "scan N holds no points",
+    "crash": "the process dies just before journal entry N is stored",
+    "crashed": "the process dies just after journal entry N is stored",
+}
+
+
+def read_fault(text: str) -> Fault:
+    """A fault from KIND@N or KIND@N=AMOUNT, such as `slip@2=0.2`."""
+    kind, _, rest = text.partition("@")
+    at, _, amount = rest.partition("=")
+    try:
+        return Fault(msgspec.convert(kind, FaultKind), int(at), float(amount or 0.0))
+    except (ValueError, msgspec.ValidationError):
+        kinds = ", ".join(FAULTS)
+        raise InputError(f"--fault {text}: write it KIND@N or KIND@N=AMOUNT, KIND of {kinds}") from None
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What is to go wrong."""
+
+    all: tuple[Fault, ...] = ()
+
+    def due(self, kind: FaultKind, at: int) -> Fault | None:
+        return next((fault for fault in self.all if (fault.kind, fault.at) == (kind, at)), None)
+
+
+NO_FAULTS = Faults()
+
+
 class SimulatedBase:
     """A differential drive on an empty floor."""
 
-    def __init__(self, *, clock: Clock, keep: Path | None = None, wear: Wear = Wear(), seed: int = 1) -> None:
+    def __init__(
+        self,
+        *,
+        clock: Clock,
+        keep: Path | None = None,
+        wear: Wear = Wear(),
+        faults: Faults = NO_FAULTS,
+        seed: int = 1,
+    ) -> None:
         self._clock = clock
+        self._faults = faults
+        self._drives = 0
+        self._shakes_until_ns = 0
         self._keep = keep
         self._wear = wear
         self._chance = random.Random(seed)
@@ -67,17 +130,22 @@ class SimulatedBase:
     def goto(
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
     ) -> Outcome:
-        start, _ = self._now()
+        self._drives += 1
         path, heading = self._missed(path, heading)
         motion = along(
-            start, path, heading,
+            self.pose(), path, heading,
             speed=limits.speed, turn_rate=limits.turn_rate, acceleration=limits.acceleration,
         )  # fmt: skip
-        if self._follow(motion, interrupt):
-            return "arrived"
-        pose, speed = self._now()
-        self._follow(Motion(pose, (Brake(pose, speed, limits.acceleration),)), Event())
-        return "interrupted"
+        if self._faults.due("blocked", self._drives):
+            self._follow(motion, interrupt, share=0.5)
+            self._brake(limits.acceleration)
+            return "blocked"
+        if not self._follow(motion, interrupt):
+            self._brake(limits.acceleration)
+            return "interrupted"
+        self._stand(motion.at(motion.duration)[0])
+        self._suffer()
+        return "arrived"
 
     def stop(self) -> None:
         self._stand(self.pose())
@@ -85,6 +153,10 @@ class SimulatedBase:
     def stand_at(self, pose: Pose) -> None:
         """Put the robot there by hand."""
         self._stand(pose)
+
+    def charge(self) -> None:
+        """Fill the battery."""
+        self._world = msgspec.structs.replace(self._world, battery=1.0)
 
     def stand_at_start(self, start: Start) -> None:
         """Put the robot at a mission's start, if nobody ever said where it stands."""
@@ -96,6 +168,11 @@ class SimulatedBase:
         if not path:
             return path, heading
         x, y = path[-1]
+        slip = self._faults.due("slip", self._drives)
+        if slip:
+            before = path[-2] if len(path) > 1 else (self.pose().x, self.pose().y)
+            left = math.atan2(y - before[1], x - before[0]) + math.pi / 2
+            x, y = x + slip.amount * math.cos(left), y + slip.amount * math.sin(left)
         beside = (x + self._error(self._wear.noise_m), y + self._error(self._wear.noise_m))
         turned = None if heading is None else heading + self._error(self._wear.noise_rad)
         return (*path[:-1], beside), turned
@@ -103,25 +180,40 @@ class SimulatedBase:
     def _error(self, deviation: float) -> float:
         return max(-2 * deviation, min(2 * deviation, self._chance.gauss(0.0, deviation)))
 
-    def _follow(self, motion: Motion, interrupt: Event) -> bool:
-        """Let the motion take its time; false if it was interrupted."""
+    def _follow(self, motion: Motion, interrupt: Event, *, share: float = 1.0) -> bool:
+        """Let the motion, or its first share, take its time; false if it was interrupted."""
         self._motion, self._began_ns = motion, self._clock.now_ns()
-        left = motion.duration
-        while left > 0:
+        end_ns = self._began_ns + round(motion.duration * share * 1e9)
+        while (left := (end_ns - self._clock.now_ns()) / 1e9) > 0:
             if self._clock.wait(min(left, SLICE_S), interrupt):
                 return False
             self._remember(self._now()[0], self._wear.battery_per_s * SLICE_S)
-            left = motion.duration - (self._clock.now_ns() - self._began_ns) / 1e9
-        self._stand(motion.at(motion.duration)[0])
         return True
+
+    def _brake(self, deceleration: float) -> None:
+        pose, speed = self._now()
+        braking = Motion(pose, (Brake(pose, speed, deceleration),))
+        self._follow(braking, Event())
+        self._stand(braking.at(braking.duration)[0])
+
+    def _suffer(self) -> None:
+        """What befalls the robot once it has arrived."""
+        drain, shaking = self._faults.due("drain", self._drives), self._faults.due("shaking", self._drives)
+        if drain:
+            self._world = msgspec.structs.replace(self._world, battery=drain.amount)
+        if shaking:
+            self._shakes_until_ns = self._clock.now_ns() + round(shaking.amount * 1e9)
 
     def _stand(self, pose: Pose) -> None:
         self._motion, self._began_ns = Motion(pose), self._clock.now_ns()
         self._remember(pose, 0.0)
 
     def _now(self) -> tuple[Pose, float]:
-        motion = self._motion
-        return motion.at((self._clock.now_ns() - self._began_ns) / 1e9)
+        motion, now_ns = self._motion, self._clock.now_ns()
+        pose, speed = motion.at((now_ns - self._began_ns) / 1e9)
+        if now_ns < self._shakes_until_ns:
+            pose = msgspec.structs.replace(pose, x=pose.x + SHAKE_M * math.sin(now_ns / 1e8))
+        return pose, speed
 
     def _remember(self, pose: Pose, used: float) -> None:
         battery = max(0.0, self._world.battery - used)
@@ -135,18 +227,24 @@ class SimulatedScanner:
 
     profiles: tuple[str, ...] | None = None
 
-    def __init__(self, *, clock: Clock, record: Path | None = None) -> None:
+    def __init__(self, *, clock: Clock, record: Path | None = None, faults: Faults = NO_FAULTS) -> None:
         self._clock = clock
         self._record = record
+        self._faults = faults
+        self._scans = 0
 
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
+        self._scans += 1
         self._note(f"begin {label}")
         if self._clock.wait(min(scan.duration_s, scan.timeout_s), interrupt):
             return ScanFailed(reason="interrupted")
         if scan.duration_s > scan.timeout_s:
             return ScanFailed(reason=f"no result within {scan.timeout_s:g} s")
+        if self._faults.due("scanner", self._scans):
+            return ScanFailed(reason="the scanner reported an error")
         self._note(f"end {label}")
-        points = round(POINTS_PER_S * max(scan.duration_s, 0.1))
+        empty = self._faults.due("empty", self._scans)
+        points = 0 if empty else round(POINTS_PER_S * max(scan.duration_s, 0.1))
         digest = hashlib.sha256(label.encode()).hexdigest()
         return ScanResult(file=f"{label}.e57", size=points * BYTES_PER_POINT, sha256=digest, points=points)
 

@@ -17,7 +17,7 @@ from bridge.inbox import Inbox
 from bridge.journal import Journal, memory_journal
 from bridge.link import MemoryLink, Switchboard
 from bridge.protocol import Answer, Command, Keys, Verb
-from bridge.simulator import SimulatedBase, SimulatedScanner, Wear
+from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
 from bridge.station import Station
 from mission.document import (
     Frame,
@@ -74,13 +74,14 @@ class Field:
     clock: SimulatedClock = field(default_factory=SimulatedClock)
     wear: Wear = EXACT
     keep: Path | None = None
+    faults: Faults = NO_FAULTS
     ids: Any = field(default_factory=count)
 
     def __post_init__(self) -> None:
         self.board = Switchboard()
         self.keys = Keys("r1")
-        self.base = SimulatedBase(clock=self.clock, wear=self.wear, keep=self.keep)
-        self.scanner = SimulatedScanner(clock=self.clock)
+        self.base = SimulatedBase(clock=self.clock, wear=self.wear, keep=self.keep, faults=self.faults)
+        self.scanner = SimulatedScanner(clock=self.clock, faults=self.faults)
         self.boot()
 
     def boot(self) -> None:
