@@ -121,9 +121,10 @@ DROP_REASONS = (
     "closer than the edge distance to a floor edge",
     "not reachable by the robot",
     "in another part of the floor",
+    "in a circle to avoid",
 )
 """Why a candidate was dropped; `Candidates.reason` holds indices into this."""
-KEPT, OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, UNREACHABLE, OTHER_PART = range(len(DROP_REASONS))
+KEPT, OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, UNREACHABLE, OTHER_PART, AVOIDED = range(len(DROP_REASONS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,11 +145,28 @@ class Candidates:
     """The part this plan is of."""
     part_area: tuple[float, ...] = ()
     """Free area of each part, m²."""
+    doorway: BoolArray = field(default_factory=lambda: frozen([], np.bool_))
+    """Whether each candidate stands in a doorway (n,); empty where none does."""
+    must: BoolArray = field(default_factory=lambda: frozen([], np.bool_))
+    """Whether a stop must be at each candidate (n,); empty where none must."""
 
     @cached_property
     def kept(self) -> IntArray:
         """Indices of the reachable candidates."""
         return frozen(np.flatnonzero(self.reason == KEPT), np.int64)
+
+    @cached_property
+    def doorway_rows(self) -> IntArray:
+        """Rows (indices into `kept`) of the candidates in doorways."""
+        return self._rows_where(self.doorway)
+
+    @cached_property
+    def must_rows(self) -> IntArray:
+        """Rows (indices into `kept`) of the candidates where a stop must be."""
+        return self._rows_where(self.must)
+
+    def _rows_where(self, flag: BoolArray) -> IntArray:
+        return frozen(np.flatnonzero(flag[self.kept]) if len(flag) else [], np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,6 +302,7 @@ class Unreached:
 
 __all__ = [
     "AT_EDGE",
+    "AVOIDED",
     "DROP_REASONS",
     "IN_HOLE",
     "KEPT",

@@ -45,6 +45,18 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     start: tuple[float, float, float] | None = None
     """x, y in metres and heading in degrees counter-clockwise from +x."""
     end: tuple[float, float] | None = None
+    use: tuple[tuple[float, float], ...] = ()
+    """Places where a stop must be."""
+    avoid: tuple[tuple[float, float, float], ...] = ()
+    """Circles x, y, radius in which no stop may be."""
+    door_scan: bool = False
+    """Whether a stop is added in every doorway that is driven through, to help registration."""
+    door_candidates: bool = False
+    """Whether doorways are candidates."""
+    node_limit: int = 20_000
+    """Branch-and-bound nodes of the exact selector, after which it reports its gap."""
+    time_limit: float | None = None
+    """Seconds after which the exact selector stops; makes a plan depend on the machine's speed."""
     origin: tuple[float, float, float, float] | None = None
     """Latitude, longitude, altitude of the drawing's origin, and the bearing of its +y axis."""
     seed: int = 1
@@ -79,7 +91,8 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 SECTIONS: dict[str, tuple[str, ...]] = {
     "plan": (
         *("candidates", "visibility", "selector", "router", "coverage", "d_sec", "d_dis", "grid"),
-        *("door_access", "edge", "doors", "targets", "tour", "start", "end", "origin", "seed"),
+        *("door_access", "edge", "doors", "targets", "tour", "start", "end", "use", "avoid"),
+        *("door_scan", "door_candidates", "node_limit", "time_limit", "origin", "seed"),
     ),
     "robot": ("robot_radius", "speed", "turn_rate", "acceleration"),
     "scanner": ("range", "profile", "settle", "scan_time"),
@@ -90,11 +103,14 @@ SECTIONS: dict[str, tuple[str, ...]] = {
 _POSITIVE = (
     *("d_dis", "grid", "door_access", "robot_radius", "speed", "turn_rate"),
     "acceleration",
+    "time_limit",
     "range",
     "tolerance",
 )
-_NOT_NEGATIVE = ("d_sec", "edge", "settle", "scan_time", "retries", "link_loss_after", "seed")
-_LIMIT = 1e6
+_NOT_NEGATIVE = ("d_sec", "edge", "settle", "scan_time", "retries", "link_loss_after", "seed", "node_limit")
+_LARGEST = 1e6
+_FARTHEST = 1e9
+"""Coordinates of a site may be this large, in metres."""
 
 
 def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
@@ -145,9 +161,11 @@ def _home_of(key: str, table: str) -> str:
 def check_settings(settings: Settings) -> None:
     """Refuse values that no plan can be made with, naming key and value."""
     for key in settings.__struct_fields__:
-        for number in _numbers(getattr(settings, key)):
-            if not math.isfinite(number) or abs(number) > _LIMIT:
-                raise InputError(f"{key} = {number}: must be a finite number below {_LIMIT:g}")
+        value = getattr(settings, key)
+        limit = _FARTHEST if isinstance(value, tuple) else _LARGEST
+        for number in _numbers(value):
+            if not math.isfinite(number) or abs(number) > limit:
+                raise InputError(f"{key} = {number}: must be a finite number below {limit:g}")
     for key in _POSITIVE:
         value = getattr(settings, key)
         if value is not None and value <= 0:
@@ -160,8 +178,10 @@ def check_settings(settings: Settings) -> None:
 
 
 def _numbers(value: object) -> list[float]:
-    values = value if isinstance(value, tuple) else (value,)
-    return [item for item in values if isinstance(item, int | float) and not isinstance(item, bool)]
+    """All numbers in a value, however deep."""
+    if isinstance(value, tuple):
+        return [number for item in value for number in _numbers(item)]
+    return [value] if isinstance(value, int | float) and not isinstance(value, bool) else []
 
 
 def _check_shares(settings: Settings) -> None:
@@ -202,4 +222,6 @@ def settings_toml(settings: Settings) -> str:
 def _toml(value: object) -> str:
     if isinstance(value, tuple):
         return "[" + ", ".join(_toml(item) for item in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
     return f'"{value}"' if isinstance(value, str) else repr(value)

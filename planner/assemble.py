@@ -96,6 +96,7 @@ def _robot(settings: Settings) -> RobotSpec:
 def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
     visibility = route.selection.visibility
     rows = route.selection.chosen[route.order]
+    doorways = set(visibility.candidates.doorway_rows.tolist())
     seen = np.zeros(visibility.targets.total, dtype=bool)
     width = max(2, len(str(len(rows))))
     stops = []
@@ -106,7 +107,8 @@ def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
         seen[units] = True
         heading = _arrival_heading(approach, heading)
         sees = Sees(units=len(units), new_units=new)
-        stops.append(_stop(f"s{number:0{width}d}", approach, heading, sees, settings))
+        name, doorway = f"s{number:0{width}d}", int(row) in doorways
+        stops.append(_stop(name, approach, heading, sees, settings, doorway=doorway))
     return tuple(stops)
 
 
@@ -118,14 +120,16 @@ def _arrival_heading(approach: FloatArray, before: float) -> float:
     return _rounded(math.atan2(step[1], step[0]))
 
 
-def _stop(name: str, approach: FloatArray, heading: float, sees: Sees, settings: Settings) -> Stop:
+def _stop(
+    name: str, approach: FloatArray, heading: float, sees: Sees, settings: Settings, *, doorway: bool
+) -> Stop:
     line = _line(approach)
     return Stop(
         id=name,
         x=line[-1][0],
         y=line[-1][1],
         heading=heading,
-        doorway=False,
+        doorway=doorway,
         tolerance_m=settings.tolerance,
         settle_s=settings.settle,
         scan=Scan(

@@ -53,7 +53,11 @@ def plan_command(
     ] = None,
     candidates: Annotated[str | None, typer.Option(help="grid, or module:function")] = None,
     visibility: Annotated[str | None, typer.Option(help="exact")] = None,
-    selector: Annotated[str | None, typer.Option(help="default or greedy")] = None,
+    selector: Annotated[str | None, typer.Option(help="default, greedy, or exact")] = None,
+    node_limit: Annotated[int | None, typer.Option(help="Nodes of the exact selector's search.")] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(help="Seconds of that search; plans then depend on the machine.")
+    ] = None,
     router: Annotated[str | None, typer.Option(help="default")] = None,
     range_: Annotated[float | None, typer.Option("--range", help="Scanner's range, m.")] = None,
     coverage: Annotated[float | None, typer.Option(help="Share of the visible units to be seen.")] = None,
@@ -63,6 +67,14 @@ def plan_command(
     door_access: Annotated[float | None, typer.Option(help="Least clear width of an opening, m.")] = None,
     edge: Annotated[float | None, typer.Option(help="Stops and legs to floor edges, m.")] = None,
     doors: Annotated[str | None, typer.Option(help="open or closed, for the laser")] = None,
+    door_scan: Annotated[
+        bool | None, typer.Option("--door-scan", help="Add a stop in every doorway driven through.")
+    ] = None,
+    door_candidates: Annotated[
+        bool | None, typer.Option("--door-candidates", help="Offer doorways as candidates.")
+    ] = None,
+    use: Annotated[list[str] | None, typer.Option(help="X,Y of a stop that must be; repeatable.")] = None,
+    avoid: Annotated[list[str] | None, typer.Option(help="X,Y,RADIUS without stops; repeatable.")] = None,
     targets: Annotated[str | None, typer.Option(help="Kinds to scan, such as walls,columns.")] = None,
     tour: Annotated[str | None, typer.Option(help="closed or open")] = None,
     start: Annotated[str | None, typer.Option(help="X,Y,HEADING in m and degrees.")] = None,
@@ -84,6 +96,8 @@ def plan_command(
     given = {key.rstrip("_"): value for key, value in options.items() if key not in NOT_SETTINGS}
     for key in ("start", "end", "origin"):
         given[key] = None if given[key] is None else numbers(given[key])
+    for key in ("use", "avoid"):
+        given[key] = tuple(numbers(text) for text in given[key]) if given[key] else None
     given["targets"] = None if targets is None else tuple(kind.strip() for kind in targets.split(","))
     settings = read_settings(parameters, given)
     if print_config:

@@ -39,6 +39,8 @@ class Parts:
                 shapely.points(xy), predicate="dwithin", distance=GRID
             )
             found[point] = self.part[piece]
+        for way, part in zip(self.gaps, self.gap_part, strict=True):
+            found[shapely.dwithin(shapely.LineString(way), shapely.points(xy), GRID)] = part
         return found
 
     def touching(self, line: BaseGeometry) -> set[int]:

@@ -26,8 +26,10 @@ from mission.planning import (
     NavigableSpace,
 )
 from planner.candidates.fallback import best_point
+from planner.candidates.given import doorways, places_to_use
 from planner.candidates.grid import grid
 from planner.candidates.place import Place
+from planner.candidates.proposals import Proposals, joined
 from planner.connected import Parts, parts_of
 from planner.shapes import local_origin, to_shape
 
@@ -41,17 +43,15 @@ def candidates(space: NavigableSpace, *, part: int | None = None) -> Candidates:
     `part` counts from the largest; None takes the part that holds the start, else the largest that
     has candidates and a room.
     """
-    name = space.settings.candidates
-    xy, room = strategy(name)(space)
     place = Place(space)
-    reason = place.reasons(xy, room)
-    extra = [
-        (k, point) for k in _empty_rooms(space, room, reason) if (point := best_point(place, k)) is not None
-    ]
-    xy = np.concatenate([xy.reshape(-1, 2), np.array([p for _, p in extra]).reshape(-1, 2)])
-    room = np.concatenate([room, np.array([k for k, _ in extra], dtype=np.int64)])
-    reason = np.concatenate([reason, np.full(len(extra), KEPT)])
-    return _of_part(space, xy, room, reason, part, name)
+    found = _from_strategy(place)
+    proposals = joined([places_to_use(place), found, _for_empty_rooms(place, found), doorways(space)])
+    return _of_part(space, proposals, part)
+
+
+def _from_strategy(place: Place) -> Proposals:
+    xy, room = strategy(place.space.settings.candidates)(place.space)
+    return Proposals.of(xy, room, place.reasons(xy, room))
 
 
 def strategy(name: str) -> Strategy:
@@ -68,14 +68,16 @@ def strategy(name: str) -> Strategy:
     return found
 
 
-def _empty_rooms(space: NavigableSpace, room: IntArray, reason: IntArray) -> list[int]:
-    kept = set(room[reason == KEPT].tolist())
-    return [k for k in range(len(space.rooms)) if k not in kept]
+def _for_empty_rooms(place: Place, found: Proposals) -> Proposals:
+    """The best point of every room that the strategy left without a candidate."""
+    kept = set(found.room[found.reason == KEPT].tolist())
+    empty = [k for k in range(len(place.space.rooms)) if k not in kept]
+    best = [(k, point) for k in empty if (point := best_point(place, k)) is not None]
+    return Proposals.of([point for _, point in best], [k for k, _ in best])
 
 
-def _of_part(
-    space: NavigableSpace, xy: FloatArray, room: IntArray, reason: IntArray, part: int | None, name: str
-) -> Candidates:
+def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> Candidates:
+    xy, reason = proposals.xy, proposals.reason
     origin = local_origin(space.floor)
     parts = parts_of(to_shape(space.drive_area, origin), space.gaps - origin)
     at = np.where(reason == KEPT, parts.part_at(xy - origin), -1)
@@ -83,17 +85,28 @@ def _of_part(
     if not np.any(at >= 0):
         raise AnswerIsNo(_no_candidate(space, reason))
     chosen = _chosen_part(space, parts, at, part)
+    _check_used(space, proposals, at, chosen)
     reason = np.where((reason == KEPT) & (at != chosen), OTHER_PART, reason)
     return Candidates(
         space=space,
         xy=frozen(xy),
-        room=frozen(room, np.int64),
+        room=frozen(proposals.room, np.int64),
         reason=frozen(reason, np.int64),
         part=frozen(at, np.int64),
-        strategy=name,
+        strategy=space.settings.candidates,
         chosen_part=chosen,
         part_area=parts.areas,
+        doorway=frozen(proposals.doorway, np.bool_),
+        must=frozen(proposals.must, np.bool_),
     )
+
+
+def _check_used(space: NavigableSpace, proposals: Proposals, at: IntArray, chosen: int) -> None:
+    """Refuse stops asked for that the robot of this plan does not get to."""
+    for x, y in proposals.xy[proposals.must & (at != chosen)]:
+        raise AnswerIsNo(
+            f"use = {x:g},{y:g}: the robot does not get there from the planned part of the floor"
+        )
 
 
 def _chosen_part(space: NavigableSpace, parts: Parts, at: IntArray, part: int | None) -> int:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from mission.geometry import FloatArray, IntArray
-from mission.planning import AT_EDGE, IN_HOLE, KEPT, OUTSIDE, TOO_CLOSE, NavigableSpace
+from mission.geometry import BoolArray, FloatArray, IntArray
+from mission.planning import AT_EDGE, AVOIDED, IN_HOLE, KEPT, OUTSIDE, TOO_CLOSE, NavigableSpace
 from planner.shapes import SLACK, local_origin, segments_of, to_shape
 
 
@@ -43,8 +43,22 @@ class Place:
         )
         off_edge = self.to_edge(local) >= self.space.settings.edge - SLACK
         return np.select(
-            [~in_room, ~on_floor, ~clear, ~off_edge], [OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE], KEPT
+            [~in_room, ~on_floor, ~clear, ~off_edge, self.avoided(local + self.origin)],
+            [OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, AVOIDED],
+            KEPT,
         ).astype(np.int64)
+
+    def avoided(self, xy: FloatArray) -> BoolArray:
+        """Whether each point (n, 2) lies in a circle that the user wants no stop in."""
+        inside = np.zeros(len(xy), dtype=bool)
+        for x, y, radius in self.space.settings.avoid:
+            inside |= np.hypot(xy[:, 0] - x, xy[:, 1] - y) <= radius
+        return inside
+
+    def room_at(self, xy: FloatArray) -> int:
+        """The room nearest a point, by the order of rooms where several are."""
+        point = shapely.Point(xy - self.origin)
+        return int(np.argmin([room.distance(point) for room in self.rooms]))
 
     def to_element(self, local: FloatArray) -> FloatArray:
         """Distance of each local point (n, 2) to the nearest element's outline."""

@@ -1,6 +1,7 @@
 """Visibility -> selection: as few candidates as see the required share of what is visible.
 
-A method is a function `(cover, bound) -> rows`, where no selection has fewer rows than `bound`.
+A method is a function `(cover, bound, settings) -> (rows, bound)`: rows that cover what is needed, and a
+number of rows that none goes below, at least as good as the one it is given.
 """
 
 from __future__ import annotations
@@ -9,49 +10,99 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mission.errors import InputError
+from mission.errors import AnswerIsNo, InputError
 from mission.geometry import FloatArray, IntArray, frozen
 from mission.planning import Selection, Visibility
+from mission.settings import Settings
 from planner.selection.bound import relaxation_bound
 from planner.selection.cover import Cover, cover_of
+from planner.selection.exact import exact
 from planner.selection.greedy import greedy, in_greedy_order
 from planner.selection.improve import improved
 
-Method = Callable[[Cover, int], IntArray]
+Method = Callable[[Cover, int, Settings], tuple[IntArray, int]]
 
 
-def _greedy(cover: Cover, bound: int) -> IntArray:
-    return greedy(cover)
+def _greedy(cover: Cover, bound: int, settings: Settings) -> tuple[IntArray, int]:
+    return greedy(cover), bound
 
 
-def _default(cover: Cover, bound: int) -> IntArray:
-    return improved(cover, greedy(cover), at_least=bound)
+def _default(cover: Cover, bound: int, settings: Settings) -> tuple[IntArray, int]:
+    return improved(cover, greedy(cover), at_least=bound), bound
 
 
-METHODS: dict[str, Method] = {"default": _default, "greedy": _greedy}
-NAMES = {"default": "greedy, drop-and-repair", "greedy": "greedy"}
+def _exact(cover: Cover, bound: int, settings: Settings) -> tuple[IntArray, int]:
+    start = improved(cover, greedy(cover), at_least=bound)
+    if len(start) <= bound:
+        return start, bound
+    rows, proved = exact(cover, start, settings=settings)
+    return rows, max(bound, proved)
+
+
+METHODS: dict[str, Method] = {"default": _default, "greedy": _greedy, "exact": _exact}
+NAMES = {
+    "default": "greedy, drop-and-repair",
+    "greedy": "greedy",
+    "exact": "greedy, drop-and-repair, branch and bound",
+}
 
 
 def select(visibility: Visibility) -> Selection:
-    """Choose stops by the method named in the settings, and say how few there could be at best."""
-    settings = visibility.candidates.space.settings
+    """Choose stops by the method named in the settings, and say how few there could be at best.
+
+    Stops that must be used are chosen first and count; doorways added for registration come last.
+    """
+    candidates = visibility.candidates
+    settings = candidates.space.settings
     if settings.selector not in METHODS:
         raise InputError(f"selector = {settings.selector}: unknown; known: {', '.join(METHODS)}")
-    cover = cover_of(visibility, required=settings.coverage)
-    bound = relaxation_bound(cover)
-    rows = in_greedy_order(cover, METHODS[settings.selector](cover, bound))
+    whole = cover_of(visibility, required=settings.coverage)
+    must = candidates.must_rows
+    offered = np.arange(whole.rows)
+    if not settings.door_candidates:
+        offered = np.setdiff1d(offered, candidates.doorway_rows)
+    problem = whole.after(must).offering(offered)
+    rows, bound = METHODS[settings.selector](problem, relaxation_bound(problem), settings)
+    chosen = np.concatenate([must, in_greedy_order(problem, rows)]).astype(np.int64)
+    if not settings.door_scan:
+        return _selection(visibility, whole, chosen, len(must) + bound)
+    fixed = np.union1d(must, candidates.doorway_rows)
+    left = relaxation_bound(whole.after(fixed).offering(offered))
+    return _selection(visibility, whole, _with(chosen, fixed), len(fixed) + left)
+
+
+def _with(chosen: IntArray, fixed: IntArray) -> IntArray:
+    """The chosen rows, then those of `fixed` that are not among them."""
+    return np.concatenate([chosen, np.setdiff1d(fixed, chosen)])
+
+
+def _selection(visibility: Visibility, whole: Cover, chosen: IntArray, bound: int) -> Selection:
+    settings = visibility.candidates.space.settings
+    steps = _coverage_steps(whole, chosen)
+    if whole.units(whole.covered_by(chosen)) < whole.needed:
+        name, reached = visibility.candidates.space.floor.name, steps[-1] if len(steps) else 0.0
+        raise AnswerIsNo(
+            f"{name}: coverage {reached:.3f} is reached, not {settings.coverage:g}; "
+            "lower --coverage or offer more candidates"
+        )
+    proved = ", proved fewest" if len(chosen) == bound else ""
     return Selection(
         visibility=visibility,
-        chosen=frozen(rows, np.int64),
-        coverage_steps=frozen(_coverage_steps(cover, rows)),
+        chosen=frozen(chosen, np.int64),
+        coverage_steps=frozen(steps),
         required=settings.coverage,
         bound=bound,
-        method=NAMES[settings.selector],
+        method=NAMES[settings.selector] + proved,
     )
 
 
 def _coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
-    return np.array([cover.units(cover.covered_by(rows[: k + 1])) / cover.total for k in range(len(rows))])
+    """Coverage after each row."""
+    counted, steps = np.zeros(len(cover.weight), dtype=np.int64), []
+    for row in rows:
+        counted[cover.columns_of(int(row))] += 1
+        steps.append(cover.units(counted) / cover.total)
+    return np.array(steps)
 
 
 __all__ = ["METHODS", "Method", "select"]

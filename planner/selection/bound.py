@@ -27,7 +27,7 @@ def relaxation_bound(cover: Cover) -> int:
     duality; the solver's prices are made feasible and the bound is computed from them.
     """
     simple = counting_bound(cover)
-    if cover.sees.nnz > LARGEST:
+    if cover.needed == 0 or cover.sees.nnz > LARGEST:
         return simple
     prices = _relaxation_prices(cover)
     return simple if prices is None else max(simple, int(np.ceil(_dual_value(cover, *prices) - 1e-6)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from mission.geometry import FloatArray, IntArray
 from mission.planning import Visibility
@@ -46,6 +46,24 @@ class Cover:
         """Units in the columns that are covered at least once."""
         return int(self.weight[covered > 0].sum())
 
+    def after(self, rows: IntArray) -> Cover:
+        """What is left to cover once `rows` are chosen; row numbers stay."""
+        if not len(rows):
+            return self
+        left = self.covered_by(rows) == 0
+        needed = max(0, self.needed - int(self.weight[~left].sum()))
+        return Cover(_sorted(self.sees[:, np.flatnonzero(left)]), self.weight[left], needed)
+
+    def offering(self, rows: IntArray) -> Cover:
+        """The same, where only `rows` can be chosen: the others see nothing."""
+        if len(rows) == self.rows:
+            return self
+        offered = np.zeros(self.rows)
+        offered[rows] = 1
+        sees = _sorted((diags_array(offered) @ self.sees).tocsr().astype(np.int64))
+        sees.eliminate_zeros()
+        return Cover(sees, self.weight, self.needed)
+
 
 def cover_of(visibility: Visibility, *, required: float) -> Cover:
     """Merge equal columns, without loss: within a run's ends nothing changes, then equal sets join."""
@@ -63,9 +81,14 @@ def cover_of(visibility: Visibility, *, required: float) -> Cover:
     seen = group >= 0
     first = np.unique(group[seen], return_index=True)[1]
     weight = np.bincount(group[seen], weights=length[seen], minlength=len(groups)).astype(np.int64)
-    merged = sees[:, np.flatnonzero(seen)[first]].tocsr()
-    merged.sort_indices()
+    merged = _sorted(sees[:, np.flatnonzero(seen)[first]])
     return Cover(merged, weight, needed_units(int(weight.sum()), required=required))
+
+
+def _sorted(matrix: csr_array) -> csr_array:
+    matrix = matrix.tocsr()
+    matrix.sort_indices()
+    return matrix
 
 
 def needed_units(total: int, *, required: float) -> int:

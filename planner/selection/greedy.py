@@ -9,11 +9,14 @@ from planner.selection.cover import Cover
 
 
 def greedy(cover: Cover) -> IntArray:
-    """Rows in the order they are chosen, until the needed units are covered; ties go to the lower row."""
+    """Rows in the order they are chosen, until enough is covered; ties go to the lower row."""
     covered = np.zeros(len(cover.weight), dtype=np.int64)
     chosen: list[int] = []
     while cover.units(covered) < cover.needed:
-        best = int(np.argmax(cover.gains(covered)))
+        gains = cover.gains(covered)
+        best = int(np.argmax(gains))
+        if gains[best] <= 0:
+            break  # the rows offered do not see enough
         chosen.append(best)
         covered[cover.columns_of(best)] += 1
     return np.array(chosen, dtype=np.int64)

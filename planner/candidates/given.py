@@ -1,0 +1,50 @@
+"""Positions that do not come from a strategy: doorways, and places the user asks for."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from mission.errors import AnswerIsNo
+from mission.geometry import FloatArray
+from mission.planning import DROP_REASONS, KEPT, NavigableSpace, OpeningState
+from planner.candidates.place import Place
+from planner.candidates.proposals import Proposals
+from planner.shapes import local_origin, to_shape
+
+
+def doorways(space: NavigableSpace) -> Proposals:
+    """The middle of every opening the robot drives through, where doorways are asked for."""
+    settings = space.settings
+    if not (settings.door_scan or settings.door_candidates):
+        return Proposals.of(np.empty((0, 2)), [])
+    index = {item.room: k for k, item in enumerate(space.rooms) if item.room is not None}
+    obstacles = to_shape(space.obstacles, local_origin(space.floor))
+    passable = [item for item in space.openings if item.passable]
+    rooms = [next((index[k] for k in item.rooms if k is not None), 0) for item in passable]
+    return Proposals.of([_middle(space, item, obstacles) for item in passable], rooms, doorway=True)
+
+
+def _middle(space: NavigableSpace, state: OpeningState, obstacles: shapely.Geometry) -> FloatArray:
+    """The middle of the opening's clear piece, in the drawing's coordinates."""
+    origin = local_origin(space.floor)
+    pieces = shapely.get_parts(shapely.LineString(state.opening.line - origin).difference(obstacles))
+    widest = max(pieces, key=lambda piece: piece.length)
+    return shapely.get_coordinates(widest)[[0, -1]].mean(axis=0) + origin
+
+
+def places_to_use(place: Place) -> Proposals:
+    """The user's own stops.
+
+    Raises
+    ------
+    AnswerIsNo
+        Where no stop may be, naming the place and the reason.
+    """
+    points = np.array(place.space.settings.use, dtype=np.float64).reshape(-1, 2)
+    rooms = [place.room_at(point) for point in points]
+    for point, room in zip(points, rooms, strict=True):
+        reason = int(place.reasons(point[None], np.array([room]))[0])
+        if reason != KEPT:
+            raise AnswerIsNo(f"use = {point[0]:g},{point[1]:g}: no stop may be there, {DROP_REASONS[reason]}")
+    return Proposals.of(points, rooms, must=True)

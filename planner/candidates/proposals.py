@@ -1,0 +1,55 @@
+"""Proposed scan positions before it is known which of them can be reached."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mission.geometry import BoolArray, FloatArray, IntArray
+from mission.planning import KEPT
+
+
+@dataclass(frozen=True, eq=False)
+class Proposals:
+    """Positions (n, 2) in the drawing's metres, each with its room and what is known of it."""
+
+    xy: FloatArray
+    room: IntArray
+    reason: IntArray
+    doorway: BoolArray
+    must: BoolArray
+    """Positions where a stop must be."""
+
+    @classmethod
+    def of(
+        cls,
+        xy: Sequence[FloatArray] | FloatArray,
+        room: Sequence[int] | IntArray,
+        reason: Sequence[int] | IntArray | None = None,
+        *,
+        doorway: bool = False,
+        must: bool = False,
+    ) -> Proposals:
+        """Proposals of one kind; without reasons all are kept."""
+        rooms = np.asarray(room, dtype=np.int64)
+        n = len(rooms)
+        return cls(
+            xy=np.asarray(xy, dtype=np.float64).reshape(-1, 2),
+            room=rooms,
+            reason=np.full(n, KEPT) if reason is None else np.asarray(reason, dtype=np.int64),
+            doorway=np.full(n, doorway),
+            must=np.full(n, must),
+        )
+
+
+def joined(proposals: Sequence[Proposals]) -> Proposals:
+    """All proposals in one, in their order."""
+    return Proposals(
+        xy=np.concatenate([item.xy for item in proposals]),
+        room=np.concatenate([item.room for item in proposals]),
+        reason=np.concatenate([item.reason for item in proposals]),
+        doorway=np.concatenate([item.doorway for item in proposals]),
+        must=np.concatenate([item.must for item in proposals]),
+    )

@@ -1,0 +1,80 @@
+"""Exact selection: the covering problem as a mixed integer programme, solved by HiGHS, with its bound."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array, eye_array, hstack, vstack
+
+from mission.geometry import IntArray
+from mission.settings import Settings
+from planner.selection.cover import Cover
+
+WHOLE = 1e-6
+"""The solver's bound may exceed the truth by its tolerance; this much is taken off before rounding up."""
+
+
+def exact(cover: Cover, start: IntArray, *, settings: Settings) -> tuple[IntArray, int]:
+    """Fewest rows that cover the needed units, and a lower bound on their number.
+
+    min Σ x_i, y_j <= Σ x_i that see j, Σ w_j y_j >= needed; x whole, y continuous in [0, 1]. The search
+    begins at the rows `start`, runs on one thread and ends at a node limit, so that it repeats; where
+    it does not close, the bound stays below the number of rows found.
+    """
+    import highspy
+
+    solver = highspy.Highs()
+    for option, value in _options(settings).items():
+        solver.setOptionValue(option, value)
+    solver.passModel(_model(cover))
+    first = highspy.HighsSolution()
+    first.col_value = _as_solution(cover, start)
+    solver.setSolution(first)
+    solver.run()
+    bound = math.ceil(solver.getInfo().mip_dual_bound - WHOLE)
+    values = np.array(solver.getSolution().col_value[: cover.rows])
+    rows = np.flatnonzero(values > 0.5) if len(values) == cover.rows else start
+    covered = cover.units(cover.covered_by(rows)) >= cover.needed
+    return (rows if covered and len(rows) < len(start) else start), max(0, min(bound, len(start)))
+
+
+def _options(settings: Settings) -> dict[str, Any]:
+    options: dict[str, Any] = {
+        "output_flag": False,
+        "threads": 1,
+        "random_seed": settings.seed,
+        "mip_max_nodes": settings.node_limit,
+        "mip_abs_gap": 1.0 - 1e-3,  # the objective is a whole number: a gap below 1 is closed
+        "mip_rel_gap": 0.0,
+    }
+    if settings.time_limit is not None:
+        options["time_limit"] = settings.time_limit
+    return options
+
+
+def _model(cover: Cover) -> Any:
+    """The programme in HiGHS's form: columns x then y, rows the coverings then the demand."""
+    import highspy
+
+    rows, columns = cover.rows, len(cover.weight)
+    demand = csr_array(np.concatenate([np.zeros(rows), cover.weight.astype(float)])[None, :])
+    matrix = vstack([hstack([cover.sees.T, -eye_array(columns)]), demand], format="csc")
+    model = highspy.HighsLp()
+    model.num_col_, model.num_row_ = rows + columns, columns + 1
+    model.col_cost_ = np.concatenate([np.ones(rows), np.zeros(columns)])
+    model.col_lower_, model.col_upper_ = np.zeros(rows + columns), np.ones(rows + columns)
+    model.row_lower_ = np.concatenate([np.zeros(columns), [float(cover.needed)]])
+    model.row_upper_ = np.full(columns + 1, highspy.kHighsInf)
+    model.a_matrix_.format_ = highspy.MatrixFormat.kColwise
+    model.a_matrix_.start_, model.a_matrix_.index_ = matrix.indptr, matrix.indices
+    model.a_matrix_.value_ = matrix.data.astype(float)
+    model.integrality_ = [highspy.HighsVarType.kInteger] * rows + [highspy.HighsVarType.kContinuous] * columns
+    return model
+
+
+def _as_solution(cover: Cover, chosen: IntArray) -> list[float]:
+    x = np.zeros(cover.rows)
+    x[chosen] = 1.0
+    return [*x.tolist(), *(cover.covered_by(chosen) > 0).astype(float).tolist()]
