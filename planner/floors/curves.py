@@ -39,10 +39,13 @@ class Fineness:
         by_chord = abs(angle) * radius / self.chord
         bent = max(-1.0, 1.0 - self.sagitta / radius) if radius > 0 else -1.0
         by_sagitta = abs(angle) / (2.0 * math.acos(bent))
-        count = math.ceil(max(by_chord, by_sagitta, 1.0) - 1e-9)
-        if count > _MOST_CHORDS:
-            raise ValueError(f"radius {radius:g} is no building's")
-        return count
+        return _checked(math.ceil(max(by_chord, by_sagitta, 1.0) - 1e-9), radius)
+
+
+def _checked(count: int, radius: float) -> int:
+    if count > _MOST_CHORDS:
+        raise ValueError(f"radius {radius:g} is no building's")
+    return count
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +75,11 @@ def _line(entity: Line, fineness: Fineness) -> Iterator[Curve]:
 
 
 def _circle(entity: Circle, fineness: Fineness) -> Iterator[Curve]:
-    radius = abs(float(entity.dxf.radius))
+    points = _disc(entity.dxf.center, abs(float(entity.dxf.radius)), fineness)
+    yield Curve(_in_world(entity.ocs(), points), closed=True)
+
+
+def _disc(center: Vec3, radius: float, fineness: Fineness) -> FloatArray:
     if fineness.outside:
         count = circle_count(radius, chord=fineness.chord)
         reach, phase = radius / math.cos(math.pi / count), math.pi / count
@@ -80,17 +87,19 @@ def _circle(entity: Circle, fineness: Fineness) -> Iterator[Curve]:
         count = max(8, fineness.chords(angle=math.tau, radius=radius))
         reach, phase = radius, 0.0
     angles: FloatArray = phase + np.arange(count, dtype=np.float64) * (math.tau / count)
-    yield Curve(_in_world(entity.ocs(), _around(entity.dxf.center, reach, angles)), closed=True)
+    return _around(center, reach, angles)
 
 
 def circle_count(radius: float, *, chord: float) -> int:
     """Edges of the circumscribed polygon of a circle: Eq. 1, at least 8.
 
-    The edges are tangents, slightly longer than the arcs they stand for; the count is raised by one where
-    an edge would exceed `chord` and be split into two units.
+    The edges are tangents, a little longer than the arcs they stand for. Counted by their own length rather
+    than the arc's, no edge is split into two units.
     """
-    count = max(8, Fineness(chord, math.inf).chords(angle=math.tau, radius=radius))
-    return count if 2 * radius * math.tan(math.pi / count) <= chord * (1 + 1e-9) or count == 8 else count + 1
+    if not 0.0 < radius <= LARGEST:
+        raise ValueError(f"radius {radius:g} is no building's")
+    count = max(8, math.ceil(math.pi / math.atan(chord / (2.0 * radius)) - 1e-9))
+    return _checked(count, radius)
 
 
 def _around(center: Vec3, radius: float, angles: FloatArray) -> FloatArray:
@@ -119,7 +128,7 @@ def _ellipse(entity: Ellipse, fineness: Fineness) -> Iterator[Curve]:
 
 def _lwpolyline(entity: LWPolyline, fineness: Fineness) -> Iterator[Curve]:
     vertices = np.array(entity.get_points("xyb"), dtype=np.float64).reshape(-1, 3)
-    points = _bulged(vertices[:, :2], vertices[:, 2], closed=entity.closed, fineness=fineness)
+    points = _bulged(vertices[:, :2], vertices[:, 2], closed=bool(entity.closed), fineness=fineness)
     level = np.full((len(points), 1), float(entity.dxf.elevation))
     yield Curve(_in_world(entity.ocs(), np.hstack((points, level))), closed=entity.closed)
 
@@ -145,6 +154,10 @@ def _bulged(points: FloatArray, bulges: FloatArray, *, closed: bool, fineness: F
     """The points of a polyline with its bulges (tangent of a quarter of the arc's angle) cut into chords."""
     if not np.any(bulges):
         return points
+    if closed and len(points) == 2 and abs(bulges[0]) == 1.0 == abs(bulges[1]) and bulges[0] == bulges[1]:
+        center, radius = points.mean(axis=0), float(np.hypot(*(points[1] - points[0]))) / 2
+        turned = 1 if bulges[0] > 0 else -1
+        return _disc(Vec3(*center), radius, fineness)[::turned, :2]
     following = np.roll(points, -1, axis=0)
     count = len(points) if closed else len(points) - 1
     pieces = [_bulge(points[i], following[i], float(bulges[i]), fineness) for i in range(count)]

@@ -30,6 +30,7 @@ BROKEN_INPUT = (
     LookupError,
     OSError,
     RecursionError,
+    StopIteration,
     TypeError,
     ValueError,
     struct.error,
@@ -67,6 +68,8 @@ def open_drawing(data: bytes, *, source: Path) -> tuple[Drawing, list[Finding]]:
     InputError
         When `data` is no DXF, is cut off before its entities end, or holds nothing that can be read.
     """
+    if data[:4] == b"AC10":
+        raise InputError(f"{source}: is a DWG file, which is not read; save it as DXF")
     if not _looks_like_dxf(data):
         raise InputError(
             f"{source}: is not a DXF file (it starts with {data[:16]!r}); export the floor as DXF"
@@ -78,7 +81,7 @@ def open_drawing(data: bytes, *, source: Path) -> tuple[Drawing, list[Finding]]:
         )
     with _quiet():
         try:
-            return _load(data), []
+            return _load(data), _without_end(data)
         except BROKEN_INPUT as error:
             return _recover(data, source=source, cause=error)
 
@@ -92,6 +95,12 @@ def _holds_all_entities(data: bytes) -> bool:
     """What follows ENTITIES is no geometry; a file cut before that may lack walls and must not be planned."""
     start = data.rfind(b"ENTITIES")
     return start >= 0 and data.find(b"ENDSEC", start) >= 0
+
+
+def _without_end(data: bytes) -> list[Finding]:
+    if b"EOF" in data[-64:]:
+        return []
+    return [Finding("recovered", "the file ends without EOF after its entities; nothing drawn is missing")]
 
 
 @contextmanager
@@ -130,7 +139,14 @@ def _recover(data: bytes, *, source: Path, cause: BaseException) -> tuple[Drawin
 
 
 def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())[:120] or type(error).__name__
+    return legible(str(error)) or type(error).__name__
+
+
+def legible(text: str, *, most: int = 120) -> str:
+    """Text from a file as one line that any terminal and any file takes."""
+    sound = text.encode("utf-8", errors="replace").decode("utf-8")
+    line = " ".join(sound.split())
+    return "".join(letter if letter.isprintable() else "?" for letter in line)[:most]
 
 
 def metres_per_unit(

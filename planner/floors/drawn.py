@@ -50,6 +50,8 @@ class Closed:
     clockwise: bool = False
     """How the ring was drawn; a hole is drawn against the shape around it."""
     global_id: str | None = None
+    fill: bool = False
+    """A hatch, which often fills an outline that is drawn as well."""
     odd: tuple[Oddity, ...] = ()
 
 
@@ -66,25 +68,27 @@ class Open:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """All that is drawn on one layer, duplicates dropped."""
+    """All that is drawn on one layer, each thing once."""
 
     closed: tuple[Closed, ...] = ()
     open: tuple[Open, ...] = ()
+    dropped: tuple[Oddity, ...] = ()
+    """What has no length."""
 
 
 def drawn(strokes: Iterable[Stroke], *, gap: float = SNAP) -> Drawn:
     """Closed shapes and open lines; a stroke whose ends are within `gap` metres of each other is closed."""
-    closed: list[Closed] = []
-    lines: list[Open] = []
-    for stroke in strokes:
-        shape = _shape(stroke, gap=gap)
-        if isinstance(shape, Closed):
-            closed.append(shape)
-        else:
-            lines.append(shape)
-    closed.sort(key=_closed_key)
-    lines.sort(key=_open_key)
-    return Drawn(_each_closed_once(closed), _each_line_once(lines))
+    shapes = [_shape(stroke, gap=gap) for stroke in strokes]
+    closed = sorted((shape for shape in shapes if isinstance(shape, Closed)), key=_closed_key)
+    lines = sorted((shape for shape in shapes if isinstance(shape, Open)), key=_open_key)
+    points = [line for line in lines if polyline_length(line.points) <= SNAP]
+    return Drawn(
+        closed=_each_closed_once(_without_fills(closed)),
+        open=_each_line_once([line for line in lines if line not in points]),
+        dropped=tuple(
+            Oddity("no_length", "a line without length was dropped", place(line.points)) for line in points
+        ),
+    )
 
 
 def _shape(stroke: Stroke, *, gap: float) -> Closed | Open:
@@ -102,7 +106,7 @@ def _shape(stroke: Stroke, *, gap: float) -> Closed | Open:
     if not stroke.closed:
         odd = (*odd, *_gap(points))
     region = polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
-    return Closed(region, stroke.layer, ring_area(ring) < 0, stroke.global_id, odd)
+    return Closed(region, stroke.layer, ring_area(ring) < 0, stroke.global_id, stroke.fill, odd)
 
 
 def _repeats(stroke: Stroke, points: FloatArray) -> tuple[Oddity, ...]:
@@ -150,6 +154,15 @@ def region_key(region: Region) -> tuple:
 
 def _open_key(line: Open) -> tuple:
     return (line.points.tolist(), line.global_id is None, line.global_id or "", line.layer)
+
+
+def _without_fills(shapes: Sequence[Closed]) -> list[Closed]:
+    """Without hatches that fill outlines drawn on the same layer."""
+    outlines = [shape for shape in shapes if not shape.fill]
+    drawn_area = shapely.union_all([shape.region for shape in outlines])
+    fills = [shape for shape in shapes if shape.fill]
+    bare = [shape for shape in fills if shape.region.difference(drawn_area).area > shape.region.area / 100]
+    return sorted((*outlines, *bare), key=_closed_key)
 
 
 def _each_closed_once(shapes: Sequence[Closed]) -> tuple[Closed, ...]:

@@ -30,7 +30,8 @@ def read_dxf(data: bytes, *, source: Path, digest: str, d_dis: float) -> FloorPl
     shapes, odd_shapes = shapes_of(drawing, source=source)
     scale, odd_units = _scale(drawing, shapes)
     strokes, words, odd_strokes = strokes_of(shapes, scale=scale, chord=d_dis)
-    parts = parts_of(strokes, words, source=source, layers=[shape.layer for shape in shapes])
+    layers = [shape.layer for shape in shapes]
+    parts = parts_of(strokes, words, source=source, layers=layers, skipped=_skipped(odd_strokes))
     return FloorPlan(
         name=source.stem,
         digest=digest,
@@ -47,3 +48,9 @@ def _scale(drawing: Drawing, shapes: Sequence[Shape]) -> tuple[float, list[Findi
     doors = sketch(shape for shape in shapes if shape.role == "doors" and shape.entity.dxftype() == "LINE")
     widths = [float(np.hypot(*(line[-1] - line[0]))) for line in doors]
     return metres_per_unit(drawing, floor=np.vstack(floor) if floor else np.empty((0, 2)), doors=widths)
+
+
+def _skipped(findings: Sequence[Finding]) -> str:
+    """The first damaged shape on FLOOR, for the error about an outline that is missing because of it."""
+    damaged = [finding.message for finding in findings if "on FLOOR is skipped" in finding.message]
+    return f" ({damaged[0]})" if damaged else ""

@@ -32,21 +32,18 @@ def _across(drawn: Drawn, *, kind: str) -> tuple[list[Across], list[Finding]]:
     findings: list[Finding] = []
     shapes: list[Open | Closed] = [*drawn.open, *drawn.closed]
     for shape in shapes:
-        if isinstance(shape, Open) and shape.curved:
-            findings.append(
-                Finding(
-                    "not_an_opening", f"{kind}: a curve is not read as an opening", at=place(shape.points)
-                )
-            )
-            continue
         line, odd = _line(shape)
-        if float(np.hypot(*(line[1] - line[0]))) <= SNAP:
-            findings.append(
-                Finding("no_length", f"{kind}: a line without length was dropped", at=place(line))
-            )
-            continue
-        lines.append((line, shape.global_id, (*shape.odd, *odd)))
+        if isinstance(shape, Open) and shape.curved:
+            findings.append(_ignored("not_an_opening", f"{kind}: a curve is not a line across it", line))
+        elif float(np.hypot(*(line[1] - line[0]))) <= SNAP:
+            findings.append(_ignored("no_length", f"{kind}: a line ends where it starts", line))
+        else:
+            lines.append((line, shape.global_id, (*shape.odd, *odd)))
     return sorted(lines, key=lambda item: item[0].tolist()), findings
+
+
+def _ignored(code: str, text: str, line: FloatArray) -> Finding:
+    return Finding(code, f"{text}; it is ignored", at=place(line))
 
 
 def _line(shape: Open | Closed) -> tuple[FloatArray, tuple[Oddity, ...]]:

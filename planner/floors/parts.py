@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,26 +30,29 @@ class Parts:
 
 
 def parts_of(
-    strokes: Sequence[Stroke], words: Sequence[Word], *, source: Path, layers: Iterable[str]
+    strokes: Sequence[Stroke],
+    words: Sequence[Word],
+    *,
+    source: Path,
+    layers: Iterable[str],
+    skipped: str = "",
 ) -> Parts:
     """The parts that strokes and words on the known layers draw.
 
     Raises
     ------
     InputError
-        When nothing on layer FLOOR is closed; `layers` are the names of those that are present.
+        When nothing on layer FLOOR is closed; it names the `layers` that are present and what was `skipped`.
     """
     on = _drawn_by_role(strokes)
     outline, odd_outline = _outline(on["floor"])
     if outline.is_empty:
-        why = _why_no_outline(on["floor"])
-        raise InputError(
-            f"{source}: {why}; layers present: {_listed(layers)} (draw one as a closed polyline)"
-        )
+        why = f"{_why_no_outline(on['floor'])}{skipped}; layers present: {_listed(layers)}"
+        raise InputError(f"{source}: {why} (draw the outline there as a closed polyline)")
     rooms, odd_rooms = rooms_of(on["rooms"], _room_names(words), outline=outline)
     openings, odd_openings = openings_of(doors=on["doors"], passages=on["passages"])
     elements, odd_elements = elements_of(on, outline=outline, rooms=rooms)
-    odd_layers = _unknown_layers(on["other"], words)
+    odd_layers = [*_unknown_layers(on["other"], words), *_dropped(on)]
     findings = (*odd_outline, *odd_rooms, *odd_openings, *odd_elements, *odd_layers)
     return Parts(canonical_region(outline), rooms, openings, elements, _in_order(findings))
 
@@ -75,9 +78,8 @@ def _outline(floor: Drawn) -> tuple[Region, list[Finding]]:
 def _why_no_outline(floor: Drawn) -> str:
     if not floor.open:
         return "no closed outline on layer FLOOR"
-    return (
-        f"no closed outline on layer FLOOR, only {len(floor.open)} open lines with gaps over {GAP * 100:g} cm"
-    )
+    lines = f"{len(floor.open)} open lines with gaps over {GAP * 100:g} cm"
+    return f"no closed outline on layer FLOOR, only {lines}"
 
 
 def _listed(layers: Iterable[str], *, most: int = 20) -> str:
@@ -105,6 +107,15 @@ def _unknown_layers(other: Drawn, words: Iterable[Word]) -> list[Finding]:
             f"{lines[layer]} open lines and {texts[layer]} texts or dimensions are ignored",
         )
         for layer in sorted({*closed, *lines, *texts})
+    ]
+
+
+def _dropped(on: Mapping[str, Drawn]) -> list[Finding]:
+    return [
+        Finding(odd.code, f"layer {role.upper()}: {odd.text}", at=odd.at)
+        for role, drawn_on in on.items()
+        if role != "other"
+        for odd in drawn_on.dropped
     ]
 
 

@@ -130,10 +130,9 @@ def _holds(outer: shapely.Polygon, inner: shapely.Polygon) -> bool:
 
 def even_odd(polygons: Sequence[shapely.Polygon]) -> Region:
     """The region of nested rings: a ring in a ring is a hole, one in a hole is filled. Parts are unioned."""
-    above = parents(polygons)
     levels: dict[int, list[shapely.Polygon]] = {}
-    for index, polygon in enumerate(polygons):
-        levels.setdefault(_depth(index, above), []).append(polygon)
+    for polygon, depth in zip(polygons, depths(polygons), strict=True):
+        levels.setdefault(depth, []).append(polygon)
     region: Region = shapely.Polygon()
     for depth in sorted(levels):
         layer = shapely.union_all(levels[depth])
@@ -141,9 +140,16 @@ def even_odd(polygons: Sequence[shapely.Polygon]) -> Region:
     return region
 
 
-def _depth(index: int, above: Sequence[int | None]) -> int:
-    parent = above[index]
-    return 0 if parent is None else 1 + _depth(parent, above)
+def depths(polygons: Sequence[shapely.Polygon]) -> list[int]:
+    """In how many others each polygon lies."""
+    above = parents(polygons)
+    found = [0] * len(polygons)
+    for index in range(len(polygons)):
+        parent = above[index]
+        while parent is not None:
+            found[index] += 1
+            parent = above[parent]
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,11 +10,12 @@ from pathlib import Path
 
 from ezdxf import disassemble
 from ezdxf.document import Drawing
-from ezdxf.entities import DXFEntity, Insert
+from ezdxf.entities import DXFEntity, DXFTagStorage, Insert, MLine
 from ezdxf.math import Matrix44
 
 from mission.errors import InputError
 from mission.floor import KINDS, Finding
+from planner.floors.drawing import BROKEN_INPUT, legible
 
 ROLES: dict[str, str] = {
     "FLOOR": "floor",
@@ -32,8 +33,7 @@ _NOTES = {
     *("DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION", "LEADER", "MULTILEADER", "MLEADER"),
     *("TOLERANCE", "ACAD_TABLE", "IMAGE", "PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "OLE2FRAME"),
 }
-_DEEPEST = 32
-_MOST_SHAPES = 1_000_000
+_MOST = 1_000_000
 _MOST_COPIES = 10_000
 
 
@@ -60,7 +60,12 @@ class Shape:
     @property
     def name(self) -> str:
         """How a finding calls it: kind, handle and layer."""
-        return f"{self.entity.dxftype()} #{self.entity.dxf.get('handle') or '?'} on {self.layer}"
+        return f"{self.kind} #{legible(str(self.entity.dxf.get('handle')))} on {self.layer}"
+
+    @property
+    def kind(self) -> str:
+        """The entity's kind as the format calls it, such as LWPOLYLINE."""
+        return legible(self.entity.dxftype())
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +76,8 @@ class _Placement:
     layer: str = "0"
     global_id: str | None = None
     frozen: bool = False
-    depth: int = 0
+    blocks: tuple[str, ...] = ()
+    """Names of the blocks it is in, outermost first."""
 
 
 def shapes_of(drawing: Drawing, *, source: Path) -> tuple[list[Shape], list[Finding]]:
@@ -79,58 +85,77 @@ def shapes_of(drawing: Drawing, *, source: Path) -> tuple[list[Shape], list[Find
 
     Content of a block on layer 0 lies on its insert's layer. A hidden layer counts only if its name is known.
     """
-    walk = _Walk(drawing)
-    shapes: list[Shape] = []
-    for shape in walk.through(drawing.modelspace(), _Placement()):
-        shapes.append(shape)
-        if len(shapes) > _MOST_SHAPES:
-            raise InputError(f"{source}: more than {_MOST_SHAPES} shapes; export one floor without furniture")
+    walk = _Walk(drawing, source=source)
+    shapes = list(walk.through(drawing.modelspace(), _Placement()))
     return shapes, walk.findings()
 
 
 class _Walk:
     """One pass over a drawing, with what it met on the way."""
 
-    def __init__(self, drawing: Drawing) -> None:
+    def __init__(self, drawing: Drawing, *, source: Path) -> None:
+        self._source = source
+        self._met = 0
         self._hidden = {layer.dxf.name.upper(): layer.is_frozen() for layer in _hidden_layers(drawing)}
         self._used: Counter[str] = Counter()
         self._odd: Counter[tuple[str, str]] = Counter()
 
     def through(self, entities: Iterable[DXFEntity], placed: _Placement) -> Iterator[Shape]:
         for entity in entities:
-            if entity.dxftype() in _NOT_DRAWN or entity.dxf.get("invisible", 0):
+            self._count()
+            if entity.dxftype() in _NOT_DRAWN or _attribute(entity, "invisible", 0):
                 continue
             if isinstance(entity, Insert):
                 yield from self._insert(entity, placed)
-            elif entity.dxftype() == "MLINE":
-                yield from self.through(disassemble.recursive_decompose([entity]), placed)
+            elif isinstance(entity, MLine):
+                yield from self.through(self._strands(entity), placed)
             else:
                 yield from self._shape(entity, placed)
 
+    def _count(self) -> None:
+        self._met += 1
+        if self._met > _MOST:
+            raise InputError(
+                f"{self._source}: more than {_MOST} entities; export one floor without furniture"
+            )
+
+    def _strands(self, multiline: MLine) -> list[DXFEntity]:
+        try:
+            return list(disassemble.recursive_decompose([multiline]))
+        except BROKEN_INPUT as error:
+            self._odd["bad_coordinates", f"an MLINE is skipped: {legible(str(error))}"] += 1
+            return []
+
     def _insert(self, insert: Insert, placed: _Placement) -> Iterator[Shape]:
-        block = insert.block()
-        name = insert.dxf.get("name", "?")
+        name = legible(str(insert.dxf.get("name")))
+        try:
+            block, places = insert.block(), _places(insert, placed)
+        except BROKEN_INPUT as error:
+            self._odd["bad_coordinates", f"block {name} is skipped: {legible(str(error))}"] += 1
+            return
         if block is None or block.block is None or block.block.is_xref:
             self._odd["missing_block", f"block {name} is not in the file; bind external references"] += 1
-            return
-        if placed.depth >= _DEEPEST or insert.mcount > _MOST_COPIES:
-            self._odd["endless_block", f"block {name} holds itself or {insert.mcount} copies; not read"] += 1
-            return
+        elif name in placed.blocks:
+            self._odd["endless_block", f"block {name} holds itself and is not followed"] += 1
+        else:
+            yield from self.through(insert.attribs, placed)
+            inside = self._inside(insert, placed, name=name)
+            for matrix in places:
+                yield from self.through(block, replace(inside, matrix=matrix))
+
+    def _inside(self, insert: Insert, placed: _Placement, *, name: str) -> _Placement:
         layer = _layer(insert, placed)
-        inside = replace(
+        return replace(
             placed,
             layer=layer,
             global_id=_global_id(insert) or placed.global_id,
             frozen=placed.frozen or self._hidden.get(layer.upper(), False),
-            depth=placed.depth + 1,
+            blocks=(*placed.blocks, name),
         )
-        yield from self.through(insert.attribs, placed)
-        for copy in insert.multi_insert() if insert.mcount > 1 else [insert]:
-            yield from self.through(block, replace(inside, matrix=_within(copy, placed.matrix)))
 
     def _shape(self, entity: DXFEntity, placed: _Placement) -> Iterator[Shape]:
         layer = _layer(entity, placed)
-        plain = _PREFIX.sub("", layer)
+        plain = legible(_PREFIX.sub("", layer))
         role = ROLES.get(plain.upper(), "other")
         if plain.upper() == "DEFPOINTS":
             return
@@ -143,9 +168,7 @@ class _Walk:
 
     def findings(self) -> list[Finding]:
         hidden = [
-            Finding(
-                "hidden_layer", f"layer {layer} is frozen or off; its {count} entities are used all the same"
-            )
+            Finding("hidden_layer", f"layer {legible(layer)} is frozen or off; its {count} entities are used")
             for layer, count in self._used.items()
         ]
         odd = [Finding(code, f"{text} ({count} times)") for (code, text), count in self._odd.items()]
@@ -157,17 +180,28 @@ def _hidden_layers(drawing: Drawing) -> list:
 
 
 def _layer(entity: DXFEntity, placed: _Placement) -> str:
-    layer = str(entity.dxf.get("layer", "0"))
+    layer = str(_attribute(entity, "layer", "0"))
     return placed.layer if layer == "0" else layer
 
 
-def _within(insert: Insert, outer: Matrix44 | None) -> Matrix44:
-    inner = insert.matrix44()
-    return inner if outer is None else inner * outer
+def _attribute(entity: DXFEntity, name: str, default: object) -> object:
+    """An attribute that entities of a kind unknown to ezdxf keep among their raw tags."""
+    if isinstance(entity, DXFTagStorage):
+        return entity.graphic_properties().get(name, default)
+    return entity.dxf.get(name, default) if entity.dxf.is_supported(name) else default
+
+
+def _places(insert: Insert, placed: _Placement) -> list[Matrix44]:
+    """Where the block is drawn: once, or in rows and columns."""
+    if insert.mcount > _MOST_COPIES:
+        raise ValueError(f"{insert.mcount} copies are no building's")
+    copies = insert.multi_insert() if insert.mcount > 1 else [insert]
+    inner = [copy.matrix44() for copy in copies]
+    return inner if placed.matrix is None else [matrix * placed.matrix for matrix in inner]
 
 
 def _global_id(entity: DXFEntity) -> str | None:
     """The IFC GlobalId: XDATA of application IFC, group 1000."""
     if not entity.has_xdata("IFC"):
         return None
-    return next((str(tag.value) for tag in entity.get_xdata("IFC") if tag.code == 1000), None)
+    return next((legible(str(tag.value)) for tag in entity.get_xdata("IFC") if tag.code == 1000), None)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import shapely
 from ezdxf.entities import LWPolyline
 from ezdxf.math import OCS, Z_AXIS, Matrix44, Vec3
 
 from mission.floor import KINDS, Finding
-from mission.geometry import FloatArray, frozen
+from mission.geometry import FloatArray, frozen, ring_area
 from planner.floors.curves import LARGEST, Curve, Fineness, curves_of
-from planner.floors.drawing import BROKEN_INPUT
+from planner.floors.drawing import BROKEN_INPUT, legible
+from planner.floors.rings import depths
 from planner.floors.shapes import Shape
 
 SAGITTA = 0.001
@@ -22,31 +25,35 @@ _COARSE = Fineness(chord=LARGEST, sagitta=LARGEST)
 
 @dataclass(frozen=True, eq=False)
 class Stroke:
-    """A polyline (n, 2) in metres on a layer; `closed` strokes do not repeat their first point."""
+    """A polyline (n, 2) in metres on a layer; a `closed` one need not repeat its first point."""
 
     points: FloatArray
     layer: str
     role: str
     closed: bool = False
     curved: bool = False
+    """Drawn as one arc."""
     fill: bool = False
-    """One boundary of a hatch."""
+    """One boundary of a hatch: counter-clockwise around what is filled, clockwise around a hole."""
     global_id: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Word:
-    """A text and the points that may stand for it: where it is inserted, where it is aligned."""
+    """A text, and the points that may stand for it: where it is inserted, where it is aligned.
+
+    A dimension or another note is a word without text.
+    """
 
     text: str
     layer: str
     role: str
-    at: tuple[tuple[float, float], ...]
+    at: tuple[tuple[float, float], ...] = ()
 
 
 def sketch(shapes: Iterable[Shape]) -> list[FloatArray]:
     """The points (n, 2) of each shape in drawing units, coarsely: enough to see how large it is."""
-    sketches = []
+    sketches: list[FloatArray] = []
     for shape in shapes:
         try:
             sketches += [points for points, _ in _placed(shape, _COARSE)]
@@ -58,7 +65,7 @@ def sketch(shapes: Iterable[Shape]) -> list[FloatArray]:
 def strokes_of(
     shapes: Sequence[Shape], *, scale: float, chord: float
 ) -> tuple[list[Stroke], list[Word], list[Finding]]:
-    """Strokes and words in metres, and a finding for each shape that could not be used.
+    """Strokes and words in metres, and findings about shapes that could not be used.
 
     Parameters
     ----------
@@ -69,41 +76,59 @@ def strokes_of(
     """
     strokes: list[Stroke] = []
     words: list[Word] = []
-    findings: list[Finding] = []
+    damaged: list[Finding] = []
+    solid: Counter[tuple[str, str]] = Counter()
     for shape in shapes:
         try:
-            if shape.is_text:
+            if shape.is_text or shape.is_note:
                 words.append(_word(shape, scale=scale))
-            elif not shape.is_note:
+            else:
                 strokes += _strokes(shape, scale=scale, chord=chord)
-        except TypeError as error:
-            findings.append(Finding("unreadable_entity", f"{shape.name}: has no outline to read ({error})"))
+        except TypeError:
+            solid[shape.layer, shape.kind] += 1
         except BROKEN_INPUT as error:
-            findings.append(_damage(shape, error, scale=scale))
-    return strokes, words, findings
+            damaged.append(_damage(shape, error, scale=scale))
+    return strokes, words, [*damaged, *_without_outline(solid)]
 
 
 def _strokes(shape: Shape, *, scale: float, chord: float) -> list[Stroke]:
     stretch = scale * _stretch(shape.matrix)
     outside = shape.role in KINDS
     fineness = Fineness(chord=chord / stretch, sagitta=SAGITTA / stretch, outside=outside)
-    return [
+    strokes = [
         Stroke(
             frozen(points * scale),
             shape.layer,
             shape.role,
             closed=curve.closed,
             curved=curve.curved,
-            fill=shape.entity.dxftype() in ("HATCH", "MPOLYGON"),
             global_id=shape.global_id,
         )
         for points, curve in _placed(shape, fineness)
     ]
+    return _filled(strokes) if shape.kind in ("HATCH", "MPOLYGON") else strokes
+
+
+def _filled(boundaries: Sequence[Stroke]) -> list[Stroke]:
+    """The boundaries of a hatch, turned by how deep they are nested: every second one is a hole."""
+    rings = [item for item in boundaries if len(item.points) >= 3]
+    nested = depths([shapely.Polygon(item.points).buffer(0) for item in rings])
+    return [
+        replace(item, points=_turned(item.points, depth), fill=True)
+        for item, depth in zip(rings, nested, strict=True)
+    ]
+
+
+def _turned(ring: FloatArray, depth: int) -> FloatArray:
+    clockwise = ring_area(ring) < 0
+    return frozen(ring[::-1]) if clockwise != bool(depth % 2) else ring
 
 
 def _placed(shape: Shape, fineness: Fineness) -> list[tuple[FloatArray, Curve]]:
     """Each curve with its points (n, 2) in the world, in drawing units."""
-    placed = [(_flat(curve.points, shape.matrix), curve) for curve in curves_of(shape.entity, fineness)]
+    # Numbers too large to calculate with are damage too, and reported as such.
+    with np.errstate(over="raise", invalid="raise", divide="raise"):
+        placed = [(_flat(curve.points, shape.matrix), curve) for curve in curves_of(shape.entity, fineness)]
     for points, _ in placed:
         if not (np.isfinite(points).all() and (np.abs(points) <= LARGEST).all()):
             raise ValueError("a coordinate is not a number or beyond any building")
@@ -121,38 +146,47 @@ def _stretch(matrix: Matrix44 | None) -> float:
     """The greatest factor by which a placement lengthens anything in plan."""
     if matrix is None:
         return 1.0
-    lengths = [matrix.transform_direction(axis).magnitude for axis in (Vec3(1, 0, 0), Vec3(0, 1, 0))]
-    stretch = max(lengths)
+    axes = (Vec3(1, 0, 0), Vec3(0, 1, 0))
+    stretch = max(matrix.transform_direction(axis).magnitude for axis in axes)
     if not 1e-9 < stretch < LARGEST:
         raise ValueError(f"its block is scaled by {stretch:g}")
     return stretch
 
 
 def _word(shape: Shape, *, scale: float) -> Word:
+    if shape.is_note:
+        return Word("", shape.layer, shape.role)
     entity = shape.entity
     text = entity.plain_text() if hasattr(entity, "plain_text") else str(entity.dxf.text)
     values = entity.dxf.all_existing_dxf_attribs()
     points = [values[key] for key in ("insert", "align_point") if key in values]
     # MTEXT is placed in the world, TEXT in a plane of its own.
-    plane = OCS(values.get("extrusion", Z_AXIS)) if entity.dxftype() != "MTEXT" else OCS()
-    world = [plane.to_wcs(Vec3(point)).xyz for point in points]
-    placed = _flat(np.array(world).reshape(-1, 3), shape.matrix) * scale
-    at = tuple((float(x), float(y)) for x, y in placed)
-    return Word(" ".join(text.split()), shape.layer, shape.role, at)
+    plane = OCS(values.get("extrusion", Z_AXIS)) if shape.kind != "MTEXT" else OCS()
+    world = np.array([plane.to_wcs(Vec3(point)).xyz for point in points]).reshape(-1, 3)
+    sound = [point for point in _flat(world, shape.matrix) if (np.abs(point) <= LARGEST).all()]
+    at = tuple((float(x) * scale, float(y) * scale) for x, y in sound)
+    return Word(legible(text), shape.layer, shape.role, at)
 
 
 def _damage(shape: Shape, error: Exception, *, scale: float) -> Finding:
-    message = f"{shape.name}: skipped, {' '.join(str(error).split()) or type(error).__name__}"
+    message = f"{shape.name} is skipped: {legible(str(error)) or type(error).__name__}"
     return Finding("bad_coordinates", message, at=_place(shape, scale=scale))
 
 
 def _place(shape: Shape, *, scale: float) -> tuple[float, float] | None:
-    """The first sound point of a damaged shape, where its block is drawn."""
+    """The first sound point of a damaged shape, as it is drawn in its block."""
     values = shape.entity.dxf.all_existing_dxf_attribs()
     named = [values.get(key) for key in ("start", "end", "center", "insert", "vtx0", "vtx1")]
     listed = shape.entity.get_points("xy") if isinstance(shape.entity, LWPolyline) else []
     for point in [Vec3(item) for item in (*named, *listed) if item is not None]:
-        x, y = point.x * scale, point.y * scale
-        if abs(x) <= LARGEST and abs(y) <= LARGEST:
-            return (x, y)
+        if abs(point.x) <= LARGEST and abs(point.y) <= LARGEST:
+            return (point.x * scale, point.y * scale)
     return None
+
+
+def _without_outline(solid: Counter[tuple[str, str]]) -> list[Finding]:
+    """Solids, meshes and proxies: what they draw cannot be seen from the file alone."""
+    return [
+        Finding("no_outline", f"layer {layer}: {count} {kind} have no outline to read; explode them to lines")
+        for (layer, kind), count in sorted(solid.items())
+    ]
