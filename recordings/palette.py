@@ -38,14 +38,17 @@ _REASON_COLOURS: tuple[Colour, ...] = (
     (200, 105, 60, 255),  # closer than the edge distance
     (150, 60, 60, 255),  # not reachable
     (110, 95, 150, 255),  # in another part
+    (160, 120, 60, 255),  # in a circle to avoid
 )
+_OTHER_REASON: Colour = (130, 90, 90, 255)
 
 
 def reason(number: int) -> Meaning:
     """The class of candidates whose reason is `DROP_REASONS[number]`."""
     label = DROP_REASONS[number]
     verb = "candidate" if number == 0 else "dropped candidate"
-    return Meaning(_FIRST_REASON + number, f"{verb}: {label}", _REASON_COLOURS[number])
+    colour = _REASON_COLOURS[number] if number < len(_REASON_COLOURS) else _OTHER_REASON
+    return Meaning(_FIRST_REASON + number, f"{verb}: {label}", colour)
 
 
 MEANINGS = (
@@ -65,14 +68,14 @@ KIND_COLOURS: dict[str, Colour] = {
 """Every element kind of `mission.floor.KINDS`."""
 
 OUTLINE: Colour = (110, 118, 135, 255)
-HOLE: Colour = (230, 110, 150, 255)
+HOLE: Colour = (175, 95, 120, 255)
 ROOM: Colour = (58, 64, 78, 255)
 ROOM_NAME: Colour = (150, 158, 175, 255)
-PASSABLE: Colour = (90, 225, 140, 255)
-BLOCKED: Colour = (230, 85, 85, 255)
-DRIVE: Colour = (50, 95, 140, 255)
-STOP_AREA: Colour = (70, 140, 95, 255)
-GAP: Colour = (255, 120, 220, 255)
+PASSABLE: Colour = (232, 236, 245, 255)
+BLOCKED: Colour = (255, 70, 200, 255)
+DRIVE: Colour = (38, 66, 104, 255)
+STOP_AREA: Colour = (50, 120, 85, 255)
+GAP: Colour = (255, 255, 255, 255)
 RAY: Colour = (235, 215, 110, 70)
 EYE: Colour = (255, 235, 120, 255)
 STOP: Colour = (70, 255, 110, 255)
