@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,6 +16,7 @@ from mission.errors import InputError
 if TYPE_CHECKING:
     from bridge.protocol import Answer, Verb
     from bridge.station import Station
+    from bridge.watch import Recording
     from mission.events import Pose, StateReport
 
 RobotName = Annotated[str, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
@@ -218,22 +219,22 @@ def watch(
 
     Example: stopgo watch --robot r1 --rrd field.rrd
     """
-    from bridge.watch import watch_run
+    from bridge.watch import Lines, Table, watch_showing
 
     with (
         reached(robot, connect, site=site, who=None, timeout=timeout, insecure=insecure) as station,
         recording(rrd) as record,
     ):
-        state = watch_run(station, record, say=say)
+        state = watch_showing(station, record, Table() if sys.stderr.isatty() else Lines(say))
     if json_:
         print_json({key: getattr(state, key) for key in STATUS_KEYS})
     raise typer.Exit(0 if state.state == "FINISHED" else 1)
 
 
-def recording(path: Path | None) -> AbstractContextManager[Any]:
+def recording(path: Path | None) -> AbstractContextManager[Recording | None]:
     """The field recording at `path`; nothing of Rerun is loaded without one."""
     if path is None:
-        return ExitStack()
+        return nullcontext()
     from recordings.field import FieldRecording
 
     return FieldRecording(path, None)

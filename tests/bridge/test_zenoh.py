@@ -144,3 +144,16 @@ def test_threads_end_with_the_link() -> None:
     with pytest.raises(RobotUnreachable), unreached:
         pass
     assert threading.active_count() <= before + 1
+
+
+def test_watch_records_the_run(tmp_path: Path) -> None:
+    pytest.importorskip("rerun")
+    with robot_process("r1", tmp_path / "state", speed_up=100) as endpoint:
+        with connect(endpoint, robot="r1") as station:
+            station.push(corridor())
+            station.command("start")
+        watched = stopgo(
+            "watch", "--robot", "r1", "--connect", endpoint, "--rrd", str(tmp_path / "field.rrd")
+        )
+    assert watched.returncode == 0, watched.stderr
+    assert (tmp_path / "field.rrd").stat().st_size > 1000

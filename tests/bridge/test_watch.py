@@ -1,0 +1,120 @@
+"""What a person sees of a run, and what a recording is handed."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+
+from bridge import agent as agents
+from bridge.agent import Agent
+from bridge.clock import WallClock
+from bridge.controller import Controller
+from bridge.follow import Report, Silence
+from bridge.journal import memory_journal
+from bridge.link import Switchboard
+from bridge.protocol import Keys
+from bridge.simulator import SimulatedBase, SimulatedScanner
+from bridge.station import Station
+from bridge.watch import Lines, Table, clock, remaining_s, table_lines
+from mission.events import PoseReport, Scanned, StateReport
+from mission.schedule import schedule
+from tests.bridge.world import Field, corridor
+
+
+def test_the_time_left_at_the_start_is_the_plan() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    left = remaining_s(corridor(), field.controller.report(), (), 0.0)
+    assert left == schedule(corridor()).total_s
+
+
+def test_the_time_left_counts_down_and_ends_at_zero() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    left = []
+    while field.controller.step():
+        events = field.journal.events()
+        left.append(remaining_s(corridor(), field.controller.report(), events, events[-1].mission_time_s))
+    assert left == sorted(left, reverse=True)
+    assert left[-1] < 0.1
+
+
+def test_the_table_names_stop_state_battery_link_and_time() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    for _ in range(3):
+        field.controller.step()
+    lines = "\n".join(table_lines(corridor(), field.controller.report(), None, field.journal.events(), 4.0))
+    for said in (
+        "RUNNING  s1 SCANNING",
+        "0 done, 0 skipped of 3",
+        "100%",
+        "no word for 4 s",
+        "left as planned",
+    ):
+        assert said in lines
+
+
+def test_the_table_is_drawn_in_place() -> None:
+    written: list[str] = []
+    table = Table(written.append)
+    field = Field()
+    for _ in range(2):
+        table.show(field.controller.report())
+    height = written[0].count("\n")
+    assert written[1].startswith(f"\x1b[{height}A")
+    assert written[1].count("\n") == height
+
+
+def test_lines_tell_events_and_silence_but_not_every_pose() -> None:
+    said: list[str] = []
+    lines = Lines(said.append)
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    field.work()
+    for report in (field.controller.report(), *field.journal.events(), Silence(seconds=3.0)):
+        lines.show(report)
+    assert len(said) == len(field.journal.events()) + 1
+    assert said[-1] == "no word for 3 s"
+
+
+def test_a_duration_reads_as_a_clock() -> None:
+    assert clock(3725.9) == "1:02:05"
+
+
+def test_events_missed_while_the_link_was_cut_are_told_once_and_in_order() -> None:
+    board = Switchboard()
+    journal, wall = memory_journal(), WallClock(speed_up=200)
+    base, scanner = SimulatedBase(clock=wall), SimulatedScanner(clock=wall)
+    controller = Controller(
+        robot="r1", journal=journal, base=base, scanner=scanner, clock=wall, command_clock=WallClock(),
+        mission_taken=lambda mission: base.stand_at_start(mission.start),
+    )  # fmt: skip
+    agent = Agent(
+        keys=Keys("r1"), link=board.link(), journal=journal, controller=controller, base=base,
+        scanner=scanner, clock=wall, command_clock=WallClock(), speed_up=200,
+    )  # fmt: skip
+    with agents.on_link(agent):
+        station = Station(board.link(), Keys("r1"), commander="test")
+        station.push(corridor())
+        told: queue.Queue[Report] = queue.Queue()
+        watching = threading.Thread(target=lambda: [told.put(report) for report in station.reports()])
+        watching.start()
+        station.command("start")
+        while not isinstance(told.get(timeout=10), Scanned):
+            pass
+        board.cut = True
+        while controller.run.state != "FINISHED":
+            time.sleep(0.01)
+        board.cut = False
+        watching.join(20)
+    heard = [told.get() for _ in range(told.qsize())]
+    events = [report for report in heard if not isinstance(report, StateReport | PoseReport | Silence)]
+    assert [event.number for event in events] == list(range(events[0].number, journal.newest + 1))
+    assert heard[-1] is not None
+    assert [report.state for report in heard if isinstance(report, StateReport)][-1] == "FINISHED"
