@@ -65,3 +65,17 @@ def of_run(parent: str, run_id: str, *names: str) -> str:
 def under(entity: str) -> str:
     """The expression that takes an entity and everything below it into a view."""
     return f"{entity}/**"
+
+
+def events_of_run(run_id: str) -> str:
+    """Where the events of a run are kept as values."""
+    return of_run(FIELD, run_id, _EVENTS)
+
+
+def run_of_events(entity: str) -> str | None:
+    """The run whose events the entity holds, if it does."""
+    parts = entity.split("/")
+    return parts[2] if len(parts) == 4 and entity == events_of_run(parts[2]) else None
+
+
+_EVENTS = "events"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 from mission.document import Mission
 from mission.events import AnyEvent, PoseReport, StateReport
 from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
+from recordings.compact import compact
 from recordings.mission_drawing import draw_mission, mission_extent
 from recordings.run_drawing import RunDrawing
 
@@ -34,11 +34,12 @@ class FieldRecording:
         self._mission: Mission | None = None
         self._canvas: Canvas | None = None
         self._partial: Path | None = None
+        self._given = mission
         self._open = ExitStack()
-        if mission is not None:
-            self.mission(mission)
 
     def __enter__(self) -> FieldRecording:
+        if self._given is not None:
+            self.mission(self._given)
         return self
 
     def mission(self, mission: Mission) -> None:
@@ -75,7 +76,7 @@ class FieldRecording:
     ) -> None:
         self._open.close()
         if self._partial is not None:
-            os.replace(self._partial, self.path)
+            compact(self._partial, self.path)
 
     def _begin(self, mission: Mission) -> None:
         self._partial = _free_name(self.path)

@@ -19,11 +19,10 @@ MARGIN = 0.04
 """Empty space around the drawing, as a share of its size."""
 
 
-def blueprint(bounds: Bounds | None = None, *, tab: int = 0) -> rrb.Blueprint:
+def blueprint(bounds: Bounds | None = None) -> rrb.Blueprint:
     """Tabs for the mission, its planning stages, the run, and the log; 2D views show `bounds`."""
-    area = None if bounds is None else _visible(bounds)
     return rrb.Blueprint(
-        rrb.Tabs(_mission(area), _stages(area), _run(), _texts(), active_tab=tab),
+        rrb.Tabs(_mission(bounds), _stages(bounds), _run(), _texts(), active_tab=0),
         rrb.TimePanel(timeline=at.MISSION_TIME, play_state="paused", state="collapsed"),
         auto_views=False,
         auto_layout=False,
@@ -31,27 +30,28 @@ def blueprint(bounds: Bounds | None = None, *, tab: int = 0) -> rrb.Blueprint:
     )
 
 
-def _mission(area: rrb.VisualBounds2D | None) -> rrb.Horizontal:
+def _mission(bounds: Bounds | None) -> rrb.Horizontal:
     plan = _flat(
         "Plan and run",
-        area,
+        _visible(bounds),
         *(at.FLOOR, at.COVERAGE, at.ROUTE, at.STOPS, at.PLANNED_ROBOT, at.FIELD),
         time_ranges=_so_far(),
     )
     return rrb.Horizontal(
         plan,
-        rrb.Vertical(_solid(), rrb.TextDocumentView(origin=at.REPORT, name="Plan report")),
+        rrb.Vertical(_solid(bounds), rrb.TextDocumentView(origin=at.REPORT, name="Plan report")),
         column_shares=[3, 2],
         name="Mission",
     )
 
 
-def _stages(area: rrb.VisualBounds2D | None) -> rrb.Grid:
+def _stages(bounds: Bounds | None) -> rrb.Grid:
+    area = _visible(bounds)
     return rrb.Grid(
         _flat("Navigable space and candidates", area, at.FLOOR, at.NAVIGABLE, at.TARGETS, at.CANDIDATES),
         _flat("What a candidate sees (timeline: candidate)", area, at.FLOOR, at.VISIBILITY),
         _flat("Selection (timeline: stage_step)", area, at.FLOOR, at.SELECTION),
-        _plot("Coverage, %", at.METRIC_COVERAGE, (0.0, 100.0)),
+        _plot("Coverage, %", at.METRIC_COVERAGE),
         grid_columns=2,
         name="Planning",
     )
@@ -59,7 +59,7 @@ def _stages(area: rrb.VisualBounds2D | None) -> rrb.Grid:
 
 def _run() -> rrb.Vertical:
     return rrb.Vertical(
-        rrb.StateTimelineView(origin=at.FIELD, contents=under(at.FIELD), name="States"),
+        rrb.StateTimelineView(origin=at.FIELD, contents=under(at.FIELD), name="States", time_view=_whole()),
         _plot("Distance from the route, m (left positive)", at.METRIC_CROSS_TRACK),
         _plot("Deviation at each stop, m", at.METRIC_DEVIATION),
         _plot("Battery, %", at.METRIC_BATTERY, (0.0, 100.0)),
@@ -75,8 +75,10 @@ def _texts() -> rrb.Horizontal:
     )
 
 
-def _visible(bounds: Bounds) -> rrb.VisualBounds2D:
+def _visible(bounds: Bounds | None) -> rrb.VisualBounds2D | None:
     """Rerun's bounds are y-down."""
+    if bounds is None:
+        return None
     left, low, right, high = bounds
     margin = MARGIN * max(right - left, high - low, 1.0)
     return rrb.VisualBounds2D(
@@ -98,20 +100,36 @@ def _flat(
     )
 
 
-def _solid() -> rrb.Spatial3DView:
+def _solid(bounds: Bounds | None) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin=at.WORLD,
         contents=under(at.WORLD),
         name="3D",
         background=BACKGROUND,
         line_grid=False,
+        eye_controls=None if bounds is None else _from_the_south(bounds),
         time_ranges=_so_far(),
+    )
+
+
+def _from_the_south(bounds: Bounds) -> rrb.EyeControls3D:
+    """An eye that looks down into the rooms, north at the top."""
+    left, low, right, high = bounds
+    x, y, size = (left + right) / 2, (low + high) / 2, max(right - left, high - low, 1.0)
+    return rrb.EyeControls3D(
+        position=(x, y - 0.6 * size, 0.75 * size), look_target=(x, y, 0.0), eye_up=(0.0, 0.0, 1.0)
     )
 
 
 def _plot(name: str, entity: str, span: tuple[float, float] | None = None) -> rrb.TimeSeriesView:
     axis = None if span is None else rrb.ScalarAxis(range=span, zoom_lock=True)
-    return rrb.TimeSeriesView(origin=entity, contents=under(entity), name=name, axis_y=axis)
+    return rrb.TimeSeriesView(origin=entity, contents=under(entity), name=name, axis_x=_whole(), axis_y=axis)
+
+
+def _whole() -> rrb.TimeAxis:
+    """All of the timeline; Rerun's own choice is a minute around the cursor."""
+    everything = rrb.TimeRange(start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.infinite())
+    return rrb.TimeAxis(view_range=everything)
 
 
 def _so_far() -> list[rr.VisibleTimeRange]:

@@ -28,10 +28,12 @@ def draw_mission(canvas: Canvas, mission: Mission) -> None:
 
 
 def mission_extent(mission: Mission) -> Bounds:
-    """Bounds of everything the mission drives along."""
+    """Bounds of what the mission drives along, and of what its scanner reaches from there."""
     start = np.array([(mission.start.x, mission.start.y)])
     ways = [start, *(np.array(stop.approach).reshape(-1, 2) for stop in mission.stops)]
-    return bounds([*ways, np.array(mission.return_ or ()).reshape(-1, 2)])
+    left, low, right, high = bounds([*ways, np.array(mission.return_ or ()).reshape(-1, 2)])
+    reach = mission.scanner.range
+    return (left - reach, low - reach, right + reach, high + reach)
 
 
 def draw_drive(canvas: Canvas, drive: Drive, *, radius: float) -> None:
@@ -83,7 +85,7 @@ def _draw_stops(canvas: Canvas, mission: Mission) -> None:
     heading = np.array([stop.heading for stop in mission.stops])
     facing = ARROW * np.stack([np.cos(heading), np.sin(heading)], axis=1)
     points = rr.Points2D(
-        xy, labels=labels, colors=palette.STOP, radii=0.14, show_labels=True, draw_order=ORDER["stop"]
+        xy, labels=labels, colors=palette.STOP, radii=on_screen(5), show_labels=True, draw_order=ORDER["stop"]
     )
     details = rr.AnyValues(
         doorway=[stop.doorway for stop in mission.stops],
@@ -99,9 +101,7 @@ def _draw_stops(canvas: Canvas, mission: Mission) -> None:
         draw_order=ORDER["stop"],
     )
     canvas.show(f"{entities.STOPS}/heading", arrows)
-    poles = rr.Points3D(
-        strokes.level(xy, 1.5), labels=labels, colors=palette.STOP, radii=0.12, show_labels=True
-    )
+    poles = rr.Points3D(strokes.level(xy, 1.5), labels=labels, colors=palette.STOP, radii=0.12)
     canvas.show(entities.WORLD_STOPS, poles)
     legs = np.stack([strokes.level(xy, 0.0), strokes.level(xy, 1.5)], axis=1)
     canvas.show(f"{entities.WORLD_STOPS}/legs", rr.LineStrips3D(legs, colors=palette.STOP, radii=0.02))

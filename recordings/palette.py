@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from mission import planning
 from mission.planning import DROP_REASONS
 
 Colour = tuple[int, int, int, int]
@@ -30,25 +31,23 @@ SKIPPED = Meaning(42, "skipped", (255, 190, 60, 255))
 FAILED = Meaning(43, "failed", (255, 70, 70, 255))
 
 _FIRST_REASON = 20
-_REASON_COLOURS: tuple[Colour, ...] = (
-    (245, 215, 80, 255),  # kept
-    (120, 75, 75, 255),  # outside the room
-    (135, 60, 110, 255),  # in a hole
-    (190, 70, 60, 255),  # closer than d_sec
-    (200, 105, 60, 255),  # closer than the edge distance
-    (150, 60, 60, 255),  # not reachable
-    (110, 95, 150, 255),  # in another part
-    (160, 120, 60, 255),  # in a circle to avoid
-)
-_OTHER_REASON: Colour = (130, 90, 90, 255)
+_DROPPED: Colour = (150, 60, 60, 255)
+_REASON_COLOURS: dict[int, Colour] = {
+    planning.KEPT: (245, 215, 80, 255),
+    planning.OUTSIDE: (120, 75, 75, 255),
+    planning.IN_HOLE: (135, 60, 110, 255),
+    planning.TOO_CLOSE: (190, 70, 60, 255),
+    planning.AT_EDGE: (200, 105, 60, 255),
+    planning.OTHER_PART: (110, 95, 150, 255),
+}
+"""Dropped candidates are dim, and reddish for every reason without a colour of its own."""
 
 
 def reason(number: int) -> Meaning:
     """The class of candidates whose reason is `DROP_REASONS[number]`."""
     label = DROP_REASONS[number]
     verb = "candidate" if number == 0 else "dropped candidate"
-    colour = _REASON_COLOURS[number] if number < len(_REASON_COLOURS) else _OTHER_REASON
-    return Meaning(_FIRST_REASON + number, f"{verb}: {label}", colour)
+    return Meaning(_FIRST_REASON + number, f"{verb}: {label}", _REASON_COLOURS.get(number, _DROPPED))
 
 
 MEANINGS = (

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rerun.chunk import Chunk, RrdReader
+from rerun.chunk import Chunk, RrdReader, StoreEntry
 
 from mission.errors import InputError
 from recordings import entities
@@ -43,24 +43,25 @@ def check(path: Path) -> Contents:
     InputError
         When the file is missing, empty, no recording, cut off, or damaged anywhere.
     """
-    reader = _open(path)
-    stores = reader.recordings()
+    reader, stores = _open(path)
     if len(stores) != 1:
         raise InputError(f"{path}: holds {len(stores)} recordings, expected one")
-    rows: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     timelines: set[str] = set()
     properties: dict[str, dict[str, Any]] = {}
     for chunk in chunks(path, reader):
         entity = str(chunk.entity_path)
-        rows[entity] += chunk.num_rows
+        counts[entity] += chunk.num_rows
         timelines.update(chunk.timeline_names)
         if entity.startswith(entities.PROPERTIES + "/"):
-            properties.setdefault(entity.rpartition("/")[2], {}).update(_values(chunk))
+            name = entity.rpartition("/")[2]
+            for _, values in rows(chunk):
+                properties.setdefault(name, {}).update(values)
     return Contents(
         application=stores[0].application_id,
         recording_id=stores[0].recording_id,
         complete=_has_footer(reader),
-        rows=dict(sorted(rows.items())),
+        rows=dict(sorted(counts.items())),
         timelines=tuple(sorted(timelines)),
         properties=properties,
     )
@@ -68,30 +69,32 @@ def check(path: Path) -> Contents:
 
 def chunks(path: Path, reader: RrdReader | None = None) -> Iterator[Chunk]:
     """Every chunk of the recording, to the end; damage is found only when its chunk is read."""
-    reader = reader or _open(path)
+    reader = reader or _open(path)[0]
     try:
         yield from reader.stream()
     except (RuntimeError, ValueError) as error:
         raise InputError(f"{path}: damaged ({_reason(error)})") from None
 
 
-def column(path: Path, entity: str, component: str) -> list[tuple[float, Any]]:
-    """(Seconds of mission time, value) of one component of one entity, in the order of time."""
-    found = []
-    for chunk in chunks(path):
-        batch = chunk.to_record_batch() if str(chunk.entity_path) == entity else None
-        if batch is None or component not in batch.schema.names or chunk.is_static:
-            continue
-        if entities.MISSION_TIME not in batch.schema.names:
-            continue
-        times = batch.column(entities.MISSION_TIME).to_pylist()
-        values = batch.column(component).to_pylist()
-        pairs = zip(times, values, strict=True)
-        found += [(time.total_seconds(), value[0]) for time, value in pairs if value]
-    return sorted(found, key=lambda pair: pair[0])
+def rows(chunk: Chunk) -> Iterator[tuple[float | None, dict[str, Any]]]:
+    """Mission time in seconds, where a row has one, and its values by component; single values bare."""
+    batch = chunk.to_record_batch()
+    timed = entities.MISSION_TIME in batch.schema.names
+    times = batch.column(entities.MISSION_TIME).cast("int64").to_pylist() if timed else [None] * len(batch)
+    data = [name for name in batch.schema.names if name not in _INDEXES and not name.startswith("rerun.")]
+    for time, cells in zip(times, batch.select(data).to_pylist(), strict=True):
+        values = {name.rpartition(":")[2]: _bare(cell) for name, cell in cells.items() if cell is not None}
+        yield None if time is None else time / 1e9, values
 
 
-def _open(path: Path) -> RrdReader:
+_INDEXES = (entities.STEP, entities.CANDIDATE, entities.MISSION_TIME, entities.ROBOT_TIME)
+
+
+def _bare(cell: list[Any]) -> Any:
+    return cell[0] if len(cell) == 1 else cell
+
+
+def _open(path: Path) -> tuple[RrdReader, list[StoreEntry]]:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     if os.path.getsize(path) == 0:
@@ -100,7 +103,8 @@ def _open(path: Path) -> RrdReader:
         with warnings.catch_warnings():
             # A file without a footer is told by `Contents.complete`.
             warnings.simplefilter("ignore")
-            return RrdReader(path)
+            reader = RrdReader(path)
+            return reader, reader.recordings()
     except (RuntimeError, ValueError) as error:
         raise InputError(f"{path}: {_fault(path, error)}") from None
 
@@ -121,13 +125,3 @@ def _has_footer(reader: RrdReader) -> bool:
     except RuntimeError:
         return False
     return True
-
-
-def _values(chunk: Chunk) -> dict[str, Any]:
-    batch = chunk.to_record_batch()
-    values = {}
-    for name in batch.schema.names:
-        if not name.startswith("rerun."):
-            cell = batch.column(name).to_pylist()[-1]
-            values[name.partition(":")[2] or name] = cell[0] if cell and len(cell) == 1 else cell
-    return values

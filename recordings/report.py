@@ -32,9 +32,12 @@ def parameters(nouns: Nouns) -> Settings | None:
 
 
 def parameter_values(settings: Settings) -> dict[str, str]:
-    """The settings as JSON texts, so that a parameter has one type whatever its value."""
+    """The settings as texts, so that a parameter has one type whatever its value."""
     values = msgspec.to_builtins(settings)
-    return {name: msgspec.json.encode(value).decode() for name, value in values.items()}
+    return {
+        name: value if isinstance(value, str) else msgspec.json.encode(value).decode()
+        for name, value in values.items()
+    }
 
 
 def plan_report(nouns: Nouns, origin: Origin) -> str:
@@ -42,10 +45,20 @@ def plan_report(nouns: Nouns, origin: Origin) -> str:
     results = plan_results(nouns)
     title = nouns[Mission].name if Mission in nouns else results.get("floor", "plan")
     lines = [f"# {title}", "", "| | |", "|---|---|"]
-    lines += [f"| {name.replace('_', ' ')} | {_shown(value)} |" for name, value in results.items()]
+    lines += [f"| {name.replace('_', ' ')} | {_shown(value)} |" for name, value in _ordered(results)]
     lines += ["", *_stop_table(nouns.get(Mission)), *_findings(nouns)]
     lines += ["## Looking around", "", *_GUIDE, *_origin_note(origin)]
     return "\n".join(lines)
+
+
+FIRST = ("stops", "stops_bound", "coverage", "coverage_required", "route_m", "route_bound_m", "planned_s")
+"""What a reader looks for first."""
+
+
+def _ordered(results: dict[str, Any]) -> list[tuple[str, Any]]:
+    names = [name for name in FIRST if name in results]
+    names += [name for name in results if name not in FIRST]
+    return [(name, results[name]) for name in names]
 
 
 def _floor(floor: FloorPlan) -> dict[str, Any]:

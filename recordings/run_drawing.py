@@ -79,7 +79,9 @@ class RunDrawing:
         """Write the event down whole, mark it on the plan, and bring the report up to date."""
         self._began_ns = event.robot_ns - round(event.mission_time_s * 1e9)
         told = {name: value for name, value in msgspec.to_builtins(event).items() if name in EVENT_FIELDS}
-        self._at(self._flat("events"), rr.DynamicArchetype("Event", components=told), event.robot_ns)
+        self._at(
+            entities.events_of_run(self.run_id), rr.DynamicArchetype("Event", components=told), event.robot_ns
+        )
         level = "WARN" if isinstance(event, Skipped | Failed) else "INFO"
         line = rr.TextLog(f"{type(event).__name__} {_about(event)}".rstrip(), level=level)
         self._at(of_run(entities.LOG_FIELD, self.run_id), line, event.robot_ns)

@@ -9,7 +9,7 @@ import rerun as rr
 
 from mission.document import Mission
 from mission.floor import Finding, FloorPlan, Room
-from mission.geometry import FloatArray, IntArray
+from mission.geometry import FloatArray, IntArray, bounds
 from mission.planning import (
     DROP_REASONS,
     KEPT,
@@ -33,6 +33,9 @@ ORDER = {
 }
 HAIR, THIN, THICK, BOLD = (on_screen(width) for width in (0.5, 0.8, 1.6, 2.5))
 
+MOST_NAMES = 30
+"""With more rooms than these their names hide one another, and are shown where the mouse points."""
+
 
 def draw_floor(canvas: Canvas, floor: FloorPlan) -> None:
     """Outline, holes, rooms with names, elements by kind, openings."""
@@ -52,10 +55,11 @@ def draw_floor(canvas: Canvas, floor: FloorPlan) -> None:
 
 def draw_space(canvas: Canvas, space: NavigableSpace) -> None:
     """Where the robot may drive and stop, which openings it passes, what it is to look at."""
-    drive = strokes.hatch(space.drive_area, spacing=0.25, angle=np.pi / 4)
+    spacing = _hatch_spacing(space.floor)
+    drive = strokes.hatch(space.drive_area, spacing=spacing, angle=np.pi / 4)
     _lines(canvas, f"{entities.NAVIGABLE}/drive", drive, palette.DRIVE, "area", THIN)
     stop_polygons = [polygon for room in space.rooms for polygon in room.stop_area]
-    stop_area = strokes.hatch(stop_polygons, spacing=0.25, angle=-np.pi / 4)
+    stop_area = strokes.hatch(stop_polygons, spacing=spacing, angle=-np.pi / 4)
     _lines(canvas, f"{entities.NAVIGABLE}/stop", stop_area, palette.STOP_AREA, "area", THIN)
     edges = strokes.outlines(stop_polygons)
     _lines(canvas, f"{entities.NAVIGABLE}/stop_edge", edges, palette.STOP_AREA, "area", THIN)
@@ -63,7 +67,7 @@ def draw_space(canvas: Canvas, space: NavigableSpace) -> None:
     _draw_openings(canvas, space.openings)
     targets = space.targets
     lines = np.stack([targets.a, targets.b], axis=1)
-    _lines(canvas, entities.TARGETS, lines, palette.TARGET.colour, "target", THICK)
+    _lines(canvas, entities.TARGETS, lines, palette.TARGET.colour, "target", THIN)
     _say_findings(canvas, [item for item in space.findings if item not in space.floor.findings])
     canvas.say(f"navigable space: {len(space.rooms)} rooms, {targets.total} target units")
 
@@ -77,7 +81,7 @@ def draw_candidates(canvas: Canvas, candidates: Candidates) -> None:
     points = rr.Points2D(
         canvas.local(candidates.xy),
         class_ids=[palette.reason(int(number)).number for number in candidates.reason],
-        radii=np.where(kept, 0.09, 0.06),
+        radii=np.where(kept, on_screen(2.2), on_screen(1.5)),
         show_labels=False,
         draw_order=ORDER["candidate"],
     )
@@ -104,7 +108,9 @@ def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
     _style(canvas, f"{entities.VISIBILITY}/seen", palette.SEEN.colour, "target", BOLD)
     eye = f"{entities.VISIBILITY}/candidate"
     canvas.columns(eye, index, rr.Points2D.columns(positions=canvas.local(eyes)))
-    canvas.show(eye, rr.Points2D.from_fields(colors=palette.EYE, radii=0.15, draw_order=ORDER["stop"]))
+    canvas.show(
+        eye, rr.Points2D.from_fields(colors=palette.EYE, radii=on_screen(6), draw_order=ORDER["stop"])
+    )
     _plot_sight(canvas, visibility, index)
     visible = int(visibility.visible.sum())
     canvas.say(f"visibility ({visibility.method}): {visible} of {visibility.targets.total} units seen by any")
@@ -196,7 +202,12 @@ def _draw_chosen(canvas: Canvas, selection: Selection, index: rr.TimeColumn) -> 
     labels = [str(number + 1) for count in counts for number in range(count)]
     columns = rr.Points2D.columns(positions=positions, labels=labels)
     canvas.columns(stops, index, columns.partition(counts))
-    canvas.show(stops, rr.Points2D.from_fields(colors=palette.STOP, radii=0.16, draw_order=ORDER["stop"]))
+    canvas.show(
+        stops,
+        rr.Points2D.from_fields(
+            colors=palette.STOP, radii=on_screen(4), show_labels=True, draw_order=ORDER["stop"]
+        ),
+    )
     final = rr.Points2D.from_fields(positions=xy, labels=[str(number + 1) for number in range(steps)])
     canvas.at(stops, final, mission_s=0.0, candidate=0)
 
@@ -229,8 +240,8 @@ def _draw_rooms(canvas: Canvas, rooms: tuple[Room, ...]) -> None:
         canvas.local(np.array(at)),
         labels=[room.label for room in named],
         colors=palette.ROOM_NAME,
-        radii=on_screen(0.1),
-        show_labels=True,
+        radii=on_screen(1.5),
+        show_labels=len(named) <= MOST_NAMES,
         draw_order=ORDER["line"],
     )
     canvas.show(f"{entities.FLOOR}/room_names", points)
@@ -271,6 +282,12 @@ def _draw_openings(canvas: Canvas, openings: tuple[OpeningState, ...]) -> None:
     widths = [state.clear_width for state in openings]
     why = [state.why or "passable" for state in openings]
     canvas.show(f"{entities.FLOOR}/openings", lines, rr.AnyValues(clear_width=widths, why=why))
+
+
+def _hatch_spacing(floor: FloorPlan) -> float:
+    """Wide enough that hatches of a large floor do not run together on a screen."""
+    left, low, right, high = bounds(polygon.exterior for polygon in floor.outline)
+    return float(np.clip(max(right - left, high - low) / 90, 0.2, 1.0))
 
 
 def _say_findings(canvas: Canvas, findings: Iterable[Finding]) -> None:

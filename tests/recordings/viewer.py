@@ -10,15 +10,14 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import rerun_cli
 from rerun.experimental import View, ViewerClient
 
-from recordings import entities
-from recordings.layout import blueprint
-
 BINARY = Path(rerun_cli.__file__).with_name("rerun")
 PATIENCE_S = 15.0
+REDRAW_S = 0.5
 
 
 def has_vulkan() -> bool:
@@ -29,16 +28,14 @@ def has_vulkan() -> bool:
 
 
 @contextmanager
-def viewer(files: Sequence[Path], *, tab: int, size: str = "1600x1000") -> Iterator[ViewerClient]:
-    """A viewer that opened the files with this tab in front; its process group ends with the block.
+def viewer(files: Sequence[Path], *, size: str = "1600x1000") -> Iterator[ViewerClient]:
+    """A viewer that opened the files; its process group ends with the block.
 
     The files are given on the command line, as a person would: opened later they would not be merged.
     """
-    layout = files[0].with_suffix(f".tab{tab}.rbl")
-    blueprint(tab=tab).save(entities.APPLICATION, layout)
     port = _free_port()
     command = [str(BINARY), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
-    command += ["--window-size", size, *(str(path) for path in (*files, layout))]
+    command += ["--window-size", size, *map(str, files)]
     process = subprocess.Popen(
         command,
         start_new_session=True,
@@ -55,18 +52,42 @@ def viewer(files: Sequence[Path], *, tab: int, size: str = "1600x1000") -> Itera
         process.wait()
 
 
-def look(client: ViewerClient, into: Path) -> dict[str, tuple[View, Path]]:
-    """A picture of every view that is in front, by the view's name."""
+def show_tab(client: ViewerClient, name: str) -> set[str]:
+    """Bring this tab to the front; returns the ids of its views."""
+    parts = client.get_blueprint().blueprint
+    tabs = next(path for path in parts if _container(parts, path).get("container_kind") == "Tabs")
+    for part in _container(parts, tabs)["contents"]:
+        if _container(parts, f"/{part}").get("display_name") == name:
+            _container(parts, tabs)["active_tab"] = part
+            client.set_blueprint(parts, of="recording")
+            return _views(parts, f"/{part}")
+    raise AssertionError(f"no tab {name}")
+
+
+def look(client: ViewerClient, tab: str, into: Path) -> dict[str, tuple[View, Path]]:
+    """Each view of a tab by its name, with what it reported, and its picture."""
+    shown = show_tab(client, tab)
+    time.sleep(REDRAW_S)
     pictures = {}
     for view in client.get_state().views:
-        picture = into / f"{view.view_id}.png"
-        try:
-            client.save_screenshot(str(picture), view.view_id)
-        except ConnectionError:  # a view of another tab
-            continue
-        pictures[view.name] = (view, picture)
-    reports = {view.name: view for view in client.get_state().views}
-    return {name: (reports[name], picture) for name, (_, picture) in pictures.items()}
+        if view.view_id in shown:
+            pictures[view.view_id] = into / f"{view.view_id}.png"
+            client.save_screenshot(str(pictures[view.view_id]), view.view_id)
+    views = [view for view in client.get_state().views if view.view_id in shown]
+    return {view.name: (view, pictures[view.view_id]) for view in views}
+
+
+def _container(parts: dict[str, Any], path: str) -> dict[str, Any]:
+    return parts.get(path, {}).get("ContainerBlueprint", {})
+
+
+def _views(parts: dict[str, Any], path: str) -> set[str]:
+    """Ids of the views in a container and in the containers in it."""
+    found: set[str] = set()
+    for part in _container(parts, path).get("contents", ()):
+        kind, _, name = part.partition("/")
+        found |= {name} if kind == "view" else _views(parts, f"/{part}")
+    return found
 
 
 def _connected(port: int) -> ViewerClient:
