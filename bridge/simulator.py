@@ -148,7 +148,8 @@ class SimulatedBase:
         return "arrived"
 
     def stop(self) -> None:
-        self._stand(self.pose())
+        if self._world.placed:  # to stop is not to say where the robot stands
+            self._stand(self.pose())
 
     def stand_at(self, pose: Pose) -> None:
         """Put the robot there by hand."""
