@@ -12,7 +12,7 @@ import pytest
 
 from mission.errors import StopgoError
 from mission.floor import FloorPlan
-from mission.geometry import frozen
+from mission.geometry import Polygon, frozen
 from mission.planning import KEPT, Candidates, Visibility
 from mission.settings import Settings
 from planner.candidates import candidates
@@ -26,6 +26,7 @@ from tests.planner.oracle import visible_pairs
 from tests.planner.worlds import (
     PAPER,
     SHARED,
+    Move,
     box,
     column,
     door,
@@ -98,21 +99,18 @@ def at(floor: FloorPlan, xy: np.ndarray, settings: Settings | None = None) -> Vi
     return exact(given)
 
 
-def seen_places(seen: Visibility, back: object = lambda xy: xy) -> list[set[tuple[float, float]]]:
+def seen_places(seen: Visibility, back: Move = lambda xy: xy) -> list[set[tuple[float, float]]]:
     """For each position the midpoints of the units it sees, to a tenth of a millimetre, moved `back`."""
-    xy = np.round(back(seen.targets.unit_xy) + 3e-5, 4) + 0.0  # type: ignore[operator]
+    xy = np.round(back(seen.targets.unit_xy) + 3e-5, 4) + 0.0  # no midpoint is then on the edge of rounding
     return [set(map(tuple, xy[seen.seen_by(row)].tolist())) for row in range(seen.rows)]
 
 
 def furnished() -> FloorPlan:
     """Two rooms, columns round and square, a triangle, a beam, a closed stair; no two things in line."""
     angles = np.arange(0, 2 * np.pi, np.pi / 8)
-    round_column = element(
-        "round",
-        "columns",
-        type(box(0, 0, 1, 1)).of(np.c_[2.5 + 0.3 * np.cos(angles), 1.1 + 0.3 * np.sin(angles)]),
-    )
-    wedge = wall("wedge", type(box(0, 0, 1, 1)).of([(6.1, 2.9), (6.7, 3.0), (6.2, 3.4)]))
+    circle = np.round(np.c_[2.5 + 0.3 * np.cos(angles), 1.1 + 0.3 * np.sin(angles)], 4)
+    round_column = element("round", "columns", Polygon.of(circle))
+    wedge = wall("wedge", Polygon.of([(6.1, 2.9), (6.7, 3.0), (6.2, 3.4)]))
     beam = element("beam", "beams", box(1.0, 2.6, 7.0, 2.8))
     stair = element("stair", "stairs", box(6.0, 0.0, 7.0, 1.2))
     return two_rooms(0.9, at=2.3, more=(round_column, wedge, beam, stair, column("square", 1.0, 3.0)))
