@@ -73,7 +73,7 @@ class Drawn:
     closed: tuple[Closed, ...] = ()
     open: tuple[Open, ...] = ()
     dropped: tuple[Oddity, ...] = ()
-    """What has no length."""
+    """Lines without length."""
 
 
 def drawn(strokes: Iterable[Stroke], *, gap: float = SNAP) -> Drawn:
@@ -86,7 +86,7 @@ def drawn(strokes: Iterable[Stroke], *, gap: float = SNAP) -> Drawn:
         closed=_each_closed_once(_without_fills(closed)),
         open=_each_line_once([line for line in lines if line not in points]),
         dropped=tuple(
-            Oddity("no_length", "a line without length was dropped", place(line.points)) for line in points
+            Oddity("no_length", "a line shorter than 1 mm is ignored", place(line.points)) for line in points
         ),
     )
 

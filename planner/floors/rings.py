@@ -175,14 +175,17 @@ def joined(lines: Sequence[FloatArray], *, merge: bool, gap: float = GAP) -> Joi
     if not lines:
         return Joined((), (), ())
     faces: list[shapely.Polygon] = []
+    cells: list[shapely.Polygon] = []
     bridges, gaps = _bridges(lines, gap=gap)
     drawn = [shapely.LineString(line) for line in (*lines, *bridges)]
     for group in _connected(drawn):
-        enclosed = shapely.get_parts(shapely.polygonize([shapely.union_all([drawn[i] for i in group])]))
-        whole = polygons_of(shapely.union_all(enclosed)) if merge else list(enclosed)
-        faces += [shapely.Polygon(face.exterior) for face in whole if face.area > SLIVER]
-    edges = shapely.union_all([face.exterior for face in faces]).buffer(SNAP)
-    loose = tuple(i for i in range(len(lines)) if not edges.covers(drawn[i]))
+        noded = shapely.union_all([drawn[index] for index in group])
+        enclosed = polygons_of(shapely.polygonize([noded]))
+        whole = polygons_of(shapely.union_all(enclosed)) if merge else enclosed
+        faces += [shapely.Polygon(face.exterior) for face in whole]
+        cells += enclosed
+    edges = shapely.union_all([cell.boundary for cell in cells]).buffer(SNAP)
+    loose = tuple(index for index in range(len(lines)) if not edges.covers(drawn[index]))
     return Joined(tuple(faces), loose, tuple(gaps))
 
 

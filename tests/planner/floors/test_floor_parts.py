@@ -1,0 +1,366 @@
+"""Layers become the floor's outline, rooms, openings and elements."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+from conftest import Read, codes, rectangle
+from ezdxf.layouts import Modelspace
+
+from mission.floor import KINDS, FloorPlan
+
+
+def lines_around(model: Modelspace, layer: str, corners: list[tuple[float, float]]) -> None:
+    for start, end in zip(corners, [*corners[1:], corners[0]], strict=True):
+        model.add_line(start, end, dxfattribs={"layer": layer})
+
+
+def names(plan: FloorPlan) -> dict[str, float]:
+    return {room.name: round(room.area, 6) for room in plan.rooms}
+
+
+# The outline
+
+
+def test_rings_in_the_floor_are_holes_whatever_their_direction(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "FLOOR", 1, 1, 3, 3)
+        rectangle(model, "FLOOR", 5, 5, 6, 6, clockwise=True)
+
+    plan = read(draw)
+    assert plan.area == pytest.approx(80 - 4 - 1)
+    assert len(plan.outline[0].holes) == 2
+
+
+def test_a_ring_in_a_hole_is_floor_again(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "FLOOR", 1, 1, 7, 7)
+        rectangle(model, "FLOOR", 3, 3, 5, 5)
+
+    plan = read(draw)
+    assert plan.area == pytest.approx(80 - 36 + 4)
+    assert len(plan.outline) == 2
+
+
+def test_floor_parts_that_overlap_are_one(read: Read) -> None:
+    plan = read(lambda m: rectangle(m, "FLOOR", 8, 0, 14, 4))
+    assert plan.area == pytest.approx(80 + 4 * 4)
+    assert len(plan.outline) == 1
+
+
+def test_floor_parts_that_lie_apart_stay_apart(read: Read) -> None:
+    plan = read(lambda m: rectangle(m, "FLOOR", 12, 0, 14, 4))
+    assert [round(part.area) for part in plan.outline] == [80, 8]
+
+
+def test_a_floor_of_single_lines_is_joined(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        lines_around(model, "FLOOR", [(0, 0), (10, 0), (10, 8), (0, 8)])
+        lines_around(model, "FLOOR", [(2, 2), (3, 2), (3, 3), (2, 3)])
+        model.add_line((5, 0), (5, 8), dxfattribs={"layer": "FLOOR"})
+
+    plan = read(draw, floor=False)
+    assert plan.area == pytest.approx(79)
+    assert plan.findings == ()
+
+
+@pytest.mark.parametrize(("gap", "closed"), [(0.0005, True), (0.04, True), (0.06, False)])
+def test_a_gap_of_up_to_5_cm_is_closed(read: Read, gap: float, closed: bool) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "FLOOR", 20, 0, 30, 10)
+        corners = [(0, 0), (10, 0), (10, 8), (0, 8), (0, gap)]
+        for start, end in pairwise(corners):
+            model.add_line(start, end, dxfattribs={"layer": "FLOOR"})
+        polyline = [(40 + x, y) for x, y in corners]
+        model.add_lwpolyline(polyline, dxfattribs={"layer": "FLOOR"})
+
+    plan = read(draw, floor=False)
+    assert len(plan.outline) == (3 if closed else 1)
+    expected = ["open_outline"] if not closed else ["gap_closed"] * 2 if gap > 0.001 else []
+    assert codes(plan) == expected
+
+
+def test_a_ring_that_crosses_itself_is_repaired(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        bow_tie = [(1, 1), (3, 3), (3, 1), (1, 3)]
+        model.add_lwpolyline(bow_tie, close=True, dxfattribs={"layer": "COLUMNS"})
+
+    plan = read(draw)
+    assert [solid.area for solid in plan.elements[0].solids] == pytest.approx([1, 1])
+    assert codes(plan) == ["repaired"]
+    assert plan.findings[0].element == "columns-001"
+    assert plan.findings[0].at == (1.0, 1.0)
+
+
+def test_a_ring_without_area_is_a_line(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        model.add_lwpolyline([(1, 1), (3, 1)], close=True, dxfattribs={"layer": "WALLS"})
+        model.add_lwpolyline([(1, 2), (3, 2), (2, 2)], close=True, dxfattribs={"layer": "WALLS"})
+
+    plan = read(draw)
+    assert [len(element.lines) for element in plan.elements] == [1, 1]
+    assert plan.elements[0].solids == ()
+
+
+def test_repeated_points_are_dropped(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        model.add_lwpolyline([(1, 1), (3, 1), (3, 1), (3, 2)], close=True, dxfattribs={"layer": "WALLS"})
+
+    plan = read(draw)
+    assert len(plan.elements[0].solids[0].exterior) == 3
+    assert codes(plan) == ["repeated_points"]
+
+
+# Rooms
+
+
+def test_a_text_names_the_room_it_stands_in(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "ROOMS", 0, 0, 4, 8)
+        rectangle(model, "ROOMS", 4, 0, 10, 8)
+        model.add_text("101", dxfattribs={"layer": "ROOMS", "insert": (1, 5)})
+        model.add_text("Büro", dxfattribs={"layer": "ROOMS", "insert": (1, 4)})
+        model.add_mtext("{\\fArial;Open\\Poffice}", dxfattribs={"layer": "ROOMS", "insert": (6, 5)})
+        model.add_text("north", dxfattribs={"layer": "ROOMS", "insert": (50, 5)})
+
+    plan = read(draw)
+    assert names(plan) == {"101 Büro": 32, "Open office": 48}
+    assert codes(plan) == ["text_outside_rooms"]
+    assert plan.findings[0].at == (50.0, 5.0)
+
+
+def test_a_text_may_stand_in_a_block(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "ROOMS", 0, 0, 4, 8)
+        model.doc.blocks.new("tag").add_text("101", dxfattribs={"insert": (0.5, 0.5)})
+        insert = model.add_blockref("tag", (1, 1), dxfattribs={"layer": "ROOMS"})
+        insert.add_attrib("NAME", "Store", (2, 1), dxfattribs={"layer": "ROOMS"})
+
+    assert names(read(draw)) == {"101 Store": 32}
+
+
+def test_a_room_in_a_room_is_cut_out_of_it(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "ROOMS", 0, 0, 10, 8)
+        rectangle(model, "ROOMS", 2, 2, 4, 4, clockwise=True)
+        model.add_text("hall", dxfattribs={"layer": "ROOMS", "insert": (6, 5)})
+        model.add_text("booth", dxfattribs={"layer": "ROOMS", "insert": (3, 3)})
+
+    assert names(read(draw)) == {"hall": 76, "booth": 4}
+
+
+def test_a_nameless_ring_against_its_room_is_a_hole(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "ROOMS", 0, 0, 10, 8)
+        rectangle(model, "ROOMS", 2, 2, 4, 4, clockwise=True)
+        model.add_text("hall", dxfattribs={"layer": "ROOMS", "insert": (6, 5)})
+
+    plan = read(draw)
+    assert names(plan) == {"hall": 76}
+    assert len(plan.rooms[0].polygons[0].holes) == 1
+
+
+def test_a_ring_with_its_rooms_global_id_is_a_hole_though_a_text_stands_in_it(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        for ring in (rectangle(model, "ROOMS", 0, 0, 10, 8), rectangle(model, "ROOMS", 2, 2, 4, 4)):
+            ring.set_xdata("IFC", [(1000, "04Sq57eS5FffNezn2ilgmy")])  # type: ignore[attr-defined]
+        model.add_text("hall", dxfattribs={"layer": "ROOMS", "insert": (3, 3)})
+
+    plan = read(draw)
+    assert names(plan) == {"hall": 76}
+    assert plan.rooms[0].global_id == "04Sq57eS5FffNezn2ilgmy"
+
+
+def test_rings_of_one_global_id_are_one_room(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        for ring in (rectangle(model, "ROOMS", 0, 0, 4, 8), rectangle(model, "ROOMS", 6, 0, 10, 8)):
+            ring.set_xdata("IFC", [(1000, "04Sq57eS5FffNezn2ilgmy")])  # type: ignore[attr-defined]
+
+    plan = read(draw)
+    assert [len(room.polygons) for room in plan.rooms] == [2]
+
+
+def test_rooms_that_overlap_are_parted_and_told(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "ROOMS", 0, 0, 6, 8)
+        rectangle(model, "ROOMS", 5, 0, 10, 8)
+
+    plan = read(draw)
+    assert [room.area for room in plan.rooms] == pytest.approx([40, 40])
+    assert codes(plan) == ["rooms_overlap"]
+    assert plan.findings[0].element == "room-001"
+
+
+def test_rooms_may_be_drawn_as_lines(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        lines_around(model, "ROOMS", [(0, 0), (10, 0), (10, 8), (0, 8)])
+        model.add_line((4, 0), (4, 8), dxfattribs={"layer": "ROOMS"})
+
+    assert [room.area for room in read(draw).rooms] == pytest.approx([32, 48])
+
+
+def test_a_room_off_the_floor_is_told(read: Read) -> None:
+    plan = read(lambda m: rectangle(m, "ROOMS", 9, 0, 20, 8))
+    assert codes(plan) == ["room_off_floor"]
+
+
+# Openings
+
+
+def test_doors_and_passages_are_lines_across(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        model.add_line((4, 1), (4, 1.9), dxfattribs={"layer": "DOORS"})
+        model.add_lwpolyline([(3, 8), (2.5, 8.1), (2, 8)], dxfattribs={"layer": "DOORS"})
+        model.add_line((7, 5), (5, 5), dxfattribs={"layer": "PASSAGES"})
+
+    openings = read(draw).openings
+    assert [(item.id, item.kind, item.line.tolist()) for item in openings] == [
+        ("door-001", "door", [[2, 8], [3, 8]]),
+        ("door-002", "door", [[4, 1], [4, 1.9]]),
+        ("passage-001", "passage", [[5, 5], [7, 5]]),
+    ]
+
+
+def test_an_opening_without_length_is_dropped(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        model.add_line((4, 1), (4, 1), dxfattribs={"layer": "DOORS"})
+        model.add_line((4, 1), (4, 1.9), dxfattribs={"layer": "DOORS"})
+
+    plan = read(draw)
+    assert len(plan.openings) == 1
+    assert codes(plan) == ["no_length"]
+
+
+def test_a_door_leafs_swing_is_no_opening(read: Read) -> None:
+    plan = read(lambda m: m.add_arc((4, 1), 0.9, 0, 90, dxfattribs={"layer": "DOORS"}))
+    assert plan.openings == ()
+    assert codes(plan) == ["not_an_opening"]
+
+
+def test_a_door_drawn_as_a_box_is_the_line_along_its_middle(read: Read) -> None:
+    plan = read(lambda m: rectangle(m, "DOORS", 4, 1, 4.2, 2))
+    assert plan.openings[0].line.tolist() == [[4.1, 1], [4.1, 2]]
+    assert codes(plan) == ["closed_opening"]
+
+
+# Elements
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "other"])
+def test_each_kind_means_what_the_table_of_kinds_says(read: Read, kind: str) -> None:
+    (element,) = read(lambda m: rectangle(m, kind.upper(), 1, 1, 3, 2)).elements
+    means = KINDS[kind]
+    assert (element.id, element.kind) == (f"{kind}-001", kind)
+    assert (element.occludes, element.obstacle, element.target) == (
+        means.occludes,
+        means.obstacle,
+        means.target,
+    )
+
+
+@pytest.mark.parametrize(
+    "layer", ["walls", "Walls", "xref-BLDG-A$0$WALLS", "site$0$bldg$1$walls", "plan|WALLS"]
+)
+def test_layer_names_lose_case_and_prefix(read: Read, layer: str) -> None:
+    def draw(model: Modelspace) -> None:
+        # A bar is not allowed in the name of a layer that is entered, only in one that is referred to.
+        model.add_line((1, 1), (4, 5)).dxf.layer = layer
+
+    (element,) = read(draw).elements
+    assert element.kind == "walls"
+
+
+def test_a_ring_against_the_one_around_it_is_a_hole_in_a_wall(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "WALLS", 1, 1, 5, 5)
+        rectangle(model, "WALLS", 2, 2, 4, 4, clockwise=True)
+
+    (wall,) = read(draw).elements
+    assert wall.solids[0].area == pytest.approx(16 - 4)
+
+
+def test_a_ring_around_rooms_is_a_line_and_not_solid(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "WALLS", 0, 0, 10, 8)
+        rectangle(model, "WALLS", 4, 0, 4.2, 5)
+        rectangle(model, "ROOMS", 0.2, 0.2, 4, 7.8)
+
+    plan = read(draw)
+    assert [len(element.lines) for element in plan.elements] == [1, 0]
+    assert plan.elements[0].lines[0].tolist() == [[0, 0], [10, 0], [10, 8], [0, 8], [0, 0]]
+    assert codes(plan) == ["outline_not_solid"]
+
+
+def test_single_line_walls_around_a_room_leave_it_free(read: Read) -> None:
+    plan = read(lambda m: lines_around(m, "WALLS", [(1, 1), (4, 1), (4, 4), (1, 4)]))
+    assert [element.solids for element in plan.elements] == [()] * 4
+
+
+def test_a_column_of_single_lines_is_solid(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        lines_around(model, "COLUMNS", [(1, 1), (1.4, 1), (1.4, 1.4), (1, 1.4)])
+        model.add_line((1, 1), (1.4, 1.4), dxfattribs={"layer": "COLUMNS"})
+        model.add_line((3, 1), (3, 2), dxfattribs={"layer": "COLUMNS"})
+
+    column, line = read(draw).elements
+    assert column.solids[0].area == pytest.approx(0.16)
+    assert line.lines[0].tolist() == [[3, 1], [3, 2]]
+
+
+def test_treads_stay_lines(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "STAIRS", 1, 1, 2, 4)
+        for y in (2, 3):
+            model.add_line((1, y), (2, y), dxfattribs={"layer": "STAIRS"})
+
+    plan = read(draw)
+    assert sorted(len(element.lines) for element in plan.elements) == [0, 1, 1]
+
+
+def test_closed_shapes_of_an_unknown_layer_are_obstacles(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "A-FURN", 1, 1, 2, 2)
+        rectangle(model, "A-FURN", 3, 1, 4, 2)
+        model.add_line((5, 5), (6, 6), dxfattribs={"layer": "A-FURN"})
+        model.add_text("desk", dxfattribs={"layer": "A-FURN", "insert": (1, 1)})
+
+    plan = read(draw)
+    assert [(item.kind, item.obstacle, item.occludes, item.target) for item in plan.elements] == [
+        ("other", True, False, False)
+    ] * 2
+    assert codes(plan) == ["unknown_layer"]
+    assert "2 closed shapes" in plan.findings[0].message
+    assert "1 open lines and 1 texts" in plan.findings[0].message
+
+
+def test_frames_around_the_floor_and_shapes_beside_it_are_no_obstacles(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "SHEET", -5, -5, 15, 13)
+        rectangle(model, "SHEET", 16, -5, 20, 13)
+        rectangle(model, "DEFPOINTS", 1, 1, 2, 2)
+
+    plan = read(draw)
+    assert plan.elements == ()
+    assert set(codes(plan)) == {"unknown_layer", "outline_not_solid", "off_floor"}
+
+
+def test_dimensions_are_no_obstacles(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        model.add_linear_dim((1, 1), (1, 2), (5, 2), dxfattribs={"layer": "A-DIMS"}).render()
+
+    plan = read(draw)
+    assert plan.elements == ()
+    assert codes(plan) == ["unknown_layer"]
+
+
+@pytest.mark.parametrize("state", ["off", "freeze"])
+def test_hidden_layers_count_only_if_their_name_is_known(read: Read, state: str) -> None:
+    def draw(model: Modelspace) -> None:
+        for name in ("WALLS", "A-FURN"):
+            getattr(model.doc.layers.add(name), state)()
+            rectangle(model, name, 1, 1, 3, 2)
+
+    plan = read(draw)
+    assert [element.kind for element in plan.elements] == ["walls"]
+    assert codes(plan) == ["hidden_layer"]

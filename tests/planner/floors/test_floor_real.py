@@ -1,0 +1,76 @@
+"""Floors that nobody on this project drew, against counts taken from the files themselves."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from conftest import codes
+
+from mission.errors import InputError
+from planner.floors import read_floor
+
+DATA = Path(__file__).parents[4] / "shared" / "data"
+WILD = sorted((DATA / "dxf").glob("*.dxf"))
+
+real = pytest.mark.skipif(not DATA.is_dir(), reason=f"the real inputs are not in {DATA}")
+
+COUNTS = {
+    # rooms, doors, passages, floor m², rooms m², walls m², elements
+    "layered/office-l1": (59, 66, 2, 1790.0 - 8.76, 1705.2, 111.62, 383),
+    "layered/fzk-haus-eg": (6, 5, 3, 120.0, 101.4, 11.67, 34),
+    "layered/duplex-l1": (10, 6, 4, 180.5, 126.3, 24.03, 45),
+    "paper/synthetic_case1_rooms": (11, 11, 0, 326.1, 300.7, 31.33, 57),
+    "paper/synthetic_case1_structural": (0, 0, 0, 326.1, 0.0, 0.0, 168),
+    "paper/synthetic_case2_rooms": (14, 14, 0, 184.65, 162.9, 24.77, 36),
+    "paper/synthetic_case2_structural": (0, 0, 0, 184.65, 0.0, 0.0, 89),
+}
+
+
+@real
+@pytest.mark.parametrize("name", COUNTS)
+def test_a_layered_floor_has_what_its_file_holds(name: str) -> None:
+    rooms, doors, passages, floor, inside, walls, elements = COUNTS[name]
+    plan = read_floor(DATA / f"{name}.dxf", d_dis=0.05)
+    kinds = [opening.kind for opening in plan.openings]
+    assert (len(plan.rooms), kinds.count("door"), kinds.count("passage")) == (rooms, doors, passages)
+    assert plan.area == pytest.approx(floor, abs=0.05)
+    assert sum(room.area for room in plan.rooms) == pytest.approx(inside, abs=0.05)
+    solids = [solid for item in plan.elements if item.kind == "walls" for solid in item.solids]
+    assert sum(solid.area for solid in solids) == pytest.approx(walls, abs=0.005)
+    assert len(plan.elements) == elements
+    assert set(codes(plan)) <= {"unknown_layer"}
+
+
+@real
+def test_the_office_has_its_names_holes_and_global_ids() -> None:
+    plan = read_floor(DATA / "layered" / "office-l1.dxf", d_dis=0.05)
+    with_holes = {room.name for room in plan.rooms for part in room.polygons if part.holes}
+    assert with_holes == {"113 OPEN OFFICE", "115 TELE/COMM RM", "118 MECH RM", "140 OPEN OFFICE"}
+    assert all(room.name and room.global_id for room in plan.rooms)
+    assert len({room.global_id for room in plan.rooms}) == 59
+    assert all(element.global_id for element in plan.elements if element.kind == "walls")
+
+
+@real
+def test_the_office_is_read_in_half_a_second() -> None:
+    path = DATA / "layered" / "office-l1.dxf"
+    times = []
+    for _ in range(3):
+        started = time.perf_counter()
+        read_floor(path, d_dis=0.05)
+        times.append(time.perf_counter() - started)
+    assert min(times) < 0.5
+
+
+@real
+@pytest.mark.parametrize("path", WILD, ids=[path.stem for path in WILD])
+def test_a_drawing_from_the_wild_is_a_floor_or_one_line(path: Path) -> None:
+    try:
+        plan = read_floor(path, d_dis=0.05)
+    except InputError as error:
+        assert str(path) in str(error)
+        assert "\n" not in str(error)
+    else:
+        assert plan.outline
