@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -24,9 +25,11 @@ LOOKS: dict[str, dict[str, object]] = {
     "other": {"fill": "#efe2e2", "stroke": "#a58787"},
 }
 """How each element kind is filled; kinds not named here look like `other`."""
-SEEN: dict[str, object] = {"stroke": "#1a8f3c", "stroke_width": 0.5}
-UNSEEN: dict[str, object] = {"stroke": "#d7191c", "stroke_width": 0.8}
-HIDDEN: dict[str, object] = {"stroke": "#ee9a7b", "stroke_width": 0.3}
+SEEN: dict[str, Any] = {"stroke": "#1a8f3c", "stroke_width": 0.5}
+UNSEEN: dict[str, Any] = {"stroke": "#d7191c", "stroke_width": 0.8}
+HIDDEN: dict[str, Any] = {"stroke": "#ee9a7b", "stroke_width": 0.3}
+THINNER = {50: 1.0, 100: 0.8, 200: 0.65}
+"""At small scales a wall is hardly wider than the stroke along its face."""
 PASSABLE: dict[str, object] = {"stroke": "#0b63b0", "stroke_width": 0.4}
 BLOCKED: dict[str, object] = {"stroke": "#e07b00", "stroke_width": 0.5}
 
@@ -45,16 +48,18 @@ def building(space: NavigableSpace, sheet: Sheet) -> Iterator[str]:
 
 
 def targets(selection: Selection, sheet: Sheet) -> Iterator[str]:
-    """Faces out of every candidate's sight, in sight but not seen, and seen: the seen ones on top."""
+    """Faces out of every candidate's sight, in sight but not seen, and seen."""
     visibility = selection.visibility
     seen = seen_units(selection)
     layers = (
         ("hidden", ~visibility.visible, HIDDEN),
-        ("unseen", visibility.visible & ~seen, UNSEEN),
         ("seen", seen, SEEN),
+        ("unseen", visibility.visible & ~seen, UNSEEN),
     )
     for name, units, look in layers:
-        yield group(name, [path(_strokes(visibility.targets, units, sheet))], fill="none", **look)
+        width = {"stroke_width": THINNER.get(sheet.scale, 0.5) * look["stroke_width"]}
+        strokes = path(_strokes(visibility.targets, units, sheet))
+        yield group(name, [strokes], fill="none", **{**look, **width})
 
 
 def kinds_of(floor: FloorPlan) -> list[str]:

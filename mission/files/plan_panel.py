@@ -20,7 +20,7 @@ BODY = 2.3
 LINE = 4.0
 """Height of a line of the title block and of the legend."""
 TITLE_HEAD = 15.0
-SCALE_AND_AXES = 24.0
+SCALE_AND_AXES = 25.0
 MOST_ROWS = 1500
 """Stops listed; beyond, the table says how many more there are."""
 
@@ -48,11 +48,11 @@ def title_block(mission: Mission, facts: list[tuple[str, str]], box: Box) -> str
 def facts_of(route: Route, mission: Mission, *, date: str) -> list[tuple[str, str]]:
     """Lines of the title block; the sheet's own (scale, paper) are put in when it is chosen."""
     selection, settings, robot = route.selection, mission.origin.parameters, mission.robot
-    digest = mission.origin.floor_digest[:12]
     return [
         ("Mission", f"{mission.id[:12]}, revision {mission.revision}"),
         ("Digest", mission.digest[:12]),
-        ("Floor", f"{mission.origin.floor} ({digest})"),
+        ("Floor", mission.origin.floor),
+        ("Floor digest", mission.origin.floor_digest[:12]),
         ("Date", date),
         ("Scanner", f"{mission.scanner.profile}, range {mission.scanner.range:g} m"),
         ("Stops", f"{len(mission.stops)} (no plan has fewer than {selection.bound})"),
@@ -62,9 +62,13 @@ def facts_of(route: Route, mission: Mission, *, date: str) -> list[tuple[str, st
         ),
         ("Clearances", f"d_sec {settings.d_sec:g} m, robot {robot.radius:g} m, edge {settings.edge:g} m"),
         ("Route", f"{route.length:.1f} m, {route.tour} tour, {robot.speed:g} m/s"),
-        ("Planned time", f"{duration(schedule(mission).total_s)} h:min:s"),
+        ("Planned time", _time(schedule(mission).total_s)),
         ("Made by", f"stopgo {mission.origin.stopgo}"),
     ]
+
+
+def _time(seconds: float) -> str:
+    return f"{duration(seconds)} ({'h:min:s' if seconds >= 3600 else 'min:s'})"
 
 
 def _required(share: float) -> str:
@@ -83,9 +87,9 @@ def legend_entries(route: Route, mission: Mission) -> list[tuple[str, str]]:
         ("seen", "seen by the stops", True),
         ("unseen", "in sight, not seen", True),
         ("hidden", "out of sight", True),
-        ("passable", "opening, driven through", True in openings),
+        ("passable", "opening, passable", True in openings),
         ("blocked", "opening, not passable", False in openings),
-        ("stop", "stop, facing right", bool(mission.stops)),
+        ("stop", "stop, and its heading", bool(mission.stops)),
         ("doorway", "stop in a doorway", any(stop.doorway for stop in mission.stops)),
         ("start", "start", True),
         ("way", "route", bool(mission.stops)),
@@ -109,7 +113,7 @@ def legend(entries: list[tuple[str, str]], mission: Mission, sheet: Sheet) -> st
         y = box.y + 8.5 + LINE * (index % rows)
         items += [_symbol(symbol, x, y), text(x + 9, y + 0.8, words, size=BODY)]
     foot = box.y + box.height - SCALE_AND_AXES
-    items += [_scale_bar(sheet, x=box.x + 5, y=foot + 14), _axes(mission, x=box.x + 70, y=foot + 15)]
+    items += [_scale_bar(sheet, x=box.x + 5, y=foot + 16), _axes(mission, x=box.x + 70, y=foot + 17)]
     return group("legend", (_frame(box), *items))
 
 
@@ -157,7 +161,7 @@ def _scale_bar(sheet: Sheet, *, x: float, y: float) -> str:
     ]
     ends = [
         text(x + share * 5 * field, y - 1.2, f"{metres * share:g}", size=BODY, text_anchor="middle")
-        for share in (0, 0.4, 1)
+        for share in (0, 0.2, 1)
     ]
     words = text(x, y - 5.5, f"Scale 1:{sheet.scale}", size=2.8, font_weight="bold")
     return "".join((*fields, *ends, words, text(x + 5 * field + 3, y - 1.2, "m", size=BODY)))
@@ -165,11 +169,11 @@ def _scale_bar(sheet: Sheet, *, x: float, y: float) -> str:
 
 def _axes(mission: Mission, *, x: float, y: float) -> str:
     """The site's axes; north too where the mission says where on earth it is."""
-    arms = [_arrow(x, y, angle, length=8.0, label=label) for angle, label in ((0.0, "x"), (math.pi / 2, "y"))]
+    arms = [_arrow(x, y, angle, length=6.5, label=label) for angle, label in ((0.0, "x"), (math.pi / 2, "y"))]
     if mission.georeference is not None:
         # +y bears heading_deg clockwise from north, so north lies that much counter-clockwise of +y.
         north = math.pi / 2 + math.radians(mission.georeference.heading_deg)
-        arms.append(_arrow(x, y, north, length=11.0, label="N", stroke="#b00000"))
+        arms.append(_arrow(x, y, north, length=12.0, label="N", stroke="#b00000"))
     return group("axes", arms)
 
 
@@ -238,7 +242,7 @@ def coordinate_ticks(sheet: Sheet) -> str:
 
 def _ticks(sheet: Sheet, step: float, *, axis: int) -> Iterator[str]:
     box = sheet.drawing
-    room = (box.width, box.height)[axis] * sheet.scale / 1000 / 2 - step / 4
+    room = ((box.width, box.height)[axis] / 2 - 7.0) * sheet.scale / 1000
     first = math.ceil((sheet.centre[axis] - room) / step)
     last = math.floor((sheet.centre[axis] + room) / step)
     for index in range(first, last + 1):

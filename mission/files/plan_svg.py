@@ -9,10 +9,11 @@ import numpy as np
 from mission.document import Mission
 from mission.files import plan_panel as panel
 from mission.files.floor_drawing import building, targets
-from mission.files.room_labels import points_along, room_labels
+from mission.files.room_labels import Busy, points_along, room_labels
 from mission.files.route_drawing import STOP, rings, route, stops
 from mission.files.sheet import Box, Contents, Sheet, fit
 from mission.files.svg import FONT, attributes, clean, number, rect
+from mission.floor import FloorPlan
 from mission.geometry import FloatArray, bounds
 from mission.planning import Route
 
@@ -47,7 +48,7 @@ def _drawing(made: Route, mission: Mission, sheet: Sheet, *, with_range: bool) -
         targets(made.selection, sheet),
         [rings(mission, sheet)] if with_range else [],
         route(mission, sheet),
-        [room_labels(space.floor.rooms, sheet, avoid=_busy(mission, sheet), reach=0.4)],
+        [room_labels(space.floor.rooms, sheet, avoid=_busy(mission, space.floor, sheet))],
         stops(mission, sheet),
     )
     inside = "\n".join(part for part in parts if part)
@@ -55,15 +56,25 @@ def _drawing(made: Route, mission: Mission, sheet: Sheet, *, with_range: bool) -
     return (clipped, _outline(sheet.drawing), panel.coordinate_ticks(sheet))
 
 
-def _busy(mission: Mission, sheet: Sheet) -> FloatArray:
-    """Points on paper that room names keep away from: stops, densely, and the route."""
-    legs = [*(stop.approach for stop in mission.stops), mission.return_ or ()]
-    lines = [sheet.on_paper(np.array(leg, dtype=np.float64).reshape(-1, 2)) for leg in legs]
+def _busy(mission: Mission, floor: FloorPlan, sheet: Sheet) -> Busy:
+    """What room names keep away from: stops above all, then the route, then elements."""
     turns = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     disc = (STOP + 0.5) * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     centres = [(mission.start.x, mission.start.y), *((stop.x, stop.y) for stop in mission.stops)]
     discs = [place + disc for place in sheet.on_paper(np.array(centres))]
-    return np.concatenate([*discs, *points_along(lines, spacing=1.0)])
+    solids = [solid.exterior for item in floor.elements for solid in item.solids]
+    closed = [np.concatenate([ring, ring[:1]]) for ring in solids]
+    lines = [line for item in floor.elements for line in item.lines]
+    return Busy.of(
+        (6.0, discs),
+        (1.0, list(points_along([sheet.on_paper(leg) for leg in _legs(mission)], spacing=1.0))),
+        (0.7, list(points_along([sheet.on_paper(line) for line in (*closed, *lines)], spacing=1.5))),
+    )
+
+
+def _legs(mission: Mission) -> list[FloatArray]:
+    legs = [*(stop.approach for stop in mission.stops), mission.return_ or ()]
+    return [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs]
 
 
 def _bounds(made: Route, mission: Mission) -> tuple[float, float, float, float]:
@@ -73,11 +84,9 @@ def _bounds(made: Route, mission: Mission) -> tuple[float, float, float, float]:
     lines = [line for item in floor.elements for line in item.lines]
     rooms = [part.exterior for room in floor.rooms for part in room.polygons]
     openings = [opening.line for opening in floor.openings]
-    legs = [*(stop.approach for stop in mission.stops), mission.return_ or ()]
-    ways = [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs]
     start = np.array([[mission.start.x, mission.start.y]])
     outline = [part.exterior for part in floor.outline]
-    return bounds([*outline, *rooms, *solids, *lines, *openings, *ways, start])
+    return bounds([*outline, *rooms, *solids, *lines, *openings, *_legs(mission), start])
 
 
 def _scale(sheet: Sheet) -> str:

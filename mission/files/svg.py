@@ -40,14 +40,27 @@ def clean(content: str) -> str:
 
 
 def text_width(content: str, size: float) -> float:
-    """About the width of a line of text in the fonts asked for, on the wide side."""
-    return 0.58 * size * len(content)
+    """About the width of a line of text, as in the widest of the fonts asked for."""
+    return size * sum(map(_letter_width, content))
+
+
+def _letter_width(letter: str) -> float:
+    if letter in " .,:;'|ijlI-()[]/":
+        return 0.36
+    if letter.isupper() or letter in "mw%@":
+        return 0.72
+    # East Asian letters are square.
+    return 0.62 if letter < "\u2e80" else 1.0
 
 
 def shortened(content: str, *, size: float, width: float) -> str:
     """The text, cut with an ellipsis where it would be wider than `width`."""
-    most = max(1, int(width / (0.58 * size)))
-    return content if len(content) <= most else content[: most - 1] + "…"
+    if text_width(content, size) <= width:
+        return content
+    kept = content
+    while len(kept) > 1 and text_width(kept + "…", size) > width:
+        kept = kept[:-1]
+    return kept.rstrip() + "…"
 
 
 def line(x1: float, y1: float, x2: float, y2: float, **style: object) -> str:
