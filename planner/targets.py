@@ -14,6 +14,8 @@ from mission.geometry import FloatArray, frozen, polyline_length
 from mission.planning import Targets
 from planner.shapes import GRID, local_origin, one_shape, polygon_parts, snapped, snapped_union
 
+STRAIGHT = 1.5
+"""A vertex this many grid steps beside the line of its neighbours is on it: snapping moved it."""
 LINE_WALL = 1e-3
 """Thickness in metres given to an occluding element that is drawn as a single line."""
 
@@ -68,8 +70,12 @@ def targets_of(floor: FloorPlan, occluders: BaseGeometry, *, d_dis: float) -> Ta
 
 
 def units_on(lengths: FloatArray, *, d_dis: float) -> FloatArray:
-    """Fewest equal pieces of at most `d_dis` that make up each length (paper, 3.1)."""
-    return np.maximum(1, np.ceil(lengths / d_dis - 1e-9)).astype(np.int64)
+    """Fewest equal pieces of at most `d_dis` that make up each length (paper, 3.1).
+
+    A length may be over by what snapping its ends to the grid adds, so that turning the drawing does
+    not add a unit.
+    """
+    return np.maximum(1, np.ceil((lengths - 2 * GRID) / d_dis)).astype(np.int64)
 
 
 def raw_units(floor: FloorPlan, *, d_dis: float) -> dict[str, int]:
@@ -156,8 +162,9 @@ def _thinned(
     points = ring[:-1]
     whole = np.rint(points / GRID).astype(np.int64)
     before, after = np.roll(whole, 1, axis=0), np.roll(whole, -1, axis=0)
-    into, out = whole - before, after - whole
-    straight = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] == 0
+    into, across = whole - before, after - before
+    beside = np.abs(across[:, 0] * into[:, 1] - across[:, 1] * into[:, 0]) / np.hypot(*across.T)
+    straight = beside < STRAIGHT
     keep = [
         not straight[k]
         or uses[tuple(points[k])] > 1
