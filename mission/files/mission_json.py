@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import re
@@ -11,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from mission.document import SCHEMA, VERSION, Mission, digest_of, sealed
+from mission.document import SCHEMA, VERSION, Mission, canonical, digest_of, sealed
 from mission.errors import InputError
 from mission.files.atomic import write_atomic
 
@@ -46,12 +47,7 @@ def parse(data: bytes, name: str) -> Mission:
     document = _parse_json(data, name)
     _check_schema(document, name)
     mission = _convert(document, name)
-    digest = digest_of(mission)
-    if digest != mission.digest:
-        raise InputError(
-            f"{name}: $.digest is {_shown(mission.digest)} but the content gives {digest[:12]}…: "
-            "it was changed after it was written; plan again or take the original"
-        )
+    _check_digest(document, mission, name)
     return mission
 
 
@@ -164,6 +160,18 @@ def _convert(document: dict[str, Any], name: str) -> Mission:
         reason, _, place = str(error).partition(" - at ")
         path = place.strip("`") or "$"
         raise InputError(f"{name}: {path} is {_shown(_at(document, path))}: {reason}") from None
+
+
+def _check_digest(document: dict[str, Any], mission: Mission, name: str) -> None:
+    """Of the document as it stands, so that it outlives parameters that later versions add; or, where
+    another program wrote 4.0 as 4, of the mission read from it."""
+    rest = {key: value for key, value in document.items() if key != "digest"}
+    digest = hashlib.sha256(canonical(rest)).hexdigest()
+    if mission.digest not in (digest, digest_of(mission)):
+        raise InputError(
+            f"{name}: $.digest is {_shown(mission.digest)} but the content gives {digest[:12]}…: "
+            "it was changed after it was written; plan again or take the original"
+        )
 
 
 def _at(document: object, path: str) -> Any:

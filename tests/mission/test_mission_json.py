@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import hashlib
 import json
 import math
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mission.document import Mission, Transform, sealed
+from mission.document import Mission, Transform, canonical, sealed
 from mission.errors import InputError
 from mission.files.mission_json import encode, next_revision, parse, read, write
 from tests.mission.worlds import mission_of, square_tour, stop
@@ -62,6 +63,18 @@ def test_a_polyline_is_one_point_a_line() -> None:
 def test_another_indentation_reads_the_same() -> None:
     assert parse(json.dumps(DOCUMENT).encode(), "m") == square_tour()
     assert parse(json.dumps(DOCUMENT, indent=8, sort_keys=True).encode(), "m") == square_tour()
+
+
+def test_numbers_that_another_program_wrote_shorter_read_the_same() -> None:
+    text = json.dumps(DOCUMENT).replace("4.0", "4")
+    assert parse(text.encode(), "m") == square_tour()
+
+
+def test_a_parameter_that_was_not_there_when_it_was_written_does_not_break_the_digest() -> None:
+    document = copy.deepcopy(DOCUMENT)
+    del document["digest"], document["origin"]["parameters"]["seed"]
+    document["digest"] = hashlib.sha256(canonical(document)).hexdigest()
+    assert parse(json.dumps(document).encode(), "m").origin.parameters.seed == 1
 
 
 def refusal(data: bytes) -> str:

@@ -40,8 +40,9 @@ def test_no_object_takes_unknown_keys() -> None:
 
 @pytest.mark.parametrize("key", list(DOCUMENT))
 def test_every_key_is_required(key: str) -> None:
-    with pytest.raises(ValidationError, match=f"'{key}' is a required property"):
-        VALIDATOR.validate({name: value for name, value in DOCUMENT.items() if name != key})
+    rest = {name: value for name, value in DOCUMENT.items() if name != key}
+    told = [error.message for error in VALIDATOR.iter_errors(rest)]
+    assert f"'{key}' is a required property" in told
 
 
 @pytest.mark.parametrize(
