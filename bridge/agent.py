@@ -27,6 +27,7 @@ from bridge.protocol import (
     Keys,
     LogPage,
     Malformed,
+    count_of,
     decode,
     encode,
 )
@@ -148,11 +149,13 @@ class Agent:
         return encode(self._controller.obey(command))
 
     def _log(self, request: Request) -> bytes:
-        since = request.parameters.get("since", "0")
-        if not since.isdecimal() or len(since) > 18:
-            return encode(Malformed(message=f"since={since}: a number of an event is wanted"))
+        self._contact()
+        try:
+            since = count_of(request.parameters.get("since", "0"))
+        except ValueError as error:
+            return encode(Malformed(message=f"since: {error}"))
         run_id = request.parameters.get("run")
-        events = self._journal.events(since=int(since), run_id=run_id, limit=LOG_PAGE)
+        events = self._journal.events(since=since, run_id=run_id, limit=LOG_PAGE)
         return encode(LogPage(events=events, newest=self._journal.newest))
 
     def _tell_news(self) -> None:

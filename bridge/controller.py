@@ -125,6 +125,7 @@ class Controller:
                 self._write(decision.change)
                 self._store_lease(decision.lease)
             self._journal.store_answer(order, answer)
+            self._journal.forget_answers()
 
     def _store_lease(self, lease: Lease | None) -> None:
         if lease is not None:
@@ -156,7 +157,7 @@ class Controller:
         message = f"command id {command.cmd_id} was used for another order"
         return self._answer(command, Refused("id_reused", message))
 
-    def take(self, commit: Commit, document: bytes, mission: Mission) -> Rejected | None:
+    def take(self, commit: Commit, mission: Mission) -> Rejected | None:
         """Store a whole mission and make it the one to be run; not while another one runs."""
         with self._lock:
             before = self.lease
@@ -172,9 +173,7 @@ class Controller:
                 return Rejected(reason="running", messages=(message,))
             run = self._run if current else runs.installed(self._run, mission)
             with self._journal.transaction():
-                if self._journal.mission(mission.id, mission.revision) is None:
-                    self._journal.store_mission(commit.manifest, document)
-                self._journal.end_transfer(commit.manifest)
+                self._journal.keep_transfer(commit.manifest)
                 self._store_lease(lease)
                 self._write(Change(run, handed_over(before, lease)))
             if not current:

@@ -26,6 +26,7 @@ from bridge.protocol import (
     Ready,
     Reason,
     Rejected,
+    count_of,
     decode,
 )
 from mission.document import Mission
@@ -59,11 +60,12 @@ class Inbox:
             case ["begin"]:
                 return self._begin(mission_id, decode(request.payload, Manifest))
             case ["chunk", number]:
-                return self._chunk(mission_id, int(number), request)
+                return self._chunk(mission_id, count_of(number), request)
             case ["commit"]:
                 return self._commit(mission_id, decode(request.payload, Commit))
             case ["part", number]:
-                return self._part(mission_id, int(number), int(request.parameters.get("revision", "-1")))
+                revision = count_of(request.parameters.get("revision", ""))
+                return self._part(mission_id, count_of(number), revision)
         return Malformed(message=f"no such step: {'/'.join(step)}")
 
     def _begin(self, mission_id: str, manifest: Manifest) -> Message:
@@ -99,17 +101,15 @@ class Inbox:
         )
 
     def _holds(self, manifest: Manifest) -> bool:
+        """Whether this very mission is stored; its bytes may have been written with other spaces."""
         stored = self._journal.mission(manifest.mission_id, manifest.revision)
-        return stored is not None and (stored[0].digest, stored[0].sha256) == (
-            manifest.digest,
-            manifest.sha256,
-        )
+        return stored is not None and stored[0].digest == manifest.digest
 
     def _chunk(self, mission_id: str, number: int, request: Request) -> Message:
         manifest = self._journal.transfer(mission_id)
         if manifest is None or request.parameters.get("of") != manifest.sha256:
             return _no("incomplete", "no such transfer is under way; begin it again")
-        if not 0 <= number < manifest.chunks:
+        if number >= manifest.chunks:
             return _no("incomplete", f"chunk {number}: there are {manifest.chunks}")
         last = manifest.size - manifest.chunk_bytes * (manifest.chunks - 1)
         expected = last if number == manifest.chunks - 1 else manifest.chunk_bytes
@@ -123,29 +123,37 @@ class Inbox:
         refusal = self._unwelcome(mission_id, manifest)
         if refusal:
             return refusal
-        stored = self._journal.mission(mission_id, manifest.revision)
-        document = stored[1] if stored else self._journal.chunks(manifest.sha256)
+        already = self._holds(manifest)
+        mission = self._stored(manifest) if already else self._received(manifest)
+        if isinstance(mission, Rejected):
+            return mission
+        refusal = self._controller.take(commit, mission)
+        return refusal or Accepted(
+            mission_id=mission.id, revision=mission.revision, digest=mission.digest, already=already
+        )
+
+    def _stored(self, manifest: Manifest) -> Mission | Rejected:
+        stored = self._journal.mission(manifest.mission_id, manifest.revision)
+        assert stored is not None
+        return self._read(stored[1], manifest)
+
+    def _received(self, manifest: Manifest) -> Mission | Rejected:
+        """The mission that has arrived in chunks, if they are all there and give the right hash."""
+        document = self._journal.chunks(manifest.sha256)
         if len(document) != manifest.size:
             return _no("incomplete", f"{len(document)} of {manifest.size} bytes have arrived")
         if hashlib.sha256(document).hexdigest() != manifest.sha256:
             self._journal.end_transfer(manifest)
             return _no("digest", "what arrived has another sha256 than the manifest; push it again")
-        mission = self._read(document, manifest)
-        if isinstance(mission, Rejected):
-            return mission
-        refusal = self._controller.take(commit, document, mission)
-        return refusal or Accepted(
-            mission_id=mission.id,
-            revision=mission.revision,
-            digest=mission.digest,
-            already=stored is not None,
-        )
+        return self._read(document, manifest)
 
     def _read(self, document: bytes, manifest: Manifest) -> Mission | Rejected:
         try:
             mission = parse(document, "the document")
         except InputError as error:
             return _no("malformed", str(error))
+        except RecursionError:
+            return _no("malformed", "the document is nested too deeply")
         if (mission.id, mission.revision, mission.digest) != (
             manifest.mission_id, manifest.revision, manifest.digest,
         ):  # fmt: skip
@@ -158,7 +166,7 @@ class Inbox:
         if stored is None:
             return _no("no_mission", f"mission {mission_id} revision {revision} is not on this robot")
         manifest, document = stored
-        data = document[number * CHUNK_BYTES : (number + 1) * CHUNK_BYTES] if number >= 0 else b""
+        data = document[number * CHUNK_BYTES : (number + 1) * CHUNK_BYTES]
         return MissionPart(manifest=manifest, index=number, data=data)
 
 

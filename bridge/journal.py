@@ -35,6 +35,8 @@ CREATE TABLE IF NOT EXISTS chunks (
     sha256 TEXT NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL, PRIMARY KEY (sha256, number));
 """
 
+ANSWERS_KEPT = 10_000
+
 S = TypeVar("S", bound=msgspec.Struct)
 
 
@@ -126,6 +128,10 @@ class Journal:
             "INSERT INTO answers VALUES (?, ?, ?)", answer.cmd_id, order_sha, msgspec.json.encode(answer)
         )
 
+    def forget_answers(self, *, keep: int = ANSWERS_KEPT) -> None:
+        """Drop all but the newest answers; orders that old have long expired and are refused anyway."""
+        self._write("DELETE FROM answers WHERE rowid <= (SELECT MAX(rowid) FROM answers) - ?", keep)
+
     def mission(self, mission_id: str, revision: int) -> tuple[Manifest, bytes] | None:
         rows = self._rows(
             "SELECT manifest, document FROM missions WHERE mission_id = ? AND revision = ?",
@@ -139,11 +145,16 @@ class Journal:
         )
         return msgspec.json.decode(rows[0][0], type=Manifest) if rows else None
 
-    def store_mission(self, manifest: Manifest, document: bytes) -> None:
-        self._write(
-            "INSERT INTO missions VALUES (?, ?, ?, ?)",
-            *(manifest.mission_id, manifest.revision, msgspec.json.encode(manifest), document),
-        )
+    def keep_transfer(self, manifest: Manifest) -> None:
+        """What has arrived becomes a stored mission, unless it is one already; the transfer is over."""
+        with self.transaction():
+            if self.mission(manifest.mission_id, manifest.revision) is None:
+                self._write(
+                    "INSERT INTO missions VALUES (?, ?, ?, ?)",
+                    *(manifest.mission_id, manifest.revision, msgspec.json.encode(manifest)),
+                    self.chunks(manifest.sha256),
+                )
+            self.end_transfer(manifest)
 
     def transfer(self, mission_id: str) -> Manifest | None:
         """What is being received of this mission."""

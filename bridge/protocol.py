@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Any, Final, Literal, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 import msgspec
 
@@ -25,6 +25,10 @@ LEASE_S: Final = 60.0
 """How long a commander keeps the robot after the last order."""
 LONGEST_VALID_S: Final = 60.0
 """No order may claim to be valid for longer."""
+
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+"""A number that JSON readers and SQLite hold exactly."""
+Word = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 
 Verb = Literal["start", "pause", "resume", "skip", "retry", "abort", "home"]
 Reason = Literal[
@@ -133,14 +137,14 @@ class Info(Message, frozen=True):
 class Manifest(Message, frozen=True):
     """What is about to be transferred, on `mission/<id>/begin`."""
 
-    mission_id: str
-    revision: int
-    digest: str
+    mission_id: Word
+    revision: Count
+    digest: Word
     """The mission's own digest."""
-    size: int
-    sha256: str
+    size: Count
+    sha256: Word
     """Of the transferred bytes."""
-    chunk_bytes: int
+    chunk_bytes: Count
 
     @property
     def chunks(self) -> int:
@@ -162,8 +166,8 @@ class Commit(Message, frozen=True):
     """Everything has been sent: verify and store it, on `mission/<id>/commit`."""
 
     manifest: Manifest
-    commander: str
-    fence: int | None = None
+    commander: Word
+    fence: Count | None = None
     take_over: bool = False
 
 
@@ -195,20 +199,20 @@ class MissionPart(Message, frozen=True):
 class Command(Message, frozen=True):
     """An order on `cmd/<verb>`; sent again with the same `cmd_id` it is carried out once."""
 
-    cmd_id: str
+    cmd_id: Word
     verb: Verb
-    commander: str
+    commander: Word
     issued_ns: int
     valid_for_s: float
-    fence: int | None = None
+    fence: Count | None = None
     """The lease number that the commander knew."""
     take_over: bool = False
     expect_state: tuple[State, ...] | None = None
     """Refused in any other state, so that a late order does no harm."""
-    run_id: str | None = None
-    mission_id: str | None = None
-    revision: int | None = None
-    stop: str | None = None
+    run_id: Word | None = None
+    mission_id: Word | None = None
+    revision: Count | None = None
+    stop: Word | None = None
     """The stop that skip and retry are meant for."""
     again: bool = False
     from_here: bool = False
@@ -249,3 +253,10 @@ def encode(message: Any) -> bytes:
 def decode(payload: bytes, kind: type[M]) -> M:
     """The message in `payload`; raises `msgspec.ValidationError` or `DecodeError` with the JSON path."""
     return msgspec.json.decode(payload, type=kind)
+
+
+def count_of(text: str) -> int:
+    """The number in a key or parameter; raises `ValueError` for anything but a plain, not too large one."""
+    if not text.isdecimal() or len(text) > 15:
+        raise ValueError(f"{text[:20]!r} is not a number")
+    return int(text)

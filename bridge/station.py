@@ -165,7 +165,7 @@ class Station:
         state = self.status()
         kept = self._part(manifest.mission_id, manifest.revision, 0).manifest
         if (state.mission_id, state.revision) != (manifest.mission_id, manifest.revision) or (
-            kept.sha256 != manifest.sha256
+            kept.digest != manifest.digest
         ):
             raise OutcomeUnknown(
                 f"{self.keys.robot} accepted the mission, but tells of mission {state.mission_id}"

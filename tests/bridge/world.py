@@ -16,7 +16,7 @@ from bridge.controller import Controller
 from bridge.inbox import Inbox
 from bridge.journal import Journal, memory_journal
 from bridge.link import MemoryLink, Switchboard
-from bridge.protocol import Answer, Command, Keys, Verb
+from bridge.protocol import Answer, Command, Commit, Keys, Manifest, Verb
 from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
 from bridge.station import Station
 from mission.document import (
@@ -74,6 +74,7 @@ class Field:
     clock: SimulatedClock = field(default_factory=SimulatedClock)
     wear: Wear = EXACT
     keep: Path | None = None
+    record: Path | None = None
     faults: Faults = NO_FAULTS
     ids: Any = field(default_factory=count)
 
@@ -81,7 +82,7 @@ class Field:
         self.board = Switchboard()
         self.keys = Keys("r1")
         self.base = SimulatedBase(clock=self.clock, wear=self.wear, keep=self.keep, faults=self.faults)
-        self.scanner = SimulatedScanner(clock=self.clock, faults=self.faults)
+        self.scanner = SimulatedScanner(clock=self.clock, faults=self.faults, record=self.record)
         self.boot()
 
     def boot(self) -> None:
@@ -101,6 +102,9 @@ class Field:
         )  # fmt: skip
         agent.serve()
         return Station(self.board.link(), self.keys, commander="test", timeout_s=0.3)
+
+    def commit(self, manifest: Manifest) -> Commit:
+        return Commit(manifest=manifest, commander="test")
 
     def order(self, verb: Verb, **details: Any) -> Answer:
         return self.controller.obey(self.command(verb, **details))
