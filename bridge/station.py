@@ -192,19 +192,22 @@ class Station:
         OutcomeUnknown
             If no answer came: the order may or may not have been carried out.
         """
-        asked = time.monotonic()
-        order = self._order(verb, self.info(), details)
-        left = max(TRY_S, self.timeout_s - (time.monotonic() - asked))
-        reply = self._insist(self.keys.command(verb), encode(order), left)
-        answer = self._answered(reply, Answer, verb)
+        return self.give(self.order(verb, **details))
+
+    def give(self, order: Command) -> Answer:
+        """Give an order that was written before; given again it is still carried out once."""
+        reply = self._insist(self.keys.command(order.verb), encode(order), self.timeout_s)
+        answer = self._answered(reply, Answer, order.verb)
         if answer.outcome == "refused":
-            raise AnswerIsNo(f"{self.keys.robot} refused {verb}: {answer.reason}: {answer.message}")
+            raise AnswerIsNo(f"{self.keys.robot} refused {order.verb}: {answer.reason}: {answer.message}")
         return answer
 
-    def _order(self, verb: Verb, info: Info, details: dict[str, Any]) -> Command:
-        """The order as meant for the robot as it was just seen: late, it meets another and is refused."""
+    def order(self, verb: Verb, **details: Any) -> Command:
+        """An order for the robot as it is just now: late, it meets another state and is refused."""
+        info = self.info()
         state, cautious = info.state, verb not in FREE_VERBS
         meant: dict[str, Any] = {
+            "valid_for_s": self.timeout_s,
             "run_id": None if verb == "start" else state.run_id,
             "mission_id": state.mission_id,
             "revision": state.revision,
@@ -214,8 +217,8 @@ class Station:
         }
         given = {key: value for key, value in details.items() if value is not None}
         return Command(
-            cmd_id=uuid.uuid4().hex, verb=verb, commander=self.commander, valid_for_s=self.timeout_s,
-            issued_ns=info.clock_ns, **(meant | given),
+            cmd_id=uuid.uuid4().hex, verb=verb, commander=self.commander, issued_ns=info.clock_ns,
+            **(meant | given),
         )  # fmt: skip
 
     def log(self, *, since: int = 0, run_id: str | None = None) -> tuple[AnyEvent, ...]:
