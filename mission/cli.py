@@ -17,7 +17,7 @@ from mission.geometry import frozen, polyline_length
 from mission.planning import Schedule
 from mission.schedule import schedule
 from mission.sense import Problem, problems_of
-from mission.table import duration, table
+from mission.table import duration, printable, table
 
 MissionFile = Annotated[Path, typer.Argument(metavar="MISSION", help="A mission.json.")]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout and nothing else.")]
@@ -133,7 +133,7 @@ def _head(mission: Mission) -> str:
         "start": f"({start.x:.3f}, {start.y:.3f}) facing {math.degrees(start.heading):.1f}° ({start.reason})",
         "made by": f"stopgo {mission.origin.stopgo}",
     }
-    return "\n".join(f"{name:8} {value}" for name, value in lines.items())
+    return "\n".join(f"{name:8} {printable(value)}" for name, value in lines.items())
 
 
 def _identity(mission: Mission) -> str:

@@ -10,11 +10,17 @@ _GAP = "  "
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Lines of a table; a column whose every cell reads as a number is set to the right."""
+    rows = [[printable(cell) for cell in row] for row in rows]
     columns = list(zip(header, *rows, strict=True))
     widths = [max(map(_width, column)) for column in columns]
     right = [all(map(_is_number, column[1:])) and len(rows) > 0 for column in columns]
     rule = ["-" * width for width in widths]
     return "\n".join(_line(cells, widths, right) for cells in (header, rule, *rows))
+
+
+def printable(content: str) -> str:
+    """Text from a file, with what would move the cursor or colour the terminal replaced."""
+    return "".join(letter if letter.isprintable() else "\ufffd" for letter in content)
 
 
 def duration(seconds: float) -> str:

@@ -55,7 +55,7 @@ def facts_of(route: Route, mission: Mission, *, date: str) -> list[tuple[str, st
         ("Floor digest", mission.origin.floor_digest[:12]),
         ("Date", date),
         ("Scanner", f"{mission.scanner.profile}, range {mission.scanner.range:g} m"),
-        ("Stops", f"{len(mission.stops)} (no plan has fewer than {selection.bound})"),
+        ("Stops", f"{len(mission.stops)}, at least {selection.bound} needed"),
         (
             "Coverage",
             f"{100 * selection.coverage:.1f} % of what is in sight, {_required(selection.required)}",

@@ -86,7 +86,7 @@ class Contents:
     def size(self, scale: int) -> tuple[float, float]:
         """Width and height of the drawing in millimetres."""
         x0, y0, x1, y1 = self.bounds
-        return tuple(side * 1000 / scale + 2 * self.padding for side in (x1 - x0, y1 - y0))  # type: ignore[return-value]
+        return ((x1 - x0) * 1000 / scale + 2 * self.padding, (y1 - y0) * 1000 / scale + 2 * self.padding)
 
 
 def fit(contents: Contents) -> Sheet:

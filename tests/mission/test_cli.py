@@ -109,6 +109,14 @@ def test_words_stand_left_and_numbers_right() -> None:
     assert text.splitlines() == ["no  name", "--  -------", " 1  a", "10  Büro 東"]
 
 
+def test_a_file_cannot_colour_the_terminal(
+    mission: Mission, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(msgspec.structs.replace(mission, name="\x1b[31mred\nline"), tmp_path / "mission.json")
+    assert main(["show", str(tmp_path / "mission.json")]) == 0
+    assert capsys.readouterr().out.startswith("mission  \ufffd[31mred\ufffdline, id ")
+
+
 @pytest.mark.parametrize(
     ("seconds", "text"), [(0, "0:00"), (59.6, "1:00"), (725, "12:05"), (3723, "1:02:03")]
 )

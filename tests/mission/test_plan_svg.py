@@ -136,6 +136,19 @@ def test_coordinates_of_a_national_grid_are_written_in_full() -> None:
     assert {"392000", "392005", "5712000", "5712005"} <= set(shown)
 
 
+def test_a_bare_floor_without_stops_is_drawn() -> None:
+    route = room_route()
+    candidates = route.selection.visibility.candidates
+    floor = replace(candidates.space.floor, rooms=(), openings=())
+    space = replace(candidates.space, floor=floor, rooms=(), openings=())
+    visibility = replace(route.selection.visibility, candidates=replace(candidates, space=space))
+    none = np.empty(0, dtype=np.int64)
+    selection = replace(route.selection, visibility=visibility, chosen=none, coverage_steps=none)
+    bare = replace(route, selection=selection, order=none, approaches=(), return_leg=None)
+    root = ET.fromstring(plan_svg(bare, mission_of(), date="2026-11-21"))
+    assert {"route", "stops", "table", "names", "seen"}.isdisjoint(item.get("id") for item in root.iter())
+
+
 sides = st.floats(0.5, 300.0)
 
 
