@@ -106,6 +106,8 @@ class Sheet:
     origin: Origin
     extent: Bounds
     """What 2D views show, in the drawing's metres."""
+    of_run: bool = False
+    """Whether it is a run's and not a plan's."""
 
     @property
     def local_extent(self) -> Bounds:
@@ -120,7 +122,7 @@ def open_canvas(path: Path, sheet: Sheet) -> Iterator[Canvas]:
     with rr.RecordingStream(
         entities.APPLICATION, recording_id=sheet.recording_id, send_properties=False
     ) as stream:
-        stream.save(path, default_blueprint=blueprint(sheet.local_extent))
+        stream.save(path, default_blueprint=blueprint(sheet.local_extent, of_run=sheet.of_run))
         stream.set_log_time_enabled(False)
         stream.send_recording_name(sheet.name)
         canvas = Canvas(stream, sheet.origin)

@@ -85,6 +85,7 @@ class FieldRecording:
             name=mission.name,
             origin=mission_origin(mission),
             extent=mission_extent(mission),
+            of_run=True,
         )
         self._canvas = self._open.enter_context(open_canvas(self._partial, sheet))
 

@@ -19,10 +19,10 @@ MARGIN = 0.04
 """Empty space around the drawing, as a share of its size."""
 
 
-def blueprint(bounds: Bounds | None = None) -> rrb.Blueprint:
+def blueprint(bounds: Bounds | None = None, *, of_run: bool = False) -> rrb.Blueprint:
     """Tabs for the mission, its planning stages, the run, and the log; 2D views show `bounds`."""
     return rrb.Blueprint(
-        rrb.Tabs(_mission(bounds), _stages(bounds), _run(), _texts(), active_tab=0),
+        rrb.Tabs(_mission(bounds, of_run), _stages(bounds), _run(), _log(), active_tab=0),
         rrb.TimePanel(timeline=at.MISSION_TIME, play_state="paused", state="collapsed"),
         auto_views=False,
         auto_layout=False,
@@ -30,16 +30,21 @@ def blueprint(bounds: Bounds | None = None) -> rrb.Blueprint:
     )
 
 
-def _mission(bounds: Bounds | None) -> rrb.Horizontal:
+def _mission(bounds: Bounds | None, of_run: bool) -> rrb.Horizontal:
     plan = _flat(
         "Plan and run",
         _visible(bounds),
         *(at.FLOOR, at.COVERAGE, at.ROUTE, at.STOPS, at.PLANNED_ROBOT, at.FIELD),
         time_ranges=_so_far(),
     )
+    reports = rrb.Tabs(
+        rrb.TextDocumentView(origin=at.REPORT, name="Plan report"),
+        rrb.TextDocumentView(origin=at.FIELD, contents=under(at.FIELD), name="Run report"),
+        active_tab=1 if of_run else 0,
+    )
     return rrb.Horizontal(
         plan,
-        rrb.Vertical(_solid(bounds), rrb.TextDocumentView(origin=at.REPORT, name="Plan report")),
+        rrb.Vertical(_solid(bounds), reports),
         column_shares=[3, 2],
         name="Mission",
     )
@@ -61,18 +66,14 @@ def _run() -> rrb.Vertical:
     return rrb.Vertical(
         rrb.StateTimelineView(origin=at.FIELD, contents=under(at.FIELD), name="States", time_view=_whole()),
         _plot("Distance from the route, m (left positive)", at.METRIC_CROSS_TRACK),
-        _plot("Deviation at each stop, m", at.METRIC_DEVIATION),
+        _plot("Deviation at each stop, mm", at.METRIC_DEVIATION),
         _plot("Battery, %", at.METRIC_BATTERY, (0.0, 100.0)),
         name="Run",
     )
 
 
-def _texts() -> rrb.Horizontal:
-    return rrb.Horizontal(
-        rrb.TextLogView(origin=at.LOG, contents=under(at.LOG), name="Log"),
-        rrb.TextDocumentView(origin=at.FIELD, contents=under(at.FIELD), name="Run report"),
-        name="Log",
-    )
+def _log() -> rrb.TextLogView:
+    return rrb.TextLogView(origin=at.LOG, contents=under(at.LOG), name="Log")
 
 
 def _visible(bounds: Bounds | None) -> rrb.VisualBounds2D | None:
@@ -117,7 +118,7 @@ def _from_the_south(bounds: Bounds) -> rrb.EyeControls3D:
     left, low, right, high = bounds
     x, y, size = (left + right) / 2, (low + high) / 2, max(right - left, high - low, 1.0)
     return rrb.EyeControls3D(
-        position=(x, y - 0.6 * size, 0.75 * size), look_target=(x, y, 0.0), eye_up=(0.0, 0.0, 1.0)
+        position=(x, y - 0.5 * size, 0.65 * size), look_target=(x, y, 0.0), eye_up=(0.0, 0.0, 1.0)
     )
 
 

@@ -26,7 +26,7 @@ HIDDEN = Meaning(12, "target: seen by no candidate", (120, 90, 130, 255))
 NEW = Meaning(13, "target: new in this step", (245, 245, 120, 255))
 TARGET = Meaning(14, "target", (205, 160, 90, 255))
 ARRIVED = Meaning(40, "arrived", (255, 255, 255, 255))
-SCANNED = Meaning(41, "scanned", (90, 255, 150, 255))
+SCANNED = Meaning(41, "scanned", (255, 130, 225, 255))
 SKIPPED = Meaning(42, "skipped", (255, 190, 60, 255))
 FAILED = Meaning(43, "failed", (255, 70, 70, 255))
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from mission.errors import InputError
 from recordings import entities
-from recordings.read import Contents, check, chunks, rows
+from recordings.read import Contents, check_apart, chunks, rows
 
 
 @dataclass
@@ -78,7 +78,7 @@ def review(path: Path) -> Review:
     InputError
         When the file cannot be read, or was not written by stopgo.
     """
-    contents = check(path)
+    contents = check_apart(path)
     if contents.application != entities.APPLICATION:
         raise InputError(f"{path}: is a recording of {contents.application}, not of {entities.APPLICATION}")
     runs: dict[str, RunReview] = {}

@@ -86,7 +86,7 @@ class RunDrawing:
         line = rr.TextLog(f"{type(event).__name__} {_about(event)}".rstrip(), level=level)
         self._at(of_run(entities.LOG_FIELD, self.run_id), line, event.robot_ns)
         if isinstance(event, Arrived):
-            self._at(self._metric(entities.METRIC_DEVIATION), rr.Scalars(event.deviation_m), event.robot_ns)
+            self._plot_deviation(event)
         self._mark(event)
         self._report(event)
 
@@ -106,6 +106,8 @@ class RunDrawing:
             colors=palette.ARRIVED.colour, markers="circle", marker_sizes=4, names="deviation"
         )
         canvas.show(self._metric(entities.METRIC_DEVIATION), dots)
+        limit = rr.SeriesLines(colors=palette.FAILED.colour, names="tolerance", widths=1)
+        canvas.show(self._metric(entities.METRIC_DEVIATION, "tolerance"), limit)
         about = {
             "run_id": self.run_id,
             "mission_id": self.mission.id,
@@ -150,12 +152,21 @@ class RunDrawing:
         mark = rr.Points2D(
             [self.canvas.local(np.array([place.x, place.y]))],
             class_ids=meaning.number,
-            radii=0.07 if isinstance(event, Scanned) else 0.1,
+            radii=on_screen(3),
             labels=[label] if label else None,
             show_labels=False,
             draw_order=ORDER["robot"],
         )
         self._at(self._flat(meaning.label), mark, event.robot_ns)
+
+    def _plot_deviation(self, event: Arrived) -> None:
+        """The deviation in millimetres, and what the mission tolerates there."""
+        deviation = rr.Scalars(event.deviation_m * 1000)
+        self._at(self._metric(entities.METRIC_DEVIATION), deviation, event.robot_ns)
+        stop = self.stops.get(event.stop)
+        if stop is not None:
+            tolerance = rr.Scalars(stop.tolerance_m * 1000)
+            self._at(self._metric(entities.METRIC_DEVIATION, "tolerance"), tolerance, event.robot_ns)
 
     def _report(self, event: AnyEvent) -> None:
         stop = getattr(event, "stop", None)
@@ -176,8 +187,8 @@ class RunDrawing:
     def _solid(self, name: str) -> str:
         return of_run(entities.WORLD_FIELD, self.run_id, name)
 
-    def _metric(self, metric: str) -> str:
-        return of_run(metric, self.run_id)
+    def _metric(self, metric: str, *names: str) -> str:
+        return of_run(metric, self.run_id, *names)
 
 
 EVENT_FIELDS = (

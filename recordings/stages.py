@@ -235,7 +235,7 @@ def _draw_rooms(canvas: Canvas, rooms: tuple[Room, ...]) -> None:
     named = [room for room in rooms if room.polygons]
     if not named:
         return
-    at = [strokes.inner_point(max(room.polygons, key=lambda polygon: polygon.area)) for room in named]
+    at = [strokes.name_point(max(room.polygons, key=lambda polygon: polygon.area)) for room in named]
     points = rr.Points2D(
         canvas.local(np.array(at)),
         labels=[room.label for room in named],

@@ -61,15 +61,15 @@ def fill(polygons: Iterable[Polygon], *, spacing: float) -> Strokes:
     return Strokes(np.concatenate(lines), np.concatenate(radii))
 
 
-def inner_point(polygon: Polygon) -> FloatArray:
-    """A point well inside: the middle of the longest of a few chords."""
-    chords = hatch([polygon], spacing=max(np.ptp(polygon.exterior[:, 1]) / 9, 1e-3), angle=0.0)
-    if not len(chords):
-        return polygon.exterior.mean(axis=0)
+def name_point(polygon: Polygon) -> FloatArray:
+    """Where a room's name is out of the way: inside, near the top, where the room is wide."""
+    height = max(float(np.ptp(polygon.exterior[:, 1])), 1e-3)
+    chords = hatch([polygon], spacing=height / 9, angle=0.0)
     length = np.ptp(chords[:, :, 0], axis=1)
-    long = chords[length > 0.8 * length.max()].mean(axis=1)
-    middle = (polygon.exterior.min(axis=0) + polygon.exterior.max(axis=0)) / 2
-    return long[np.argmin(np.hypot(*(long - middle).T).round(6))]
+    if not len(chords) or length.max() == 0:
+        return polygon.exterior.mean(axis=0)
+    wide = chords[length > 0.6 * length.max()].mean(axis=1)
+    return wide[np.argmax(wide[:, 1])]
 
 
 def triangles(polygons: Iterable[Polygon]) -> FloatArray:

@@ -17,7 +17,7 @@ from rerun.experimental import View, ViewerClient
 
 BINARY = Path(rerun_cli.__file__).with_name("rerun")
 PATIENCE_S = 15.0
-REDRAW_S = 0.5
+REDRAW_S = 0.3
 
 
 def has_vulkan() -> bool:
@@ -53,14 +53,15 @@ def viewer(files: Sequence[Path], *, size: str = "1600x1000") -> Iterator[Viewer
 
 
 def show_tab(client: ViewerClient, name: str) -> set[str]:
-    """Bring this tab to the front; returns the ids of its views."""
+    """Bring this part of the outermost tabs to the front; returns the ids of the views to be seen."""
     parts = client.get_blueprint().blueprint
-    tabs = next(path for path in parts if _container(parts, path).get("container_kind") == "Tabs")
+    inner = {part for path in parts for part in _container(parts, path).get("contents", ())}
+    tabs = next(path for path in parts if _container(parts, path) and path.strip("/") not in inner)
     for part in _container(parts, tabs)["contents"]:
-        if _container(parts, f"/{part}").get("display_name") == name:
+        if name in (_container(parts, f"/{part}").get("display_name"), _view_name(parts, f"/{part}")):
             _container(parts, tabs)["active_tab"] = part
             client.set_blueprint(parts, of="recording")
-            return _views(parts, f"/{part}")
+            return _views(parts, part)
     raise AssertionError(f"no tab {name}")
 
 
@@ -81,13 +82,18 @@ def _container(parts: dict[str, Any], path: str) -> dict[str, Any]:
     return parts.get(path, {}).get("ContainerBlueprint", {})
 
 
-def _views(parts: dict[str, Any], path: str) -> set[str]:
-    """Ids of the views in a container and in the containers in it."""
-    found: set[str] = set()
-    for part in _container(parts, path).get("contents", ()):
-        kind, _, name = part.partition("/")
-        found |= {name} if kind == "view" else _views(parts, f"/{part}")
-    return found
+def _view_name(parts: dict[str, Any], path: str) -> str | None:
+    return parts.get(path, {}).get("ViewBlueprint", {}).get("display_name")
+
+
+def _views(parts: dict[str, Any], part: str) -> set[str]:
+    """Ids of the views to be seen in a container: of tabs, only those of the tab in front."""
+    kind, _, name = part.partition("/")
+    if kind == "view":
+        return {name}
+    container = _container(parts, f"/{part}")
+    inside = [container["active_tab"]] if container["container_kind"] == "Tabs" else container["contents"]
+    return set().union(*(_views(parts, item) for item in inside))
 
 
 def _connected(port: int) -> ViewerClient:

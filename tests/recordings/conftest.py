@@ -1,0 +1,52 @@
+"""Recordings of the small world, written once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mission.document import Mission
+from mission.events import PoseReport, StateReport
+from recordings.field import FieldRecording
+from recordings.plan import PlanRecording
+from tests.recordings import run, world
+
+
+@pytest.fixture(scope="session")
+def mission() -> Mission:
+    return world.nouns_at()[-1]
+
+
+@pytest.fixture(scope="session")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_plan(tmp_path_factory.mktemp("plan") / "plan.rrd")
+
+
+@pytest.fixture(scope="session")
+def field(tmp_path_factory: pytest.TempPathFactory, mission: Mission) -> Path:
+    return write_field(tmp_path_factory.mktemp("field") / "field.rrd", mission)
+
+
+def write_plan(path: Path, x: float = 0.0, y: float = 0.0) -> Path:
+    with PlanRecording(path, world.MISSION_ID) as recording:
+        for noun in world.nouns_at(x, y):
+            recording.observe(noun)
+    return path
+
+
+def write_field(path: Path, mission: Mission, *runs: str) -> Path:
+    with FieldRecording(path, mission) as recording:
+        for name in runs or (run.RUN,):
+            for report in run.reports(mission, run=name):
+                tell(recording, report)
+    return path
+
+
+def tell(recording: FieldRecording, report: object) -> None:
+    if isinstance(report, StateReport):
+        recording.state(report)
+    elif isinstance(report, PoseReport):
+        recording.pose(report)
+    else:
+        recording.event(report)

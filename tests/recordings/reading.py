@@ -1,0 +1,56 @@
+"""Cells of a recording as plain values: what a test compares with numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from recordings.read import chunks
+
+Cell = tuple[dict[str, int], Any]
+"""Index values by timeline (nothing for a static cell), and the list of values."""
+
+
+def cells(path: Path, entity: str, component: str) -> list[Cell]:
+    """Every cell of one component of one entity, in the order of the file."""
+    found: list[Cell] = []
+    for chunk in chunks(path):
+        if str(chunk.entity_path) == entity:
+            found += _cells(chunk, component)
+    return found
+
+
+def static(path: Path, entity: str, component: str) -> Any:
+    """The one static cell of a component."""
+    values = [value for times, value in cells(path, entity, component) if not times]
+    assert len(values) == 1, f"{entity} {component}: {len(values)} static cells"
+    return values[0]
+
+
+def on(path: Path, entity: str, component: str, timeline: str) -> dict[int, Any]:
+    """Cells of one component by their time on one timeline; durations and timestamps in nanoseconds."""
+    found = cells(path, entity, component)
+    return {times[timeline]: value for times, value in found if timeline in times}
+
+
+def components(path: Path) -> dict[str, tuple[set[str], set[str]]]:
+    """For each entity, its static components and those with times."""
+    found: dict[str, tuple[set[str], set[str]]] = {}
+    for chunk in chunks(path):
+        names = set(chunk.to_record_batch().schema.names) - set(chunk.timeline_names)
+        names = {name for name in names if not name.startswith("rerun.")}
+        found.setdefault(str(chunk.entity_path), (set(), set()))[not chunk.is_static].update(names)
+    return found
+
+
+def _cells(chunk: Any, component: str) -> list[Cell]:
+    batch = chunk.to_record_batch()
+    if component not in batch.schema.names:
+        return []
+    times = {name: batch.column(name).cast("int64").to_pylist() for name in chunk.timeline_names}
+    values = batch.column(component).to_pylist()
+    return [
+        ({name: column[row] for name, column in times.items()}, value)
+        for row, value in enumerate(values)
+        if value is not None
+    ]

@@ -1,0 +1,163 @@
+"""A run's recording shows what the robot told, overlays the plan, and survives a killed writer."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mission.document import Mission
+from mission.events import StateReport
+from recordings import entities
+from recordings.field import FieldRecording
+from recordings.read import check
+from tests.recordings import run, world
+from tests.recordings.conftest import tell, write_field, write_plan
+from tests.recordings.reading import components, on, static
+
+NS = 1_000_000_000
+RUN = entities.of_run(entities.FIELD, run.RUN)
+
+
+def test_it_has_the_id_of_the_plan_and_entities_under_the_run(plan: Path, field: Path) -> None:
+    held = check(field)
+    assert held.recording_id == check(plan).recording_id
+    assert held.timelines == ("mission_time", "robot_time")
+    assert held.properties["run"]["run_id"] == run.RUN
+    names = ("robot", "driven", "arrived", "scanned", "state", "stop_state", "events", "report")
+    assert {f"{RUN}/{name}" for name in names} <= set(held.rows)
+
+
+def test_it_draws_the_mission_where_the_plan_does(plan: Path, field: Path) -> None:
+    for entity, component in (
+        (entities.STOPS, "Points2D:positions"),
+        (entities.ROUTE, "LineStrips2D:strips"),
+        (entities.PLAN, "Transform3D:scale"),
+    ):
+        assert static(plan, entity, component) == static(field, entity, component)
+    assert static(field, entities.FIELD, "Transform3D:scale") == static(
+        field, entities.PLAN, "Transform3D:scale"
+    )
+
+
+def test_far_from_the_origin_both_overlay(tmp_path: Path) -> None:
+    x, y = 500_123.4567, 5_400_987.6543
+    plan = write_plan(tmp_path / "plan.rrd", x, y)
+    field = write_field(tmp_path / "field.rrd", world.nouns_at(x, y)[-1])
+    assert check(field).properties["run"]["local_origin"] == check(plan).properties["plan"]["local_origin"]
+    robot = on(field, f"{RUN}/robot", "Transform3D:translation", entities.MISSION_TIME)
+    stop = static(plan, entities.STOPS, "Points2D:positions")[1]
+    assert np.allclose(robot[max(robot)][0][:2], (stop[0], stop[1] + run.OFFSET), atol=1e-4)
+
+
+def test_nothing_that_changes_is_hidden_by_something_static(field: Path) -> None:
+    for entity, (fixed, changing) in components(field).items():
+        assert not fixed & changing, f"{entity}: static {fixed & changing} hides what changes"
+
+
+def test_the_driven_path_grows_piece_by_piece(field: Path) -> None:
+    pieces = on(field, f"{RUN}/driven", "LineStrips2D:strips", entities.MISSION_TIME)
+    lengths = [float(np.hypot(*np.subtract(*strip))) for (strip,) in pieces.values()]
+    assert sum(lengths) == pytest.approx(2.2, abs=0.01)
+    assert min(lengths) >= 0.05
+
+
+def test_deviation_and_distance_from_the_route_are_plotted(field: Path) -> None:
+    deviation = on(field, f"{entities.METRIC_DEVIATION}/{run.RUN}", "Scalars:scalars", entities.MISSION_TIME)
+    assert [value[0] for _, value in sorted(deviation.items())] == pytest.approx([30.0, 30.0])
+    beside = on(field, f"{entities.METRIC_CROSS_TRACK}/{run.RUN}", "Scalars:scalars", entities.MISSION_TIME)
+    # 3 cm to the left of a leg driven along +x; on the stop itself it is as far, to either side.
+    driving = [value[0] for time, value in beside.items() if 62 * NS < time < 67 * NS]
+    assert driving == pytest.approx([run.OFFSET] * len(driving), abs=1e-6)
+    assert driving
+
+
+def test_states_are_told_on_both_clocks(field: Path) -> None:
+    states = on(field, f"{RUN}/stop_state", "StateChange:state", entities.MISSION_TIME)
+    told = [value[0] for _, value in sorted(states.items())]
+    assert told[-3:] == ["SETTLING", "SCANNING", ""]
+    robot = on(field, f"{RUN}/state", "StateChange:state", entities.ROBOT_TIME)
+    assert max(robot) == run.BEGAN_NS + round(129.4 * NS)
+
+
+def test_reports_before_the_mission_are_kept(tmp_path: Path, mission: Mission, field: Path) -> None:
+    path = tmp_path / "field.rrd"
+    with FieldRecording(path, None) as recording:
+        for number, report in enumerate(run.reports(mission)):
+            if number == 10:
+                assert not list(tmp_path.iterdir())
+                recording.mission(mission)
+            tell(recording, report)
+    assert check(path).rows == check(field).rows
+
+
+def test_the_mission_may_be_told_again(tmp_path: Path, mission: Mission) -> None:
+    with FieldRecording(tmp_path / "field.rrd", mission) as recording:
+        recording.mission(mission)
+        for report in run.reports(mission):
+            tell(recording, report)
+    assert check(tmp_path / "field.rrd").complete
+
+
+def test_two_runs_lie_side_by_side(tmp_path: Path, mission: Mission) -> None:
+    path = write_field(tmp_path / "field.rrd", mission, "run-1", "run-2")
+    rows = check(path).rows
+    assert rows["/field/run-1/events"] == rows["/field/run-2/events"] == 8
+
+
+def test_what_belongs_to_no_run_is_left_out(tmp_path: Path, mission: Mission) -> None:
+    idle = StateReport(
+        **{**_fields(next(r for r in run.reports(mission) if isinstance(r, StateReport))), "run_id": None}
+    )
+    with FieldRecording(tmp_path / "field.rrd", mission) as recording:
+        recording.state(idle)
+    assert not [entity for entity in check(tmp_path / "field.rrd").rows if entity.startswith("/field/")]
+
+
+def test_without_a_mission_there_is_no_file(tmp_path: Path, mission: Mission) -> None:
+    with FieldRecording(tmp_path / "field.rrd", None) as recording:
+        for report in run.reports(mission):
+            tell(recording, report)
+    assert not list(tmp_path.iterdir())
+
+
+def test_ctrl_c_keeps_the_run_so_far(tmp_path: Path, mission: Mission) -> None:
+    path = tmp_path / "field.rrd"
+    with pytest.raises(KeyboardInterrupt), FieldRecording(path, mission) as recording:
+        for report in list(run.reports(mission))[:10]:
+            tell(recording, report)
+        raise KeyboardInterrupt
+    assert [item.name for item in tmp_path.iterdir()] == ["field.rrd"]
+    assert check(path).complete
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from recordings.field import FieldRecording
+from tests.recordings import run, world
+from tests.recordings.conftest import tell
+mission = world.nouns_at()[-1]
+with FieldRecording(Path(sys.argv[1]), mission) as recording:
+    for report in run.reports(mission):
+        tell(recording, report)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_killed_writer_leaves_what_it_was_told(tmp_path: Path) -> None:
+    path = tmp_path / "field.rrd"
+    root = Path(__file__).parents[2]
+    for partial in ("field.partial.rrd", "field.partial-2.rrd"):
+        subprocess.run([sys.executable, "-c", KILLED, str(path)], cwd=root, check=False)
+        held = check(tmp_path / partial)
+        assert not held.complete
+        assert held.rows[f"{RUN}/events"] == 8
+    assert not path.exists()
+
+
+def _fields(report: StateReport) -> dict[str, object]:
+    return {name: getattr(report, name) for name in report.__struct_fields__}

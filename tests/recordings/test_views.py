@@ -1,0 +1,95 @@
+"""Every view of a plan, a run and both draws a picture and reports nothing wrong."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from rerun.experimental import ViewerClient
+
+from recordings import palette
+from tests.recordings.viewer import PATIENCE_S, has_vulkan, look, viewer
+
+pytestmark = pytest.mark.skipif(
+    not has_vulkan(), reason="no Vulkan driver: install mesa-vulkan-drivers to look at recordings"
+)
+
+VIEWS = {
+    "plan": {
+        "Mission": {"Plan and run": palette.ROUTE, "3D": palette.ROUTE, "Plan report": None},
+        "Planning": {
+            "Navigable space and candidates": palette.STOP_AREA,
+            "What a candidate sees (timeline: candidate)": palette.KIND_COLOURS["columns"],
+            "Selection (timeline: stage_step)": palette.SEEN.colour,
+            "Coverage, %": palette.ROUTE,
+        },
+        "Log": {"Log": None},
+    },
+    "field": {
+        "Mission": {"Plan and run": palette.DRIVEN, "3D": palette.DRIVEN, "Run report": None},
+        "Run": {
+            "States": None,
+            "Distance from the route, m (left positive)": palette.DRIVEN,
+            "Deviation at each stop, mm": palette.FAILED.colour,
+            "Battery, %": palette.DRIVEN,
+        },
+        "Log": {"Log": None},
+    },
+}
+"""Views by tab, and a colour that each must show."""
+
+
+@pytest.mark.parametrize("which", VIEWS)
+def test_every_view_shows_its_subject(which: str, plan: Path, field: Path, tmp_path: Path) -> None:
+    with viewer([{"plan": plan, "field": field}[which]]) as client:
+        client.set_time("mission_time", duration=100.0, play_state="paused")
+        for tab, colours in VIEWS[which].items():
+            assert_shown(client, tab, colours, tmp_path)
+
+
+def test_plan_and_run_overlay(plan: Path, field: Path, tmp_path: Path) -> None:
+    with viewer([plan, field]) as client:
+        client.set_time("mission_time", duration=100.0, play_state="paused")
+        for colour in (palette.KIND_COLOURS["walls"], palette.DRIVEN):
+            assert_shown(client, "Mission", {"Plan and run": colour}, tmp_path)
+
+
+@pytest.mark.parametrize(("timeline", "view", "colour"), [
+    ("candidate", "What a candidate sees (timeline: candidate)", palette.SEEN.colour),
+    ("stage_step", "Selection (timeline: stage_step)", palette.NEW.colour),
+])  # fmt: skip
+def test_planning_is_played_on_its_own_timelines(
+    timeline: str, view: str, colour: palette.Colour, plan: Path, tmp_path: Path
+) -> None:
+    with viewer([plan]) as client:
+        client.set_time(timeline, sequence=1, play_state="paused")
+        assert_shown(client, "Planning", {view: colour}, tmp_path)
+
+
+def assert_shown(
+    client: ViewerClient, tab: str, colours: dict[str, palette.Colour | None], into: Path
+) -> None:
+    """No view of the tab reports anything, and before long each named one shows its colour."""
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        views = look(client, tab, into)
+        assert not {name: view.reports for name, (view, _) in views.items() if view.reports}
+        missing = {name for name, colour in colours.items() if not shows(views[name][1], colour)}
+        if not missing:
+            return
+        assert time.monotonic() < deadline, f"{tab}: {missing} not shown"
+
+
+def shows(picture: Path, colour: palette.Colour | None) -> bool:
+    """Whether at least ten pixels have the colour, but for rounding; without one, whether it is not blank."""
+    if colour is None:
+        return len(np.unique(pixels(picture), axis=0)) > 20
+    away = np.abs(pixels(picture).astype(int) - colour[:3]).max(axis=1)
+    return int((away <= 3).sum()) >= 10
+
+
+def pixels(picture: Path) -> np.ndarray:
+    return np.asarray(Image.open(picture).convert("RGB")).reshape(-1, 3)
