@@ -14,7 +14,7 @@ from mission.geometry import BoolArray, FloatArray, IntArray
 from planner.compiling import compiled
 from planner.mesh import Mesh, containing
 from planner.shapes import GRID, to_grid
-from planner.sight_kernel import HELPERS, look
+from planner.sight_kernel import HELPERS, look_all
 
 COMPILE_ABOVE = 2_000_000
 """Viewpoints × mesh triangles above which loading the compiled kernel pays for itself."""
@@ -147,22 +147,20 @@ def sight(scene: Scene, viewpoints: NDArray[np.int64], *, reach: float | None) -
         )
     ]
     if len(viewpoints) * scene.mesh.triangles > COMPILE_ABOVE:
-        return _run(compiled(look, *HELPERS), arrays, len(viewpoints), steps, interpreted=False)
-    return _run(look, [array.tolist() for array in arrays], len(viewpoints), steps, interpreted=True)
+        return _run(compiled(look_all, *HELPERS), arrays, steps, interpreted=False)
+    return _run(look_all, [array.tolist() for array in arrays], steps, interpreted=True)
 
 
-def _run(kernel: Callable[..., int], arrays: list[Any], rows: int, reach: int, *, interpreted: bool) -> Runs:
-    """Call the kernel for each viewpoint, with more room for its output whenever that may run out."""
-    triangles = len(arrays[8]) // 3
+def _run(kernel: Callable[..., int], arrays: list[Any], reach: int, *, interpreted: bool) -> Runs:
+    """Call the kernel, again with more room for its output whenever that ran out."""
+    rows, triangles = len(arrays[0]), len(arrays[8]) // 3
     stack = _zeros(4 * (2 * triangles + 16), interpreted=interpreted)
-    out = [_zeros(4096, interpreted=interpreted) for _ in range(3)]
-    pointer = [0]
-    while len(pointer) <= rows:
-        end = kernel(len(pointer) - 1, pointer[-1], *arrays, reach, stack, *out)
-        if end < 0:
-            out = [_doubled(column) for column in out]
-        else:
-            pointer.append(int(end))
+    pointer = _zeros(rows + 1, interpreted=interpreted)
+    out = [_zeros(max(4096, 32 * rows), interpreted=interpreted) for _ in range(3)]
+    done = kernel(0, pointer, *arrays, reach, stack, *out)
+    while done < rows:
+        out = [_doubled(column) for column in out]
+        done = kernel(done, pointer, *arrays, reach, stack, *out)
     segment, low, high = (np.array(column[: pointer[-1]], dtype=np.int64) for column in out)
     return Runs(pointer=np.array(pointer, dtype=np.int64), segment=segment, low=low, high=high)
 

@@ -267,6 +267,21 @@ def look(
     return count
 
 
+def look_all(first_row: int, pointer: Any, qx: Any, *scene_and_output: Any) -> int:
+    """Let every viewpoint from `first_row` on look; returns the first row that found no room left.
+
+    `pointer[row + 1]` becomes the end of what is written for each row; the other arguments are `look`'s.
+    """
+    row = first_row
+    while row < len(qx):
+        end = look(row, pointer[row], qx, *scene_and_output)
+        if end < 0:
+            return row
+        pointer[row + 1] = end
+        row += 1
+    return row
+
+
 HELPERS = (
     turn,
     side_sign,
@@ -276,5 +291,6 @@ HELPERS = (
     clip_side,
     clip_reach,
     edge_too_far,
+    look,
 )
-"""Everything `look` calls, innermost first."""
+"""Everything `look_all` calls, innermost first."""
