@@ -16,8 +16,8 @@ def visible_pairs(viewpoints, edges, a, b, units, is_face, *, reach):
     first = np.concatenate([[0], np.cumsum(units)])[:-1]
     odd = 2 * (np.arange(len(segment)) - first[segment]) + 1
     pieces = 2 * units[segment]
-    seen = _unblocked(viewpoints, edges, a[segment], b[segment], odd, pieces, is_face[segment])
-    return seen & _in_reach(viewpoints, a[segment], b[segment], odd, pieces, reach)
+    near = _in_reach(viewpoints, a[segment], b[segment], odd, pieces, reach)
+    return _unblocked(viewpoints, edges, a[segment], b[segment], odd, pieces, is_face[segment], near)
 
 
 @njit(cache=True)
@@ -26,11 +26,13 @@ def _orient(px, py, qx, qy, rx, ry):
 
 
 @njit(cache=True)
-def _unblocked(viewpoints, edges, a, b, odd, pieces, is_face):
+def _unblocked(viewpoints, edges, a, b, odd, pieces, is_face, near_enough):
     seen = np.zeros((len(viewpoints), len(a)), dtype=np.bool_)
     for v in range(len(viewpoints)):
         x, y = viewpoints[v]
         for u in range(len(a)):
+            if not near_enough[v, u]:
+                continue
             if is_face[u] and _orient(a[u, 0], a[u, 1], b[u, 0], b[u, 1], x, y) <= 0:
                 continue
             left_open, right_open = True, True
@@ -50,14 +52,16 @@ def _unblocked(viewpoints, edges, a, b, odd, pieces, is_face):
                     left_open = False
                 if (c >= 0) != (d >= 0):
                     right_open = False
+                if not (left_open or right_open):
+                    break
             seen[v, u] = left_open or right_open
     return seen
 
 
 def _in_reach(viewpoints, a, b, odd, pieces, reach):
     if reach is None:
-        return np.ones((len(viewpoints), len(a)), dtype=bool)
-    inside = np.zeros((len(viewpoints), len(a)), dtype=bool)
+        return np.ones((len(viewpoints), len(a)), dtype=np.bool_)
+    inside = np.zeros((len(viewpoints), len(a)), dtype=np.bool_)
     for v, q in enumerate(viewpoints):
         away = pieces[:, None] * (a - q) + odd[:, None] * (b - a)
         squared = (away.astype(float) ** 2).sum(axis=1)

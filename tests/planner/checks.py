@@ -1,0 +1,205 @@
+"""What every plan must be, whatever made it: checked with plain shapely from the floor as it was read."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import shapely
+
+from mission.document import Mission, digest_of
+from mission.files.mission_json import encode, parse
+from mission.floor import FloorPlan
+from mission.geometry import Polygon
+from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
+from mission.sense import problems_of
+from mission.settings import Settings
+from planner.routing.roadmap import ways_between
+from planner.shapes import GRID, local_origin, to_grid, to_shape
+from planner.targets import face_segments
+from tests.planner.oracle import visible_pairs
+
+TOLERANCE = 1e-5
+THRESHOLD = 0.3
+"""The floor assumed on each side of an opening's line."""
+
+
+def check_plan(mission: Mission, nouns: dict[type, Any], settings: Settings, *, brute: bool = True) -> None:
+    """Every property a plan has; `nouns` are what the planner handed to `observe`."""
+    floor: FloorPlan = nouns[FloorPlan]
+    check_document(mission)
+    check_chain(mission, settings)
+    check_legs(mission, floor, nouns[NavigableSpace], settings)
+    check_stops(mission, nouns[NavigableSpace], settings)
+    check_bounds(mission, nouns, settings)
+    if brute:
+        check_coverage(mission, nouns[Selection], settings)
+
+
+def check_document(mission: Mission) -> None:
+    data = encode(mission)
+    assert parse(data, "mission.json") == mission
+    assert encode(parse(data, "mission.json")) == data
+    assert mission.digest == digest_of(mission)
+    assert problems_of(mission) == ()
+
+
+def legs_of(mission: Mission) -> list[np.ndarray]:
+    legs = [np.array(stop.approach) for stop in mission.stops]
+    return legs if mission.return_ is None else [*legs, np.array(mission.return_)]
+
+
+def check_chain(mission: Mission, settings: Settings) -> None:
+    here = (mission.start.x, mission.start.y)
+    for stop in mission.stops:
+        assert stop.approach[0] == here, f"{stop.id} is approached from elsewhere"
+        here = (stop.x, stop.y)
+        assert stop.approach[-1] == here
+        if len(stop.approach) > 1:
+            step = np.subtract(stop.approach[-1], stop.approach[-2])
+            assert np.isclose(np.arctan2(step[1], step[0]), stop.heading, atol=1e-5)
+    closed = settings.tour == "closed" or (settings.tour is None and settings.start and settings.end is None)
+    if mission.return_ is not None:
+        assert mission.return_[0] == here
+        end = settings.end if settings.end is not None else (mission.start.x, mission.start.y)
+        assert np.allclose(mission.return_[-1], end, atol=1e-6)
+    else:
+        assert settings.end is None
+        assert not closed or len(mission.stops) == 1
+    for leg in legs_of(mission):
+        assert np.isfinite(leg).all()
+        assert all(tuple(a) != tuple(b) for a, b in pairwise(leg.tolist())), "a point twice in a leg"
+
+
+def shape_of(polygon: Polygon) -> shapely.Geometry:
+    return shapely.make_valid(shapely.Polygon(polygon.exterior, polygon.holes))
+
+
+def obstacles_of(floor: FloorPlan) -> list[shapely.Geometry]:
+    """Every obstacle as drawn, filled shapes and lines."""
+    solids = [shape_of(solid) for item in floor.elements if item.obstacle for solid in item.solids]
+    lines = [shapely.LineString(line) for item in floor.elements if item.obstacle for line in item.lines]
+    return solids + lines
+
+
+def floor_edges(floor: FloorPlan) -> shapely.Geometry:
+    return shapely.union_all([shapely.boundary(shape_of(polygon)) for polygon in floor.outline])
+
+
+def check_legs(mission: Mission, floor: FloorPlan, space: NavigableSpace, settings: Settings) -> None:
+    """Legs keep the robot's radius from obstacles, the edge from floor edges, and out of closed openings."""
+    obstacles = np.array([*obstacles_of(floor), shapely.Point(1e9, 1e9)])
+    closed = [shapely.LineString(o.opening.line) for o in space.openings if not o.passable]
+    doors = [shapely.LineString(o.opening.line) for o in space.openings if o.passable]
+    near_doors = shapely.union_all([line.buffer(THRESHOLD + settings.edge + 0.1) for line in doors])
+    ground = shapely.union_all([shape_of(p) for p in floor.outline] + [d.buffer(THRESHOLD) for d in doors])
+    edges = floor_edges(floor)
+    for number, leg in enumerate(legs_of(mission)):
+        line = shapely.LineString(leg) if len(leg) > 1 else shapely.Point(leg[0])
+        away = float(shapely.distance(obstacles, line).min())
+        assert away >= settings.radius - TOLERANCE, f"leg {number} passes an obstacle at {away:.6f} m"
+        free = line.difference(near_doors)
+        if not free.is_empty and settings.edge > 0:
+            away = float(edges.distance(free))
+            assert away >= settings.edge - 3 * TOLERANCE, f"leg {number} passes an edge at {away:.6f} m"
+        assert line.difference(ground.buffer(TOLERANCE)).is_empty, f"leg {number} leaves the floor"
+        for opening in closed:
+            assert not line.intersects(opening), f"leg {number} crosses a closed opening"
+
+
+def check_stops(mission: Mission, space: NavigableSpace, settings: Settings) -> None:
+    floor = space.floor
+    unnamed = any(part.room is None for part in space.rooms)
+    obstacles = np.array([*obstacles_of(floor), shapely.Point(1e9, 1e9)])
+    edges = floor_edges(floor)
+    ground = shapely.union_all([shape_of(polygon) for polygon in floor.outline])
+    rooms = shapely.union_all([shape_of(polygon) for room in floor.rooms for polygon in room.polygons])
+    ids = [stop.id for stop in mission.stops]
+    assert len(set(ids)) == len(ids)
+    for stop in mission.stops:
+        point = shapely.Point(stop.x, stop.y)
+        away = float(shapely.distance(obstacles, point).min())
+        need = settings.radius if stop.doorway else max(settings.d_sec, settings.radius)
+        assert away >= need - TOLERANCE, f"{stop.id} is {away:.6f} m from an element"
+        if not stop.doorway:
+            assert ground.distance(point) <= TOLERANCE, f"{stop.id} is not on the floor"
+            assert edges.distance(point) >= settings.edge - TOLERANCE, f"{stop.id} is too near an edge"
+            if floor.rooms and not unnamed:
+                assert rooms.distance(point) <= TOLERANCE, f"{stop.id} is outside every room"
+
+
+def check_bounds(mission: Mission, nouns: dict[type, Any], settings: Settings) -> None:
+    selection: Selection = nouns[Selection]
+    route: Route = nouns[Route]
+    assert len(set(selection.chosen.tolist())) == len(selection.chosen)
+    assert sorted(route.order.tolist()) == list(range(len(selection.chosen)))
+    assert 1 <= selection.bound <= len(selection.chosen) == len(mission.stops)
+    assert selection.coverage >= settings.coverage - 1e-12
+    assert np.all(np.diff(selection.coverage_steps) >= 0)
+    assert 0 <= route.bound <= route.length + 1e-6
+    lengths = [np.hypot(*np.diff(leg, axis=0).T).sum() for leg in legs_of(mission)]
+    assert np.isclose(sum(lengths), route.length, atol=1e-4)
+
+
+def check_coverage(mission: Mission, selection: Selection, settings: Settings) -> None:
+    """Recompute by brute force what all candidates and the chosen ones see."""
+    seen = matrix_by_force(selection.visibility)
+    visible = seen.any(axis=0)
+    assert np.array_equal(visible, selection.visibility.visible), "another set of units is visible"
+    covered = seen[selection.chosen].any(axis=0)
+    assert np.isclose(covered.sum() / visible.sum(), selection.coverage, atol=1e-12)
+    assert sum(stop.sees.new_units for stop in mission.stops) == covered.sum()
+    for stop in mission.stops:
+        nearest = int(np.argmin(np.hypot(*(selection.xy - (stop.x, stop.y)).T)))
+        assert stop.sees.units == seen[selection.chosen[nearest]].sum()
+
+
+def matrix_by_force(visibility: Visibility) -> np.ndarray:
+    found: Candidates = visibility.candidates
+    space, targets = found.space, found.space.targets
+    origin = local_origin(space.floor)
+    return visible_pairs(
+        to_grid(found.xy[found.kept] - origin),
+        to_grid(face_segments(to_shape(space.occluders, origin))).reshape(-1, 4),
+        to_grid(targets.a - origin),
+        to_grid(targets.b - origin),
+        targets.units,
+        targets.occluding,
+        reach=round(space.settings.range / GRID),
+    )
+
+
+def check_rooms_are_joined(space: NavigableSpace) -> int:
+    """Both rooms of every passable opening have a way between them; the number of openings checked."""
+    drive = [shape_of(polygon) for polygon in space.drive_area]
+    places = {k: _places(shape_of_room(space, k), drive) for k in range(len(space.floor.rooms))}
+    points = [point for found in places.values() for point in found]
+    keys = [(k, n) for k, found in places.items() for n in range(len(found))]
+    index = {key: position for position, key in enumerate(keys)}
+    lengths = ways_between(space, np.array(points).reshape(-1, 2)).lengths
+    joined = 0
+    for item in space.openings:
+        one, other = item.rooms
+        if not item.passable or one is None or other is None or one == other:
+            continue
+        pairs = [
+            lengths[index[one, n], index[other, m]]
+            for n in range(len(places[one]))
+            for m in range(len(places[other]))
+        ]
+        assert np.isfinite(pairs).any(), f"{item.opening.id} is passable, but its rooms are not joined"
+        joined += 1
+    return joined
+
+
+def shape_of_room(space: NavigableSpace, index: int) -> shapely.Geometry:
+    return shapely.union_all([shape_of(polygon) for polygon in space.floor.rooms[index].polygons])
+
+
+def _places(room: shapely.Geometry, drive: list[shapely.Geometry]) -> list[np.ndarray]:
+    """A point in every piece of drive area that makes up at least a fifth of the room's."""
+    pieces = [piece.intersection(room) for piece in drive]
+    pieces = [piece for piece in pieces if piece.area > 1e-6]
+    total = sum(piece.area for piece in pieces)
+    return [np.array(piece.representative_point().coords[0]) for piece in pieces if piece.area >= 0.2 * total]

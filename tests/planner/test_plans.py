@@ -1,0 +1,128 @@
+"""Whole plans of real floors, checked by plain shapely and brute force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mission.document import Mission
+from mission.files.mission_json import encode
+from mission.floor import FloorPlan
+from mission.planning import Candidates, NavigableSpace, Selection
+from mission.settings import Settings
+from planner.floors import read_floor
+from tests.planner.checks import check_plan, check_rooms_are_joined
+from tests.planner.worlds import FLOORS, SHARED, moved, planned, shifted, turned
+
+
+@lru_cache
+def floor(name: str) -> FloorPlan:
+    if not (SHARED / name).exists():
+        pytest.skip(f"{SHARED / name} is not there")
+    return read_floor(Path(SHARED / name), d_dis=0.05)
+
+
+@lru_cache
+def the_plan(name: str) -> tuple[Mission, dict[type, Any]]:
+    return planned(floor(name))
+
+
+@pytest.mark.parametrize("name", FLOORS)
+def test_a_real_floor_is_planned_well(name: str) -> None:
+    mission, nouns = the_plan(name)
+    check_plan(mission, nouns, Settings())
+    assert nouns[Selection].coverage >= 0.9
+
+
+@pytest.mark.parametrize("name", [name for name in FLOORS if "structural" not in name])
+def test_rooms_joined_by_a_passable_opening_are_connected(name: str) -> None:
+    assert check_rooms_are_joined(the_plan(name)[1][NavigableSpace]) > 0
+
+
+@pytest.mark.parametrize("name", [name for name in FLOORS if "case1" not in name])
+def test_two_plans_of_a_floor_are_the_same_bytes(name: str) -> None:
+    assert encode(planned(floor(name))[0]) == encode(the_plan(name)[0])
+
+
+@pytest.mark.parametrize("name", [name for name in FLOORS if "office" not in name and "case1" not in name])
+def test_the_order_of_entities_does_not_change_a_plan(name: str) -> None:
+    random = np.random.default_rng(1)
+    original = floor(name)
+
+    def shuffled(items: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(items[k] for k in random.permutation(len(items)))
+
+    other = replace(
+        original,
+        outline=shuffled(original.outline),
+        rooms=shuffled(original.rooms),
+        openings=shuffled(original.openings),
+        elements=shuffled(original.elements),
+    )
+    assert encode(planned(other)[0]) == encode(the_plan(name)[0])
+
+
+@pytest.mark.parametrize("name", [name for name in FLOORS if "rooms" in name or "fzk" in name])
+def test_elements_drawn_twice_do_not_change_a_plan(name: str) -> None:
+    original = floor(name)
+    other = replace(original, elements=original.elements + original.elements[::3])
+    assert encode(planned(other)[0]) == encode(the_plan(name)[0])
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        Settings(d_sec=0.35, edge=0.0, grid=0.7),
+        Settings(robot_radius=0.25, range=10.0, coverage=1.0),
+        Settings(doors="closed", coverage=0.5, tour="closed"),
+        Settings(targets=("columns", "walls", "beams"), selector="greedy"),
+        Settings(d_sec=1.0, door_access=0.8, d_dis=0.2),
+    ],
+    ids=["near", "small", "closed", "kinds", "far"],
+)
+@pytest.mark.parametrize("name", ["layered/fzk-haus-eg.dxf", "paper/synthetic_case2_rooms.dxf"])
+def test_other_settings_are_planned_well(name: str, settings: Settings) -> None:
+    mission, nouns = planned(floor(name), settings)
+    check_plan(mission, nouns, settings)
+
+
+@pytest.mark.parametrize("degrees", [17.0, 45.0])
+@pytest.mark.parametrize("name", ["layered/fzk-haus-eg.dxf", "paper/synthetic_case1_rooms.dxf"])
+def test_a_turned_floor_is_planned_well_and_alike(name: str, degrees: float) -> None:
+    there, nouns = planned(moved(floor(name), turned(degrees)))
+    check_plan(there, nouns, Settings(), brute=False)
+    here, straight = the_plan(name)
+    visible = [found[Selection].visibility.visible.sum() for found in (nouns, straight)]
+    assert abs(visible[0] / visible[1] - 1) <= 0.01
+    assert abs(len(there.stops) - len(here.stops)) <= 1
+
+
+def test_a_shifted_floor_has_the_shifted_plan() -> None:
+    by = np.array([4096.0, -512.25])
+    here = the_plan("layered/fzk-haus-eg.dxf")[0]
+    there = planned(moved(floor("layered/fzk-haus-eg.dxf"), shifted(*by)))[0]
+    assert len(there.stops) == len(here.stops)
+    for one, other in zip(there.stops, here.stops, strict=True):
+        assert np.allclose(np.array(one.approach) - by, other.approach, atol=1e-5)
+
+
+def test_all_parts_of_the_duplex_are_planned_apart() -> None:
+    from planner import parts_to_plan, plan_part
+
+    space = the_plan("layered/duplex-l1.dxf")[1][NavigableSpace]
+    found = parts_to_plan(space)
+    assert len(found) >= 2
+    for number, candidates in enumerate(found):
+        nouns: dict[type, Any] = {FloorPlan: space.floor, NavigableSpace: space}
+
+        def observe(noun: Any, nouns: dict[type, Any] = nouns) -> None:
+            nouns[type(noun)] = noun
+
+        mission = plan_part(candidates, observe=observe, number=number)
+        check_plan(mission, nouns, space.settings)
+        assert nouns[Candidates].chosen_part == candidates.chosen_part
