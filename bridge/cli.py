@@ -55,6 +55,9 @@ def robot(
     name: Annotated[str, typer.Option("--name", help="Name of this robot.")],
     state: Annotated[Path, typer.Option("--state", metavar="DIR", help="Its journal; one per robot.")],
     listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where to listen.")] = DEFAULT_ENDPOINT,
+    connect: Annotated[
+        str | None, typer.Option(metavar="ENDPOINT", help="A router to connect to, instead of listening.")
+    ] = None,
     site: Site = None,
     speed_up: Annotated[
         float, typer.Option("--speed-up", min=0.01, max=1000, help="How much faster simulated time runs.")
@@ -77,11 +80,12 @@ def robot(
     from bridge.simulator import Faults, read_fault
 
     options = RobotOptions(
-        name=name, listen=listen, state=state, site=site, speed_up=speed_up,
+        name=name, listen=listen, connect=connect, state=state, site=site, speed_up=speed_up,
         at=None if at is None else read_pose(at), insecure=insecure,
         faults=Faults(tuple(read_fault(text) for text in fault or ())),
     )  # fmt: skip
-    run_robot(options, ready=lambda: say(f"ready {name} listens on {listen}"))
+    where = f"listens on {listen}" if connect is None else f"connects to {connect}"
+    run_robot(options, ready=lambda: say(f"ready {name} {where}"))
 
 
 def push(
@@ -177,23 +181,36 @@ def order_of(verb: Verb) -> Callable[..., None]:
 
 def status(
     *,
-    robot: RobotName,
+    robot: Annotated[
+        str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot; all if not given.")
+    ] = None,
     connect: Connect = DEFAULT_ENDPOINT,
     site: Site = None,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
     json_: Json = False,
 ) -> None:
-    """Tell what the robot is doing.
+    """Tell what the robot is doing, or what all robots of the site are.
 
     Example: stopgo status --robot r1 --json
     """
-    with reached(robot, connect, site=site, who=None, timeout=timeout, insecure=insecure) as station:
-        report = station.status()
-    if json_:
-        print_json({key: getattr(report, key) for key in STATUS_KEYS})
+    from bridge.station import fleet
+
+    if robot is None:
+        reports = fleet(connect, site=site, timeout_s=timeout, insecure=insecure)
+        as_json: dict[str, Any] = {"robots": [status_json(report) for report in reports]}
     else:
-        typer.echo(state_line(report))
+        with reached(robot, connect, site=site, who=None, timeout=timeout, insecure=insecure) as station:
+            reports = (station.status(),)
+        as_json = status_json(reports[0])
+    if json_:
+        print_json(as_json)
+    else:
+        typer.echo("\n".join(state_line(report) for report in reports))
+
+
+def status_json(report: StateReport) -> dict[str, Any]:
+    return {key: getattr(report, key) for key in STATUS_KEYS}
 
 
 STATUS_KEYS = (
@@ -227,7 +244,7 @@ def watch(
     ):
         state = watch_showing(station, record, Table() if sys.stderr.isatty() else Lines(say))
     if json_:
-        print_json({key: getattr(state, key) for key in STATUS_KEYS})
+        print_json(status_json(state))
     raise typer.Exit(0 if state.state == "FINISHED" else 1)
 
 

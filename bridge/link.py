@@ -48,6 +48,9 @@ class Link(Protocol):
     ) -> bytes | None:
         """The answer of the one who serves `key`, or `None` if none came in time."""
 
+    def ask_all(self, key: str, *, timeout_s: float) -> list[bytes]:
+        """The answers of all who serve a key that `key` (with wildcards) includes."""
+
     def hear(self, key: str, heard: Hearing, *, late: int = 0) -> None:
         """Call `heard` with every sample on `key`, and with up to `late` that were sent before."""
 
@@ -114,6 +117,12 @@ class MemoryLink:
             if matches(pattern, key):
                 return answer(Request(key, payload, parameters or {}))
         return None
+
+    def ask_all(self, key: str, *, timeout_s: float) -> list[bytes]:
+        if self._board.cut:
+            return []
+        serving = self._board.serving.items()
+        return [answer(Request(served, b"")) for served, answer in serving if matches(key, served)]
 
     def hear(self, key: str, heard: Hearing, *, late: int = 0) -> None:
         for kept_key, past in self._board.kept.items():

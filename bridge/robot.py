@@ -28,6 +28,8 @@ class RobotOptions:
     name: str
     listen: str
     state: Path
+    connect: str | None = None
+    """A zenoh router to connect to, instead of listening."""
     site: str | None = None
     speed_up: float = 1.0
     at: Pose | None = None
@@ -39,11 +41,15 @@ class RobotOptions:
 
 def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     """Be a robot until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
-    from bridge.zenoh_link import listening
+    from bridge.zenoh_link import joining, listening
 
     signal.signal(signal.SIGTERM, _leave)
     keys = Keys(options.name, options.site)
-    with listening(options.listen, insecure=options.insecure) as link, robot_on(link, keys, options):
+    if options.connect is None:
+        opened = listening(options.listen, insecure=options.insecure)
+    else:
+        opened = joining(options.connect, insecure=options.insecure)
+    with opened as link, robot_on(link, keys, options):
         ready()
         threading.Event().wait()
 

@@ -39,6 +39,7 @@ from bridge.protocol import (
     Ready,
     Rejected,
     Verb,
+    decode,
     encode,
 )
 from mission.document import Mission
@@ -50,6 +51,8 @@ TRY_S = 1.0
 """How long one try waits for its answer."""
 PAUSE_S = 0.05
 """Between tries: a query just after a reconnect may come back empty at once."""
+GATHER_S = 0.3
+"""Once one robot of a fleet has shown itself, the others get this long."""
 TRIES_S = 10.0
 """How long the steps of a push are tried, each."""
 
@@ -82,6 +85,26 @@ def connect(
         station = Station(link, keys, commander=commander or whoami(), timeout_s=timeout_s)
         station.reach(endpoint)
         yield station
+
+
+def fleet(
+    endpoint: str, *, site: str | None = None, timeout_s: float = 5.0, insecure: bool = False
+) -> tuple[StateReport, ...]:
+    """The state of every robot of the site that can be reached through `endpoint`, by name.
+
+    Raises
+    ------
+    RobotUnreachable
+        If not a single robot showed itself within `timeout_s`.
+    """
+    from bridge.zenoh_link import connecting
+
+    with connecting(endpoint, insecure=insecure) as link:
+        station = Station(link, Keys("*", site), commander=whoami(), timeout_s=timeout_s)
+        station.reach(endpoint)
+        time.sleep(GATHER_S)
+        infos = [decode(reply, Info) for reply in link.ask_all(station.keys.info, timeout_s=TRY_S)]
+    return tuple(sorted((info.state for info in infos), key=lambda state: state.robot))
 
 
 def whoami() -> str:

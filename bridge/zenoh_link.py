@@ -38,24 +38,34 @@ RETRY = {"period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 
 
 @contextmanager
 def listening(endpoint: str, *, insecure: bool = False) -> Iterator[ZenohLink]:
-    """A link on which others connect to `endpoint`, such as `tcp/127.0.0.1:7447`."""
+    """A link on which others connect to `endpoint`, such as `tcp/127.0.0.1:7447`; it routes between them."""
     check_endpoint(endpoint, option="--listen", insecure=insecure)
     with _opened({"mode": "router", "listen/endpoints": [endpoint]}, endpoint) as link:
         yield link
 
 
 @contextmanager
-def connecting(endpoint: str, *, insecure: bool = False) -> Iterator[ZenohLink]:
-    """A link to `endpoint`; it is returned at once and connects, again and again, in the background."""
+def joining(endpoint: str, *, insecure: bool = False) -> Iterator[ZenohLink]:
+    """A robot's link to the router at `endpoint`, which stations connect to as well.
+
+    The robot is a router too: a router does not carry between two peers that it takes for neighbours.
+    """
     check_endpoint(endpoint, option="--connect", insecure=insecure)
-    settings = {
-        "mode": "peer",
-        "connect/endpoints": [endpoint],
-        "listen/endpoints": [],
-        "connect/retry": RETRY,
-    }
-    with _opened(settings, endpoint) as link:
+    with _opened({"mode": "router", **_reaching(endpoint)}, endpoint) as link:
         yield link
+
+
+@contextmanager
+def connecting(endpoint: str, *, insecure: bool = False) -> Iterator[ZenohLink]:
+    """A station's link to `endpoint`; returned at once, it connects, again and again, in the background."""
+    check_endpoint(endpoint, option="--connect", insecure=insecure)
+    with _opened({"mode": "peer", **_reaching(endpoint)}, endpoint) as link:
+        yield link
+
+
+def _reaching(endpoint: str) -> dict[str, Any]:
+    return {"connect/endpoints": [endpoint], "listen/endpoints": [], "connect/retry": RETRY,
+            "connect/exit_on_failure": False}  # fmt: skip
 
 
 @contextmanager
@@ -134,6 +144,15 @@ class ZenohLink:
             if reply.ok is not None:
                 return reply.ok.payload.to_bytes()
         return None
+
+    def ask_all(self, key: str, *, timeout_s: float) -> list[bytes]:
+        replies = self._session.get(
+            key,
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=timeout_s,
+        )
+        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 
     def hear(self, key: str, heard: Hearing, *, late: int = 0) -> None:
         self._declared.append(
