@@ -13,7 +13,7 @@ from ezdxf.document import Drawing
 
 from mission.floor import Finding, FloorPlan
 from planner.floors.drawing import metres_per_unit, open_drawing
-from planner.floors.parts import parts_of
+from planner.floors.parts import in_order, parts_of
 from planner.floors.shapes import Shape, shapes_of
 from planner.floors.strokes import sketch, strokes_of
 
@@ -39,7 +39,7 @@ def read_dxf(data: bytes, *, source: Path, digest: str, d_dis: float) -> FloorPl
         rooms=parts.rooms,
         openings=parts.openings,
         elements=parts.elements,
-        findings=(*odd_file, *odd_units, *odd_shapes, *odd_strokes, *parts.findings),
+        findings=in_order((*odd_file, *odd_units, *odd_shapes, *odd_strokes, *parts.findings)),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mission.errors import InputError
@@ -54,7 +54,7 @@ def parts_of(
     elements, odd_elements = elements_of(on, outline=outline, rooms=rooms)
     odd_layers = [*_unknown_layers(on["other"], words), *_dropped(on)]
     findings = (*odd_outline, *odd_rooms, *odd_openings, *odd_elements, *odd_layers)
-    return Parts(canonical_region(outline), rooms, openings, elements, _in_order(findings))
+    return Parts(canonical_region(outline), rooms, openings, elements, findings)
 
 
 def _drawn_by_role(strokes: Iterable[Stroke]) -> defaultdict[str, Drawn]:
@@ -119,7 +119,16 @@ def _dropped(on: Mapping[str, Drawn]) -> list[Finding]:
     ]
 
 
-def _in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Sorted, and what is said more than once said once with its count."""
+    said: dict[tuple, list[Finding]] = {}
+    for finding in sorted(findings, key=_finding_key):
+        said.setdefault((finding.code, finding.element, finding.message), []).append(finding)
     return tuple(
-        sorted(findings, key=lambda item: (item.code, item.element or "", item.at or (), item.message))
+        same[0] if len(same) == 1 else replace(same[0], message=f"{same[0].message} ({len(same)} times)")
+        for same in said.values()
     )
+
+
+def _finding_key(finding: Finding) -> tuple:
+    return (finding.code, finding.element or "", finding.at or (), finding.message)

@@ -22,6 +22,8 @@ SNAP = 1e-3
 """Ends closer than this, in metres, meet."""
 GAP = 0.05
 """The widest gap, in metres, that is closed in an outline."""
+_GRID = 1e-4
+"""Open lines are noded on a grid of this width in metres, so that an end on another line meets it."""
 SLIVER = 1e-6
 """Least area in m² of a solid."""
 
@@ -179,13 +181,14 @@ def joined(lines: Sequence[FloatArray], *, merge: bool, gap: float = GAP) -> Joi
     bridges, gaps = _bridges(lines, gap=gap)
     drawn = [shapely.LineString(line) for line in (*lines, *bridges)]
     for group in _connected(drawn):
-        noded = shapely.union_all([drawn[index] for index in group])
+        noded = shapely.union_all([drawn[index] for index in group], grid_size=_GRID)
         enclosed = polygons_of(shapely.polygonize([noded]))
         whole = polygons_of(shapely.union_all(enclosed)) if merge else enclosed
         faces += [shapely.Polygon(face.exterior) for face in whole]
         cells += enclosed
     edges = shapely.union_all([cell.boundary for cell in cells]).buffer(SNAP)
-    loose = tuple(index for index in range(len(lines)) if not edges.covers(drawn[index]))
+    alongside = shapely.length(shapely.intersection(drawn, edges)) / shapely.length(drawn)
+    loose = tuple(index for index in range(len(lines)) if alongside[index] < 0.5)
     return Joined(tuple(faces), loose, tuple(gaps))
 
 

@@ -12,6 +12,7 @@ from ezdxf import disassemble
 from ezdxf.document import Drawing
 from ezdxf.entities import DXFEntity, DXFTagStorage, Insert, MLine
 from ezdxf.math import Matrix44
+from ezdxf.xclip import XClip
 
 from mission.errors import InputError
 from mission.floor import KINDS, Finding
@@ -130,6 +131,7 @@ class _Walk:
         name = legible(str(insert.dxf.get("name")))
         try:
             block, places = insert.block(), _places(insert, placed)
+            clipped = XClip(insert).has_clipping_path
         except BROKEN_INPUT as error:
             self._odd["bad_coordinates", f"block {name} is skipped: {legible(str(error))}"] += 1
             return
@@ -138,6 +140,8 @@ class _Walk:
         elif name in placed.blocks:
             self._odd["endless_block", f"block {name} holds itself and is not followed"] += 1
         else:
+            if clipped:
+                self._odd["clipped_block", f"block {name} is clipped in the drawing and read whole"] += 1
             yield from self.through(insert.attribs, placed)
             inside = self._inside(insert, placed, name=name)
             for matrix in places:
@@ -171,8 +175,9 @@ class _Walk:
             Finding("hidden_layer", f"layer {legible(layer)} is frozen or off; its {count} entities are used")
             for layer, count in self._used.items()
         ]
-        odd = [Finding(code, f"{text} ({count} times)") for (code, text), count in self._odd.items()]
-        return hidden + odd
+        return hidden + [
+            Finding(code, text) for (code, text), count in self._odd.items() for _ in range(count)
+        ]
 
 
 def _hidden_layers(drawing: Drawing) -> list:

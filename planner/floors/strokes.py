@@ -76,7 +76,7 @@ def strokes_of(
     """
     strokes: list[Stroke] = []
     words: list[Word] = []
-    damaged: list[Finding] = []
+    odd: list[Finding] = []
     solid: Counter[tuple[str, str]] = Counter()
     for shape in shapes:
         try:
@@ -84,11 +84,12 @@ def strokes_of(
                 words.append(_word(shape, scale=scale))
             else:
                 strokes += _strokes(shape, scale=scale, chord=chord)
+                odd += _width(shape, scale=scale)
         except TypeError:
             solid[shape.layer, shape.kind] += 1
         except BROKEN_INPUT as error:
-            damaged.append(_damage(shape, error, scale=scale))
-    return strokes, words, [*damaged, *_without_outline(solid)]
+            odd.append(_damage(shape, error, scale=scale))
+    return strokes, words, [*odd, *_without_outline(solid)]
 
 
 def _strokes(shape: Shape, *, scale: float, chord: float) -> list[Stroke]:
@@ -122,6 +123,16 @@ def _filled(boundaries: Sequence[Stroke]) -> list[Stroke]:
 def _turned(ring: FloatArray, depth: int) -> FloatArray:
     clockwise = ring_area(ring) < 0
     return frozen(ring[::-1]) if clockwise != bool(depth % 2) else ring
+
+
+def _width(shape: Shape, *, scale: float) -> list[Finding]:
+    """A polyline that is drawn as a band: its width is lost, and with it clearance."""
+    if shape.role == "other" or not isinstance(shape.entity, LWPolyline) or not shape.entity.has_width:
+        return []
+    widest = max(width for *_, start, end in shape.entity.get_points("xyse") for width in (start, end))
+    width = max(float(shape.entity.dxf.const_width), widest) * scale
+    message = f"{shape.name} is drawn {width:.3g} m wide and read as its middle line"
+    return [Finding("wide_line", message, at=_place(shape, scale=scale))]
 
 
 def _placed(shape: Shape, fineness: Fineness) -> list[tuple[FloatArray, Curve]]:

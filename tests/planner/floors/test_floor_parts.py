@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import pytest
 from conftest import Read, codes, rectangle
 from ezdxf.layouts import Modelspace
+from ezdxf.xclip import XClip
 
 from mission.floor import KINDS, FloorPlan
 
@@ -52,6 +54,23 @@ def test_floor_parts_that_overlap_are_one(read: Read) -> None:
 def test_floor_parts_that_lie_apart_stay_apart(read: Read) -> None:
     plan = read(lambda m: rectangle(m, "FLOOR", 12, 0, 14, 4))
     assert [round(part.area) for part in plan.outline] == [80, 8]
+
+
+def test_lines_turned_by_an_odd_angle_still_meet(read: Read) -> None:
+    """Ends on the middle of a slanted line are never exactly on it in floating point."""
+
+    def turned(x: float, y: float) -> tuple[float, float]:
+        return (x * math.cos(0.3) - y * math.sin(0.3), x * math.sin(0.3) + y * math.cos(0.3))
+
+    def draw(model: Modelspace) -> None:
+        lines_around(model, "FLOOR", [turned(*corner) for corner in [(0, 0), (10, 0), (10, 8), (0, 8)]])
+        lines_around(model, "ROOMS", [turned(*corner) for corner in [(0, 0), (10, 0), (10, 8), (0, 8)]])
+        for x in (3, 4.7, 8.1):
+            model.add_line(turned(x, 0), turned(x, 8), dxfattribs={"layer": "ROOMS"})
+
+    plan = read(draw, floor=False)
+    assert sorted(room.area for room in plan.rooms) == pytest.approx([13.6, 15.2, 24, 27.2], abs=0.01)
+    assert plan.findings == ()
 
 
 def test_a_floor_of_single_lines_is_joined(read: Read) -> None:
@@ -222,14 +241,17 @@ def test_doors_and_passages_are_lines_across(read: Read) -> None:
     ]
 
 
-def test_an_opening_without_length_is_dropped(read: Read) -> None:
+def test_openings_without_length_are_dropped_and_counted(read: Read) -> None:
     def draw(model: Modelspace) -> None:
         model.add_line((4, 1), (4, 1), dxfattribs={"layer": "DOORS"})
+        model.add_line((5, 1), (5, 1), dxfattribs={"layer": "DOORS"})
         model.add_line((4, 1), (4, 1.9), dxfattribs={"layer": "DOORS"})
 
     plan = read(draw)
     assert len(plan.openings) == 1
     assert codes(plan) == ["no_length"]
+    assert plan.findings[0].message.endswith("(2 times)")
+    assert plan.findings[0].at == (4.0, 1.0)
 
 
 def test_a_door_leafs_swing_is_no_opening(read: Read) -> None:
@@ -364,3 +386,23 @@ def test_hidden_layers_count_only_if_their_name_is_known(read: Read, state: str)
     plan = read(draw)
     assert [element.kind for element in plan.elements] == ["walls"]
     assert codes(plan) == ["hidden_layer"]
+
+
+def test_a_polyline_drawn_as_a_band_is_told(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        model.add_lwpolyline([(1, 1), (4, 1)], dxfattribs={"layer": "WALLS", "const_width": 0.24})
+
+    plan = read(draw)
+    assert codes(plan) == ["wide_line"]
+    assert "0.24 m wide" in plan.findings[0].message
+
+
+def test_a_clipped_block_is_read_whole_and_told(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        model.doc.blocks.new("bay").add_line((0, 0), (3, 0))
+        insert = model.add_blockref("bay", (2, 2), dxfattribs={"layer": "WALLS"})
+        XClip(insert).set_block_clipping_path([(0, 0), (1, 1)])
+
+    plan = read(draw)
+    assert plan.elements[0].lines[0].tolist() == [[2, 2], [5, 2]]
+    assert codes(plan) == ["clipped_block"]
