@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
-from mission.geometry import FloatArray, IntArray
+from mission.geometry import IntArray
 from mission.planning import Visibility
 
 
@@ -34,7 +35,20 @@ class Cover:
         """Columns that a row sees."""
         return self.sees.indices[self.sees.indptr[row] : self.sees.indptr[row + 1]]
 
-    def gains(self, covered: IntArray) -> FloatArray:
+    @cached_property
+    def seen_by(self) -> csr_array:
+        """(columns, rows), the same matrix turned."""
+        return _sorted(self.sees.T)
+
+    def weights_of(self, columns: IntArray) -> IntArray:
+        """Units of these columns that each row sees."""
+        turned = self.seen_by
+        counts = turned.indptr[columns + 1] - turned.indptr[columns]
+        offsets = np.repeat(turned.indptr[columns] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
+        rows = turned.indices[np.arange(int(counts.sum())) + offsets]
+        return np.bincount(rows, np.repeat(self.weight[columns], counts), self.rows).astype(np.int64)
+
+    def gains(self, covered: IntArray) -> IntArray:
         """Units each row would add, where `covered` counts the chosen rows that see each column."""
         return np.asarray(self.sees @ np.where(covered > 0, 0, self.weight))
 

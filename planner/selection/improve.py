@@ -52,14 +52,14 @@ def _best_swap(cover: Cover, rows: list[int], covered: IntArray, tabu: deque[int
     """The swap after which most units are covered: units lost by leaving, then the largest gain."""
     best, swap = -np.inf, (rows[0], rows[0])
     blocked = np.array([*rows, *tabu], dtype=np.int64)
+    gains_now = cover.gains(covered)
     for out in sorted(rows):
         columns = cover.columns_of(out)
-        covered[columns] -= 1
-        gains = cover.gains(covered)
-        covered[columns] += 1
-        lost = int(cover.weight[columns][covered[columns] == 1].sum())
+        alone = columns[covered[columns] == 1]
+        gains = gains_now + cover.weights_of(alone)
         gains[blocked] = -1
         into = int(np.argmax(gains))
-        if gains[into] - lost > best:
-            best, swap = gains[into] - lost, (out, into)
+        change = int(gains[into]) - int(cover.weight[alone].sum())
+        if change > best:
+            best, swap = change, (out, into)
     return swap
