@@ -119,7 +119,7 @@ def furnished() -> FloorPlan:
 POSITIONS = np.array([(0.83, 0.71), (1.77, 2.03), (2.91, 3.17), (4.93, 1.09), (5.41, 2.21), (7.33, 3.07)])
 
 
-@pytest.mark.parametrize("by", [(0.0, 0.0), (12.5, -7.25), (4096.0, -65536.25)])
+@pytest.mark.parametrize("by", [(0.0, 0.0), (12.5, -7.25), (123456.789, 7654321.125)])
 def test_visibility_does_not_change_when_the_floor_is_shifted(by: tuple[float, float]) -> None:
     there = at(moved(furnished(), shifted(*by)), shifted(*by)(POSITIONS))
     assert seen_places(there, shifted(-by[0], -by[1])) == seen_places(at(furnished(), POSITIONS))
@@ -130,12 +130,20 @@ def test_visibility_does_not_change_when_the_floor_is_mirrored() -> None:
     assert seen_places(there, mirrored) == seen_places(at(furnished(), POSITIONS))
 
 
-@pytest.mark.parametrize("degrees", [90.0, 180.0])
+@pytest.mark.parametrize("degrees", [17.0, 45.0, 90.0, 200.0])
 def test_visibility_does_not_change_when_the_floor_is_turned(degrees: float) -> None:
     there = at(moved(furnished(), turned(degrees)), turned(degrees)(POSITIONS))
     here = at(furnished(), POSITIONS)
     assert there.targets.total == here.targets.total
     assert [len(places) for places in seen_places(there)] == [len(places) for places in seen_places(here)]
+
+
+@pytest.mark.parametrize("degrees", [17.0, 45.0])
+@pytest.mark.parametrize("name", [*PAPER, "layered/fzk-haus-eg.dxf"])
+def test_a_turned_floor_has_the_same_units(name: str, degrees: float) -> None:
+    here = navigable(shared(name), Settings()).targets
+    there = navigable(moved(shared(name), turned(degrees)), Settings()).targets
+    assert (there.total, len(there.units)) == (here.total, len(here.units))
 
 
 def test_visibility_does_not_depend_on_the_order_of_elements_nor_on_duplicates() -> None:
