@@ -47,7 +47,8 @@ def _scale(drawing: Drawing, shapes: Sequence[Shape]) -> tuple[float, list[Findi
     floor = sketch(shape for shape in shapes if shape.role == "floor" and not shape.is_text)
     doors = sketch(shape for shape in shapes if shape.role == "doors" and shape.entity.dxftype() == "LINE")
     widths = [float(np.hypot(*(line[-1] - line[0]))) for line in doors]
-    return metres_per_unit(drawing, floor=np.vstack(floor) if floor else np.empty((0, 2)), doors=widths)
+    points = np.vstack(floor) if floor else np.empty((0, 2))
+    return metres_per_unit(drawing, floor=points, doors=[width for width in widths if width > 0])
 
 
 def _skipped(findings: Sequence[Finding]) -> str:

@@ -55,12 +55,13 @@ def test_the_office_has_its_names_holes_and_global_ids() -> None:
 
 @real
 def test_the_office_is_read_in_half_a_second() -> None:
+    """Of the processor's time: other work on the machine does not count."""
     path = DATA / "layered" / "office-l1.dxf"
     times = []
     for _ in range(3):
-        started = time.perf_counter()
+        started = time.process_time()
         read_floor(path, d_dis=0.05)
-        times.append(time.perf_counter() - started)
+        times.append(time.process_time() - started)
     assert min(times) < 0.5
 
 
