@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from mission.document import Mission
+from mission.errors import InputError
 from mission.geometry import FloatArray
 from recordings import entities, palette
 from recordings.layout import Bounds, blueprint
@@ -115,6 +117,22 @@ class Sheet:
         return (self.extent[0] - x, self.extent[1] - y, self.extent[2] - x, self.extent[3] - y)
 
 
+def must_be_writable(path: Path) -> None:
+    """Refuse a place where no file can be made, before anything is done for it.
+
+    Raises
+    ------
+    InputError
+        Naming the path and what is wrong with it.
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; give the name of a file in it")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}; make it first")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path}: the folder {path.parent} cannot be written to")
+
+
 @contextmanager
 def open_canvas(path: Path, sheet: Sheet) -> Iterator[Canvas]:
     """A recording written to `path`, with the blueprint that all recordings share; leaving closes it."""
@@ -122,12 +140,20 @@ def open_canvas(path: Path, sheet: Sheet) -> Iterator[Canvas]:
     with rr.RecordingStream(
         entities.APPLICATION, recording_id=sheet.recording_id, send_properties=False
     ) as stream:
-        stream.save(path, default_blueprint=blueprint(sheet.local_extent, of_run=sheet.of_run))
+        _save(stream, path, sheet)
         stream.set_log_time_enabled(False)
         stream.send_recording_name(sheet.name)
         canvas = Canvas(stream, sheet.origin)
         _prepare(canvas)
         yield canvas
+
+
+def _save(stream: rr.RecordingStream, path: Path, sheet: Sheet) -> None:
+    layout = blueprint(sheet.local_extent, of_run=sheet.of_run)
+    try:
+        stream.save(path, default_blueprint=layout)
+    except RuntimeError as error:
+        raise InputError(f"{path}: cannot be written ({error})") from None
 
 
 def _prepare(canvas: Canvas) -> None:

@@ -9,17 +9,24 @@ from pathlib import Path
 import rerun
 
 from mission.errors import InputError
-from recordings.read import check
+from recordings.read import Contents, check
 
 VIEWER = Path(rerun.__file__).parents[1] / "rerun_cli" / "rerun"
 """The native program: ending the `rerun` script would leave it running."""
 
 
 def compact(source: Path, target: Path) -> None:
-    """Move `source` to `target`, compacted if that loses no row, else as it is."""
+    """Move `source` to `target`, compacted if that loses no row, else as it is.
+
+    Raises
+    ------
+    InputError
+        When `source` is not readable to its end, as after a full disk; it is left where it is.
+    """
+    written = check(source)
     merged = target.with_name(f"{target.name}.tmp")
     try:
-        if _merge(source, merged) and _holds_all(merged, source):
+        if _merge(source, merged) and _holds(merged, written):
             os.replace(merged, target)
             source.unlink()
         else:
@@ -28,18 +35,17 @@ def compact(source: Path, target: Path) -> None:
         merged.unlink(missing_ok=True)
 
 
-def _holds_all(merged: Path, source: Path) -> bool:
-    """Whether no entity has fewer rows than before; Rerun may split a row into its archetypes."""
-    rows = check(merged).rows
-    return all(rows.get(entity, 0) >= count for entity, count in check(source).rows.items())
-
-
 def _merge(source: Path, merged: Path) -> bool:
-    """Whether Rerun made a readable file; its exit code alone does not tell."""
+    """Whether Rerun says that it merged; its exit code alone does not tell that all is there."""
     command = [str(VIEWER), "rrd", "optimize", str(source), "-o", str(merged)]
     # Ctrl-C ends the recording, not the closing of its file.
-    done = subprocess.run(command, capture_output=True, check=False, start_new_session=True)
+    return subprocess.run(command, capture_output=True, check=False, start_new_session=True).returncode == 0
+
+
+def _holds(merged: Path, written: Contents) -> bool:
+    """Whether it is whole, and no entity has fewer rows; Rerun may split a row into its archetypes."""
     try:
-        return done.returncode == 0 and check(merged).complete
+        held = check(merged)
     except InputError:
         return False
+    return held.complete and all(held.rows.get(name, 0) >= count for name, count in written.rows.items())

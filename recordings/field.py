@@ -10,10 +10,10 @@ from typing import Any
 
 from mission.document import Mission
 from mission.events import AnyEvent, PoseReport, StateReport
-from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
+from recordings.canvas import Canvas, Sheet, mission_origin, must_be_writable, open_canvas
 from recordings.compact import compact
-from recordings.mission_drawing import draw_mission, mission_extent
-from recordings.run_drawing import RunDrawing
+from recordings.runs.drawing import RunDrawing
+from recordings.stages.mission import draw_mission, mission_extent
 
 Report = StateReport | PoseReport | AnyEvent
 
@@ -38,6 +38,7 @@ class FieldRecording:
         self._open = ExitStack()
 
     def __enter__(self) -> FieldRecording:
+        must_be_writable(self.path)
         if self._given is not None:
             self.mission(self._given)
         return self

@@ -16,24 +16,42 @@ from mission.errors import AnswerIsNo, StopgoError
 from mission.floor import FloorPlan
 from mission.geometry import bounds
 from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
-from recordings import entities, stages
-from recordings.canvas import Canvas, Origin, Sheet, local_origin, mission_origin, open_canvas
-from recordings.drive import planned_drive
+from recordings import entities
+from recordings.canvas import (
+    Canvas,
+    Origin,
+    Sheet,
+    local_origin,
+    mission_origin,
+    must_be_writable,
+    open_canvas,
+)
 from recordings.layout import Bounds
-from recordings.mission_drawing import draw_drive, draw_mission, mission_extent
 from recordings.read import check
 from recordings.report import Nouns, parameter_values, parameters, plan_report, plan_results
-from recordings.solid import paint_coverage, raise_floor
+from recordings.stages.candidates import draw_candidates
+from recordings.stages.drive import planned_drive
+from recordings.stages.floor import draw_floor, raise_floor
+from recordings.stages.mission import (
+    draw_drive,
+    draw_mission,
+    mission_extent,
+    plot_planned_coverage,
+    tell_route,
+)
+from recordings.stages.selection import draw_selection, paint_coverage
+from recordings.stages.space import draw_space
+from recordings.stages.visibility import draw_visibility
 
 Drawing = Callable[[Canvas, Any], None]
 
 DRAWINGS: dict[type, tuple[Drawing, ...]] = {
-    FloorPlan: (stages.draw_floor, raise_floor),
-    NavigableSpace: (stages.draw_space,),
-    Candidates: (stages.draw_candidates,),
-    Visibility: (stages.draw_visibility,),
-    Selection: (stages.draw_selection, paint_coverage),
-    Route: (stages.tell_route,),
+    FloorPlan: (draw_floor, raise_floor),
+    NavigableSpace: (draw_space,),
+    Candidates: (draw_candidates,),
+    Visibility: (draw_visibility,),
+    Selection: (draw_selection, paint_coverage),
+    Route: (tell_route,),
     Mission: (draw_mission,),
 }
 """How each noun is drawn; nouns of other types are left out."""
@@ -53,6 +71,7 @@ class PlanRecording:
         self._nouns: Nouns = {}
 
     def __enter__(self) -> PlanRecording:
+        must_be_writable(self.path)
         return self
 
     def observe(self, noun: object) -> None:
@@ -117,7 +136,7 @@ def _draw_planned_drive(canvas: Canvas, nouns: Nouns) -> None:
     draw_drive(canvas, drive, radius=mission.robot.radius)
     if Selection in nouns:
         visible = int(nouns[Selection].visibility.visible.sum())
-        stages.plot_planned_coverage(canvas, mission, drive, visible=visible)
+        plot_planned_coverage(canvas, mission, drive, visible=visible)
 
 
 def _tell(canvas: Canvas, nouns: Nouns) -> None:

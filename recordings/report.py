@@ -47,7 +47,7 @@ def plan_report(nouns: Nouns, origin: Origin) -> str:
     lines = [f"# {title}", "", "| | |", "|---|---|"]
     lines += [f"| {name.replace('_', ' ')} | {_shown(value)} |" for name, value in _ordered(results)]
     lines += ["", *_stop_table(nouns.get(Mission)), *_findings(nouns)]
-    lines += ["## Looking around", "", *_GUIDE, *_origin_note(origin)]
+    lines += ["## Colours", "", *_COLOURS, "", "## Looking around", "", *_GUIDE, *_origin_note(origin)]
     return "\n".join(lines)
 
 
@@ -158,6 +158,14 @@ def _findings(nouns: Nouns) -> list[str]:
         return []
     return ["## Findings", "", *(f"- **{item.code}** {item.message}" for item in holder.findings), ""]
 
+
+_COLOURS = (
+    "- targets: green seen by a stop, red not seen, violet seen from no candidate, yellow new in a step",
+    "- stops green with their number, doorway stops yellow-green; route cyan, way back dark cyan; run pink",
+    "- openings: white passable, magenta not",
+    "- candidates: yellow kept, reddish dropped; point at one to see why",
+    "- walls grey, columns orange, beams purple, stairs teal, windows and railings blue, holes rose",
+)
 
 _GUIDE = (
     "- timeline `mission_time`: the planned drive, and the field run when its recording is open too",

@@ -19,7 +19,7 @@ from mission.events import (
     StateReport,
     StopState,
 )
-from recordings.drive import planned_drive
+from recordings.stages.drive import planned_drive
 
 BEGAN_NS = 1_795_000_000_000_000_000
 RUN = "run-1"

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 from mission.document import Mission
+from mission.errors import InputError
 from mission.events import StateReport
 from recordings import entities
+from recordings.compact import compact
 from recordings.field import FieldRecording
+from recordings.plan import PlanRecording
 from recordings.read import check
 from tests.recordings import run, world
 from tests.recordings.conftest import tell, write_field, write_plan
@@ -132,6 +135,28 @@ def test_ctrl_c_keeps_the_run_so_far(tmp_path: Path, mission: Mission) -> None:
         raise KeyboardInterrupt
     assert [item.name for item in tmp_path.iterdir()] == ["field.rrd"]
     assert check(path).complete
+
+
+@pytest.mark.parametrize("recording", [PlanRecording, FieldRecording])
+@pytest.mark.parametrize(("name", "why"), [("none/field.rrd", "no folder"), (".", "is a folder")])
+def test_a_place_without_room_is_refused_before_the_run(
+    tmp_path: Path, recording: type, name: str, why: str
+) -> None:
+    with pytest.raises(InputError, match=why), recording(tmp_path / name, world.MISSION_ID):
+        raise AssertionError("entered")
+
+
+def test_a_run_cut_off_by_a_full_disk_is_left_under_its_partial_name(
+    tmp_path: Path, mission: Mission
+) -> None:
+    path = tmp_path / "field.rrd"
+    whole = write_field(tmp_path / "whole.rrd", mission).read_bytes()
+    partial = tmp_path / "field.partial.rrd"
+    partial.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="cut off"):
+        compact(partial, path)
+    assert partial.exists()
+    assert not path.exists()
 
 
 KILLED = """

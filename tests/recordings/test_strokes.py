@@ -10,8 +10,8 @@ import pytest
 from mission.geometry import Polygon, ring_area
 from mission.schedule import schedule
 from recordings import strokes
-from recordings.cross_track import cross_track
-from recordings.drive import planned_drive
+from recordings.runs.cross_track import cross_track
+from recordings.stages.drive import planned_drive
 from tests.recordings import world
 
 SQUARE = Polygon.of([(0, 0), (4, 0), (4, 4), (0, 4)], [[(1, 1), (3, 1), (3, 3), (1, 3)]])

@@ -22,11 +22,12 @@ from mission.events import (
 from mission.geometry import FloatArray
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
-from recordings.cross_track import cross_track
 from recordings.entities import of_run
-from recordings.mission_drawing import ABOVE_FLOOR, draw_robot, quaternions
-from recordings.run_report import StopRecord, run_report
-from recordings.stages import ORDER
+from recordings.pens import ORDER
+from recordings.robot import draw_robot, quaternions
+from recordings.runs.cross_track import cross_track
+from recordings.runs.report import StopRecord, run_report
+from recordings.stages.mission import ABOVE_FLOOR
 
 PIECE_M = 0.05
 """The driven path grows by pieces of at least this length, each a row of its own."""

@@ -9,12 +9,14 @@ import numpy as np
 import rerun as rr
 
 from mission.document import Mission
-from mission.geometry import FloatArray, bounds
+from mission.geometry import bounds
+from mission.planning import Route
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
-from recordings.drive import Drive
 from recordings.layout import Bounds
-from recordings.stages import ORDER
+from recordings.pens import ORDER
+from recordings.robot import draw_robot, quaternions
+from recordings.stages.drive import Drive
 
 ABOVE_FLOOR = 0.05
 ARROW = 0.6
@@ -36,6 +38,29 @@ def mission_extent(mission: Mission) -> Bounds:
     return (left - reach, low - reach, right + reach, high + reach)
 
 
+def tell_route(canvas: Canvas, route: Route) -> None:
+    """The route in words; the mission made from it is what is drawn."""
+    stops = len(route.order)
+    canvas.say(
+        f"route ({route.method}, {route.tour}): {stops} stops, {route.length:.2f} m,"
+        f" at least {route.bound:.2f} m; begins at {route.start_reason}",
+        step=stops,
+    )
+
+
+def plot_planned_coverage(canvas: Canvas, mission: Mission, drive: Drive, *, visible: int) -> None:
+    """Coverage over mission time, if every scan is done as planned."""
+    gained = np.cumsum([stop.sees.new_units for stop in mission.stops]) * (100.0 / max(visible, 1))
+    seconds = np.concatenate([[0.0], drive.leaving_s])
+    planned = f"{entities.METRIC_COVERAGE}/planned"
+    index = rr.TimeColumn(entities.MISSION_TIME, duration=seconds)
+    canvas.columns(planned, index, rr.Scalars.columns(scalars=np.concatenate([[0.0], gained])))
+    style = rr.SeriesLines(
+        colors=palette.ROUTE, names="coverage as planned", widths=2, interpolation_mode="StepAfter"
+    )
+    canvas.show(planned, style)
+
+
 def draw_drive(canvas: Canvas, drive: Drive, *, radius: float) -> None:
     """The planned pose over mission time."""
     index = rr.TimeColumn(entities.MISSION_TIME, duration=drive.seconds)
@@ -45,22 +70,6 @@ def draw_drive(canvas: Canvas, drive: Drive, *, radius: float) -> None:
         columns = rr.Transform3D.columns(translation=strokes.level(xy, 0.0), quaternion=turn)
         canvas.columns(robot, index, columns)
     draw_robot(canvas, entities.PLANNED_ROBOT, entities.WORLD_PLANNED_ROBOT, radius, palette.PLANNED)
-
-
-def draw_robot(canvas: Canvas, flat: str, solid: str, radius: float, colour: palette.Colour) -> None:
-    """The robot's shape in 2D and 3D; its pose is the transform of the entities `flat` and `solid`."""
-    body, nose = strokes.circle(radius), np.array([[0.0, 0.0], [radius * 1.6, 0.0]])
-    lines = rr.LineStrips2D([body, nose], colors=colour, radii=on_screen(1.5), draw_order=ORDER["robot"])
-    canvas.show(f"{flat}/shape", lines)
-    rings = [strokes.level(body, z) for z in (0.02, 0.25, 0.5)]
-    shape = rr.LineStrips3D([*rings, strokes.level(nose, 0.5)], colors=colour, radii=0.02)
-    canvas.show(f"{solid}/shape", shape)
-
-
-def quaternions(heading: FloatArray) -> FloatArray:
-    """Turns about z as quaternions (n, 4), x y z w."""
-    half = np.asarray(heading) / 2
-    return np.stack([np.zeros_like(half), np.zeros_like(half), np.sin(half), np.cos(half)], axis=-1)
 
 
 def _draw_route(canvas: Canvas, mission: Mission) -> None:
@@ -82,10 +91,11 @@ def _draw_route(canvas: Canvas, mission: Mission) -> None:
 def _draw_stops(canvas: Canvas, mission: Mission) -> None:
     xy = canvas.local(np.array([(stop.x, stop.y) for stop in mission.stops]))
     labels = [stop.id for stop in mission.stops]
+    colours = [palette.DOORWAY if stop.doorway else palette.STOP for stop in mission.stops]
     heading = np.array([stop.heading for stop in mission.stops])
     facing = ARROW * np.stack([np.cos(heading), np.sin(heading)], axis=1)
     points = rr.Points2D(
-        xy, labels=labels, colors=palette.STOP, radii=on_screen(5), show_labels=True, draw_order=ORDER["stop"]
+        xy, labels=labels, colors=colours, radii=on_screen(5), show_labels=True, draw_order=ORDER["stop"]
     )
     details = rr.AnyValues(
         doorway=[stop.doorway for stop in mission.stops],
@@ -101,7 +111,7 @@ def _draw_stops(canvas: Canvas, mission: Mission) -> None:
         draw_order=ORDER["stop"],
     )
     canvas.show(f"{entities.STOPS}/heading", arrows)
-    poles = rr.Points3D(strokes.level(xy, 1.5), labels=labels, colors=palette.STOP, radii=0.12)
+    poles = rr.Points3D(strokes.level(xy, 1.5), labels=labels, colors=colours, radii=0.12)
     canvas.show(entities.WORLD_STOPS, poles)
     legs = np.stack([strokes.level(xy, 0.0), strokes.level(xy, 1.5)], axis=1)
     canvas.show(f"{entities.WORLD_STOPS}/legs", rr.LineStrips3D(legs, colors=palette.STOP, radii=0.02))

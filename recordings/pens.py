@@ -1,0 +1,45 @@
+"""Pens: with what colour, how wide, and above what else lines are drawn in 2D."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import rerun as rr
+
+from mission.geometry import FloatArray
+from recordings.canvas import Canvas, on_screen
+from recordings.palette import Colour
+
+ORDER = {
+    name: float(order)
+    for order, name in enumerate(
+        ("room", "area", "floor", "solid", "line", "target", "ray", "route", "candidate", "stop", "robot")
+    )
+}
+"""What lies above what; Rerun's own defaults are 20 for lines and 30 for points."""
+
+HAIR, THIN, THICK, BOLD = (on_screen(width) for width in (0.5, 0.8, 1.6, 2.5))
+
+
+@dataclass(frozen=True)
+class Pen:
+    """How lines look: `order` is a key of ORDER, `radius` as Rerun takes it."""
+
+    colour: Colour
+    order: str
+    radius: float
+
+
+def draw(canvas: Canvas, entity: str, strips: Iterable[FloatArray], pen: Pen) -> None:
+    """Draw line strips, if there are any."""
+    local = canvas.strips(strips)
+    if local:
+        shape = rr.LineStrips2D(local, colors=pen.colour, radii=pen.radius, draw_order=ORDER[pen.order])
+        canvas.show(entity, shape)
+
+
+def style(canvas: Canvas, entity: str, pen: Pen) -> None:
+    """Give lines that change their unchanging look."""
+    fields = rr.LineStrips2D.from_fields(colors=pen.colour, radii=pen.radius, draw_order=ORDER[pen.order])
+    canvas.show(entity, fields)

@@ -1,0 +1,1 @@
+"""A run as it is drawn and told, report by report."""

@@ -1,0 +1,32 @@
+"""Candidates: every possible position, and why it was dropped."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from mission.planning import DROP_REASONS, KEPT, Candidates
+from recordings import entities, palette
+from recordings.canvas import Canvas, on_screen
+from recordings.pens import ORDER
+
+
+def draw_candidates(canvas: Canvas, candidates: Candidates) -> None:
+    """Every possible position, coloured by what became of it; hovering tells the reason and the room."""
+    if not len(candidates.xy):
+        canvas.say("no candidate positions", level="WARN")
+        return
+    kept = candidates.reason == KEPT
+    points = rr.Points2D(
+        canvas.local(candidates.xy),
+        class_ids=[palette.reason(int(number)).number for number in candidates.reason],
+        radii=np.where(kept, on_screen(2.2), on_screen(1.5)),
+        show_labels=False,
+        draw_order=ORDER["candidate"],
+    )
+    names = [candidates.space.rooms[int(room)].name for room in candidates.room]
+    why = [DROP_REASONS[int(number)] for number in candidates.reason]
+    canvas.show(entities.CANDIDATES, points, rr.AnyValues(room=names, reason=why))
+    counts = np.bincount(candidates.reason, minlength=len(DROP_REASONS))
+    told = ", ".join(f"{int(count)} {DROP_REASONS[i]}" for i, count in enumerate(counts) if count)
+    canvas.say(f"candidates ({candidates.strategy}): {len(candidates.xy)} generated: {told}")

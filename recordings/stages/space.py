@@ -1,0 +1,55 @@
+"""Navigable space: where the robot may drive and stop, what it passes, and what is to be scanned."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from mission.floor import FloorPlan
+from mission.geometry import bounds
+from mission.planning import NavigableSpace, OpeningState
+from recordings import entities, palette, strokes
+from recordings.canvas import Canvas
+from recordings.pens import ORDER, THICK, THIN, Pen, draw
+from recordings.stages.floor import say_findings
+
+
+def draw_space(canvas: Canvas, space: NavigableSpace) -> None:
+    """Where the robot may drive and stop, which openings it passes, what it is to look at."""
+    spacing = _hatch_spacing(space.floor)
+    drive = strokes.hatch(space.drive_area, spacing=spacing, angle=np.pi / 4)
+    draw(canvas, f"{entities.NAVIGABLE}/drive", drive, Pen(palette.DRIVE, "area", THIN))
+    stop_polygons = [polygon for room in space.rooms for polygon in room.stop_area]
+    stop_area = strokes.hatch(stop_polygons, spacing=spacing, angle=-np.pi / 4)
+    draw(canvas, f"{entities.NAVIGABLE}/stop", stop_area, Pen(palette.STOP_AREA, "area", THIN))
+    edges = strokes.outlines(stop_polygons)
+    draw(canvas, f"{entities.NAVIGABLE}/stop_edge", edges, Pen(palette.STOP_AREA, "area", THIN))
+    draw(canvas, f"{entities.NAVIGABLE}/gaps", space.gaps, Pen(palette.GAP, "line", THICK))
+    _draw_openings(canvas, space.openings)
+    targets = space.targets
+    lines = np.stack([targets.a, targets.b], axis=1)
+    draw(canvas, entities.TARGETS, lines, Pen(palette.TARGET.colour, "target", THIN))
+    say_findings(canvas, [item for item in space.findings if item not in space.floor.findings])
+    canvas.say(f"navigable space: {len(space.rooms)} rooms, {targets.total} target units")
+
+
+def _hatch_spacing(floor: FloorPlan) -> float:
+    """Wide enough that hatches of a large floor do not run together on a screen."""
+    left, low, right, high = bounds(polygon.exterior for polygon in floor.outline)
+    return float(np.clip(max(right - left, high - low) / 90, 0.2, 1.0))
+
+
+def _draw_openings(canvas: Canvas, openings: tuple[OpeningState, ...]) -> None:
+    """Replaces what the floor drew: now it is known which openings the robot passes."""
+    if not openings:
+        return
+    colours = [palette.PASSABLE if state.passable else palette.BLOCKED for state in openings]
+    lines = rr.LineStrips2D(
+        canvas.strips(state.opening.line for state in openings),
+        colors=colours,
+        radii=THICK,
+        draw_order=ORDER["line"],
+    )
+    widths = [state.clear_width for state in openings]
+    why = [state.why or "passable" for state in openings]
+    canvas.show(f"{entities.FLOOR}/openings", lines, rr.AnyValues(clear_width=widths, why=why))

@@ -1,0 +1,50 @@
+"""Visibility: what each candidate sees, as rows on the candidate timeline."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from mission.geometry import FloatArray, IntArray
+from mission.planning import Visibility
+from recordings import entities, palette, strokes
+from recordings.canvas import Canvas, on_screen
+from recordings.pens import BOLD, HAIR, ORDER, Pen, style
+
+
+def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
+    """What each candidate sees, as rows on the candidate timeline: its position, rays, and seen pieces."""
+    if not visibility.rows:
+        return
+    index = rr.TimeColumn(entities.CANDIDATE, sequence=np.arange(visibility.rows))
+    eyes = visibility.candidates.xy[visibility.candidates.kept]
+    counts = np.diff(visibility.pointer)
+    seen = strokes.runs(visibility.targets, visibility.segment, visibility.first, visibility.last)
+    fans = np.stack([seen[:, 0], np.repeat(eyes, counts, axis=0), seen[:, 1]], axis=1)
+    _rows_of_lines(canvas, f"{entities.VISIBILITY}/rays", index, fans, counts)
+    _rows_of_lines(canvas, f"{entities.VISIBILITY}/seen", index, seen, counts)
+    style(canvas, f"{entities.VISIBILITY}/rays", Pen(palette.RAY, "ray", HAIR))
+    style(canvas, f"{entities.VISIBILITY}/seen", Pen(palette.SEEN.colour, "target", BOLD))
+    eye = f"{entities.VISIBILITY}/candidate"
+    canvas.columns(eye, index, rr.Points2D.columns(positions=canvas.local(eyes)))
+    canvas.show(
+        eye, rr.Points2D.from_fields(colors=palette.EYE, radii=on_screen(6), draw_order=ORDER["stop"])
+    )
+    _plot_sight(canvas, visibility, index)
+    visible = int(visibility.visible.sum())
+    canvas.say(f"visibility ({visibility.method}): {visible} of {visibility.targets.total} units seen by any")
+
+
+def _plot_sight(canvas: Canvas, visibility: Visibility, index: rr.TimeColumn) -> None:
+    visible = max(1, int(visibility.visible.sum()))
+    seen = [len(visibility.seen_by(row)) / visible * 100 for row in range(visibility.rows)]
+    sight = f"{entities.METRIC_COVERAGE}/candidate"
+    canvas.columns(sight, index, rr.Scalars.columns(scalars=seen))
+    canvas.show(sight, rr.SeriesLines(colors=palette.EYE, names="seen by the candidate", widths=1))
+
+
+def _rows_of_lines(
+    canvas: Canvas, entity: str, index: rr.TimeColumn, lines: FloatArray, counts: IntArray
+) -> None:
+    columns = rr.LineStrips2D.columns(strips=canvas.local(lines))
+    canvas.columns(entity, index, columns.partition(counts))
