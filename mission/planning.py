@@ -122,9 +122,13 @@ DROP_REASONS = (
     "not reachable by the robot",
     "in another part of the floor",
     "in a circle to avoid",
+    "triangle too small",
+    "sliver triangle",
 )
 """Why a candidate was dropped; `Candidates.reason` holds indices into this."""
-KEPT, OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, UNREACHABLE, OTHER_PART, AVOIDED = range(len(DROP_REASONS))
+KEPT, OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, UNREACHABLE, OTHER_PART, AVOIDED, TOO_SMALL, SLIVER = range(
+    len(DROP_REASONS)
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,7 +312,9 @@ __all__ = [
     "KEPT",
     "OTHER_PART",
     "OUTSIDE",
+    "SLIVER",
     "TOO_CLOSE",
+    "TOO_SMALL",
     "UNREACHABLE",
     "Candidates",
     "NavigableSpace",

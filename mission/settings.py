@@ -33,6 +33,13 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Greatest length of a unit (Eq. 1)."""
     grid: float = 1.0
     """r_grid: greatest spacing of grid candidates."""
+    d_max: float = 1.6
+    """Greatest distance of triangulation seeds along a line. The paper gives no value for this and the
+    next two: ours come closest to its Table 3."""
+    l_min: float = 2.6
+    """Least side of a triangle whose middle is a candidate."""
+    dens_min: float = 0.25
+    """Least candidates per m² of a room, below which it is triangulated again."""
     door_access: float = 0.7
     """Least clear width of an opening that is driven through."""
     edge: float = 0.35
@@ -91,6 +98,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 SECTIONS: dict[str, tuple[str, ...]] = {
     "plan": (
         *("candidates", "visibility", "selector", "router", "coverage", "d_sec", "d_dis", "grid"),
+        *("d_max", "l_min", "dens_min"),
         *("door_access", "edge", "doors", "targets", "tour", "start", "end", "use", "avoid"),
         *("door_scan", "door_candidates", "node_limit", "time_limit", "origin", "seed"),
     ),
@@ -101,13 +109,16 @@ SECTIONS: dict[str, tuple[str, ...]] = {
 """The tables of plan.toml and the keys in each."""
 
 _POSITIVE = (
-    *("d_dis", "grid", "door_access", "robot_radius", "speed", "turn_rate"),
+    *("d_dis", "grid", "d_max", "door_access", "robot_radius", "speed", "turn_rate"),
     "acceleration",
     "time_limit",
     "range",
     "tolerance",
 )
-_NOT_NEGATIVE = ("d_sec", "edge", "settle", "scan_time", "retries", "link_loss_after", "seed", "node_limit")
+_NOT_NEGATIVE = (
+    *("d_sec", "l_min", "dens_min", "edge", "settle", "scan_time", "retries", "link_loss_after"),
+    *("seed", "node_limit"),
+)
 _LARGEST = 1e6
 _FARTHEST = 1e9
 """Coordinates of a site may be this large, in metres."""
@@ -191,6 +202,8 @@ def _check_shares(settings: Settings) -> None:
         raise InputError(f"battery_min = {settings.battery_min}: must be at least 0 and below 1")
     if settings.d_dis < 1e-3:
         raise InputError(f"d_dis = {settings.d_dis}: units below 1 mm are not planned; use 0.001 or more")
+    if settings.d_max < 0.05:
+        raise InputError(f"d_max = {settings.d_max}: seeds below 5 cm are not planned; use 0.05 or more")
     if settings.grid < 0.05:
         raise InputError(f"grid = {settings.grid}: spacing below 5 cm is not planned; use 0.05 or more")
 

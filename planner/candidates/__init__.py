@@ -1,7 +1,7 @@
 """Navigable space -> candidates: possible scan positions, each dropped one with its reason.
 
 A strategy is a function `(space) -> (xy, room)`: positions (n, 2) in the drawing's metres and the index
-of each one's room in `space.rooms`.
+of each one's room in `space.rooms`; or `(xy, room, reason)` where it drops some for reasons of its own.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from collections.abc import Callable
 from importlib import import_module
 
 import numpy as np
-import shapely
 
 from mission.errors import AnswerIsNo, InputError
 from mission.geometry import FloatArray, IntArray, frozen
@@ -30,11 +29,12 @@ from planner.candidates.given import doorways, places_to_use
 from planner.candidates.grid import grid
 from planner.candidates.place import Place
 from planner.candidates.proposals import Proposals, joined
+from planner.candidates.triangulation import triangulation
 from planner.connected import Parts, parts_of
 from planner.shapes import local_origin, to_shape
 
-Strategy = Callable[[NavigableSpace], tuple[FloatArray, IntArray]]
-STRATEGIES: dict[str, Strategy] = {"grid": grid}
+Strategy = Callable[[NavigableSpace], tuple[FloatArray, IntArray] | tuple[FloatArray, IntArray, IntArray]]
+STRATEGIES: dict[str, Strategy] = {"grid": grid, "triangulation": triangulation}
 
 
 def candidates(space: NavigableSpace, *, part: int | None = None) -> Candidates:
@@ -50,8 +50,9 @@ def candidates(space: NavigableSpace, *, part: int | None = None) -> Candidates:
 
 
 def _from_strategy(place: Place) -> Proposals:
-    xy, room = strategy(place.space.settings.candidates)(place.space)
-    return Proposals.of(xy, room, place.reasons(xy, room))
+    xy, room, *early = strategy(place.space.settings.candidates)(place.space)
+    reason = place.reasons(xy, room)
+    return Proposals.of(xy, room, np.where(early[0] == KEPT, reason, early[0]) if early else reason)
 
 
 def strategy(name: str) -> Strategy:
@@ -84,7 +85,7 @@ def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> C
     reason = np.where((reason == KEPT) & (at < 0), UNREACHABLE, reason)
     if not np.any(at >= 0):
         raise AnswerIsNo(_no_candidate(space, reason))
-    chosen = _chosen_part(space, parts, at, part)
+    chosen = _chosen_part(space, proposals, parts, at) if part is None else part
     _check_used(space, proposals, at, chosen)
     reason = np.where((reason == KEPT) & (at != chosen), OTHER_PART, reason)
     return Candidates(
@@ -109,23 +110,13 @@ def _check_used(space: NavigableSpace, proposals: Proposals, at: IntArray, chose
         )
 
 
-def _chosen_part(space: NavigableSpace, parts: Parts, at: IntArray, part: int | None) -> int:
+def _chosen_part(space: NavigableSpace, proposals: Proposals, parts: Parts, at: IntArray) -> int:
+    """The start's part, else the largest that has candidates in rooms: floor beyond them comes last."""
     held = set(at[at >= 0].tolist())
-    if part is not None:
-        return part
     if space.settings.start is not None:
         return _part_of_start(space, parts, held)
-    return next(k for k in roomy_parts(space, parts) if k in held)
-
-
-def roomy_parts(space: NavigableSpace, parts: Parts) -> list[int]:
-    """Parts by area, those that hold some of a room first: floor beyond the rooms comes last."""
-    if not space.floor.rooms:
-        return list(range(len(parts.areas)))
-    origin = local_origin(space.floor)
-    rooms = shapely.union_all([to_shape(room.polygons, origin) for room in space.floor.rooms])
-    inside = parts.area_by_part(rooms)
-    return sorted(range(len(parts.areas)), key=lambda k: (inside.get(k, 0.0) < 1e-6, k))
+    in_room = np.array([space.rooms[k].room is not None for k in proposals.room])
+    return min(set(at[(at >= 0) & in_room].tolist()) or held)
 
 
 def _part_of_start(space: NavigableSpace, parts: Parts, held: set[int]) -> int:
@@ -153,4 +144,4 @@ def _no_candidate(space: NavigableSpace, reason: IntArray) -> str:
     return f"{space.floor.name}: no candidate is left ({told or 'none was made'}); lower --d-sec or --grid"
 
 
-__all__ = ["STRATEGIES", "Strategy", "candidates", "roomy_parts", "strategy"]
+__all__ = ["STRATEGIES", "Strategy", "candidates", "strategy"]

@@ -1,58 +1,169 @@
 """Triangulation candidates: middles of Delaunay triangles and Voronoi points of each room (paper, 3.2.2).
 
 Seeds are what the drawing gives: without rooms the floor's contour and the columns' centres, with rooms
-each room's contour, the corners of its elements and the centres of round ones.
+each room's contour, the corners of the elements in it and the centres of round ones.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
 from scipy.spatial import Delaunay, QhullError, Voronoi, cKDTree
 from shapely.geometry.base import BaseGeometry
 
-from mission.floor import Element
-from mission.geometry import FloatArray, IntArray, Polygon
+from mission.geometry import FloatArray, IntArray
 from mission.planning import KEPT, SLIVER, TOO_SMALL, NavigableSpace
-from mission.settings import Settings
 from planner.candidates.grid import main_axes
 from planner.candidates.place import Place
-from planner.shapes import GRID, one_shape, polygon_parts
+from planner.shapes import one_shape, polygon_parts, segments_of
 
 LEAST_ANGLE = float(np.arcsin(1 / 6))
-"""alpha_min: sin alpha_min = l_min / (6 l_min) (paper, Eq. 2), 9.594 degrees whatever l_min is."""
+"""alpha_min in radians: sin alpha_min = l_min / (6 l_min) (paper, Eq. 2), 9.594° whatever l_min is."""
+STEP = 1e-3
+"""Seeds are rounded to this (m) in the room's own axes: float noise must not turn Delaunay's diagonals."""
 SAME = 0.01
 """Seeds and candidates closer than this (m) are one."""
+AT_ROOM = 1e-3
+"""Elements this close to a room (m) are the room's own."""
 ROUNDS = 4
 """How often a room that is not dense enough is triangulated again."""
 
 
 def triangulation(space: NavigableSpace) -> tuple[FloatArray, IntArray, IntArray]:
-    """Candidates of every room, those of small and sliver triangles with that reason."""
+    """Candidates of every room: position, room, and the reason for those of bad triangles."""
     place = Place(space)
-    per_room = [room_candidates(place, room) for room in range(len(space.rooms))]
+    drawn = Drawn.of(place)
+    per_room = [room_candidates(place, drawn, room) for room in range(len(space.rooms))]
     xy = np.concatenate([np.empty((0, 2)), *(points for points, _ in per_room)]) + place.origin
     reason = np.concatenate([np.empty(0, np.int64), *(early for _, early in per_room)])
     room = np.repeat(np.arange(len(per_room)), [len(points) for points, _ in per_room])
-    return xy, room.astype(np.int64), reason.astype(np.int64)
+    return xy, room.astype(np.int64), reason
 
 
-def room_candidates(place: Place, room: int) -> tuple[FloatArray, IntArray]:
-    """Candidates (n, 2) of one room in the local frame, and the reason each is dropped for early.
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What seeds are made of, beside the rooms' contours; local frame."""
 
-    While fewer than dens_min candidates per m² are left, the candidates so far are seeds too.
+    edges: FloatArray
+    """Element edges as shapely lines (n,)."""
+    centres: FloatArray
+    """Centres of columns or round elements (n, 2)."""
+
+    @classmethod
+    def of(cls, place: Place) -> Drawn:
+        """Columns' centres where the floor has no rooms; else the elements' outlines."""
+        floor = place.space.floor
+        if not floor.rooms:
+            columns = [solid for item in floor.elements if item.kind == "columns" for solid in item.solids]
+            middles = [one_shape(column, place.origin).centroid for column in columns]
+            return cls(shapely.linestrings(np.empty((0, 2, 2))), shapely.get_coordinates(middles))
+        parts = polygon_parts(place.obstacles)
+        cornered = shapely.multipolygons([part for part in parts if not is_round(part)])
+        centres = shapely.get_coordinates([part.centroid for part in parts if is_round(part)])
+        return cls(shapely.linestrings(segments_of(cornered)), centres)
+
+
+def is_round(solid: shapely.Polygon) -> bool:
+    """Whether a solid's corners lie on a circle, as those of a discretised column do (Eq. 1)."""
+    corners = shapely.get_coordinates(solid)[:-1]
+    radius = np.hypot(*(corners - corners.mean(axis=0)).T)
+    return len(corners) >= 8 and float(np.ptp(radius)) < 0.01 * float(radius.max())
+
+
+def room_candidates(place: Place, drawn: Drawn, room: int) -> tuple[FloatArray, IntArray]:
+    """Candidates (n, 2) of one room in the local frame, with TOO_SMALL, SLIVER or KEPT for each.
+
+    While less than dens_min candidates per m² are left, they become seeds too, as long as that gains.
     """
     settings, shape = place.space.settings, place.rooms[room]
-    seeds = seeds_of(place, room)
-    points, early = triangulated(seeds, shape, l_min=settings.l_min)
-    left = _left(place, room, points, early)
+    seeds = seeds_of(shape, drawn, d_max=settings.d_max)
+    best = triangulated(seeds, shape, l_min=settings.l_min)
+    left = _left(place, room, *best)
     for _ in range(ROUNDS):
-        if not len(left) or len(left) >= settings.dens_min * shape.area:
+        if left >= settings.dens_min * shape.area:
             break
+        points, early = best
         seeds = np.concatenate([seeds, points[early == KEPT]])
         finer = triangulated(seeds, shape, l_min=settings.l_min)
-        now = _left(place, room, *finer)
-        if len(now) <= len(left):
+        if _left(place, room, *finer) <= left:
             break
-        (points, early), left = finer, now
-    return points, early
+        best, left = finer, _left(place, room, *finer)
+    return best
+
+
+def _left(place: Place, room: int, points: FloatArray, early: IntArray) -> int:
+    """How many of the candidates a stop may be at."""
+    kept = points[early == KEPT]
+    reason = place.reasons(kept + place.origin, np.full(len(kept), room))
+    return int(np.count_nonzero(reason == KEPT))
+
+
+def seeds_of(shape: BaseGeometry, drawn: Drawn, *, d_max: float) -> FloatArray:
+    """Seeds (n, 2) of a room: segments longer than `d_max` metres are split evenly."""
+    around = shapely.buffer(shape, AT_ROOM, join_style="mitre")
+    near = drawn.edges[shapely.intersects(drawn.edges, around)]
+    lines = [*shapely.linestrings(segments_of(shape)), *shapely.intersection(near, around)]
+    centres = drawn.centres[shapely.intersects(shapely.points(drawn.centres), shape)]
+    return np.concatenate([shapely.get_coordinates(shapely.segmentize(lines, d_max)), centres])
+
+
+def triangulated(seeds: FloatArray, shape: BaseGeometry, *, l_min: float) -> tuple[FloatArray, IntArray]:
+    """Middles of all triangles, then the Voronoi points inside, and what is wrong with each triangle.
+
+    Points are taken in the room's own axes, rounded and sorted, so that the result depends on neither
+    the drawing's angle nor the order of its entities.
+    """
+    axes = main_axes(shape)
+    corner = (shapely.get_coordinates(shape) @ axes.T).min(axis=0)
+    outer = distinct(seeds @ axes.T - corner)
+    inner = distinct(voronoi_points(outer))
+    inner = inner[shapely.intersects(shape, shapely.points((inner + corner) @ axes))]
+    both = distinct(np.concatenate([outer, inner]))
+    triangles = both[delaunay(both)]
+    points = np.concatenate([triangles.mean(axis=1), inner])
+    reason = np.concatenate([triangle_reasons(triangles, l_min=l_min), np.full(len(inner), KEPT)])
+    return (points + corner) @ axes, reason
+
+
+def distinct(points: FloatArray) -> FloatArray:
+    """The points (n, 2), rounded to STEP, in a canonical order; of those closer than SAME the first."""
+    points = np.unique(np.rint(points / STEP), axis=0) * STEP
+    keep = np.ones(len(points), dtype=bool)
+    if len(points) > 1:
+        for first, second in sorted(cKDTree(points).query_pairs(SAME)):
+            keep[second] &= not keep[first]
+    return points[keep]
+
+
+def voronoi_points(points: FloatArray) -> FloatArray:
+    """Corners of the Voronoi cells of `points` (n, 2); none where all lie on a line."""
+    found = _by_qhull(Voronoi, points)
+    return np.empty((0, 2)) if found is None else found.vertices
+
+
+def delaunay(points: FloatArray) -> IntArray:
+    """Corners (t, 3) of the Delaunay triangles of `points` (n, 2); none where all lie on a line."""
+    found = _by_qhull(Delaunay, points)
+    return np.empty((0, 3), dtype=np.int64) if found is None else found.simplices.astype(np.int64)
+
+
+def _by_qhull(diagram: Callable[[FloatArray], Any], points: FloatArray) -> Any:
+    """The diagram of points that span an area, else None: Qhull refuses points on a line."""
+    if len(points) < 3:
+        return None
+    try:
+        return diagram(points)
+    except QhullError:
+        return None
+
+
+def triangle_reasons(triangles: FloatArray, *, l_min: float) -> IntArray:
+    """TOO_SMALL where a side is below `l_min` metres, SLIVER where an angle is below alpha_min (Eq. 2)."""
+    sides = np.hypot(*np.moveaxis(triangles - np.roll(triangles, -1, axis=1), -1, 0))
+    a, b, c = np.sort(sides, axis=1).T
+    least = np.arccos(np.clip((b**2 + c**2 - a**2) / (2 * b * c), -1.0, 1.0))
+    return np.select([a < l_min, least < LEAST_ANGLE], [TOO_SMALL, SLIVER], KEPT).astype(np.int64)
