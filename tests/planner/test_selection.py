@@ -1,0 +1,115 @@
+"""Selections and their bounds against every subset of small covers."""
+
+from __future__ import annotations
+
+from itertools import combinations, pairwise
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+from mission.planning import Selection
+from mission.settings import Settings
+from planner.selection import METHODS
+from planner.selection.bound import counting_bound, relaxation_bound
+from planner.selection.cover import Cover, cover_of, needed_units
+from planner.selection.greedy import greedy
+from tests.planner.worlds import box, column, element, hall, planned, two_rooms
+
+
+def small_cover(seed: int) -> Cover:
+    """Up to 10 candidates and 25 groups of units, each seen by someone."""
+    random = np.random.default_rng(seed)
+    rows, columns = int(random.integers(1, 11)), int(random.integers(1, 26))
+    sees = random.random((rows, columns)) < random.uniform(0.1, 0.6)
+    sees[random.integers(0, rows, size=columns), np.arange(columns)] = True
+    weight = random.integers(1, 30, size=columns)
+    needed = needed_units(int(weight.sum()), required=float(random.choice([0.5, 0.9, 1.0])))
+    return Cover(csr_array(sees.astype(np.int64)), weight.astype(np.int64), needed)
+
+
+def fewest(cover: Cover) -> int:
+    """Rows of the smallest selection that covers enough, by trying all."""
+    sees = cover.sees.toarray() > 0
+    for size in range(cover.rows + 1):
+        for rows in combinations(range(cover.rows), size):
+            if cover.weight[sees[list(rows)].any(axis=0)].sum() >= cover.needed:
+                return size
+    raise AssertionError("not even all rows cover what is needed")
+
+
+def check_rows(cover: Cover, rows: np.ndarray) -> None:
+    assert len(set(rows.tolist())) == len(rows)
+    seen = (cover.sees.toarray()[rows] > 0).any(axis=0)
+    assert cover.weight[seen].sum() >= cover.needed
+
+
+@pytest.mark.parametrize("name", sorted(METHODS))
+def test_every_selector_lies_between_its_bound_and_greedy(name: str) -> None:
+    for seed in range(150):
+        cover = small_cover(seed)
+        optimum, simple = fewest(cover), relaxation_bound(cover)
+        rows, bound = METHODS[name](cover, simple, Settings())
+        check_rows(cover, rows)
+        assert counting_bound(cover) <= simple <= bound <= optimum <= len(rows) <= len(greedy(cover)), seed
+        if name == "exact":
+            assert bound == optimum == len(rows), seed
+        if name == "default":
+            assert len(rows) <= optimum + 1, seed
+
+
+def test_the_default_selector_finds_nearly_every_optimum() -> None:
+    missed = sum(
+        len(METHODS["default"](cover, relaxation_bound(cover), Settings())[0]) > fewest(cover)
+        for cover in map(small_cover, range(1000, 1150))
+    )
+    assert missed <= 1
+
+
+def test_greedy_takes_what_adds_most_and_ties_go_to_the_lower_row() -> None:
+    sees = np.array([[1, 1, 0, 0], [0, 1, 1, 1], [1, 0, 1, 1], [1, 0, 0, 0]])
+    cover = Cover(csr_array(sees), np.array([1, 1, 1, 1]), 4)
+    assert greedy(cover).tolist() == [1, 0]
+
+
+@pytest.mark.parametrize(
+    ("total", "required", "needed"),
+    [(10, 0.9, 9), (10, 0.91, 10), (7334, 0.9, 6601), (1000, 0.3, 300), (1, 0.01, 1)],
+)
+def test_needed_units_are_the_fewest_that_make_the_share(total: int, required: float, needed: int) -> None:
+    assert needed_units(total, required=required) == needed
+
+
+def test_units_that_look_alike_are_merged_without_loss() -> None:
+    floor = two_rooms(1.0, more=(column("c", 2.0, 1.0), element("b", "beams", box(1, 3, 7, 3.2))))
+    _, nouns = planned(floor, Settings(range=4))
+    visibility = nouns[Selection].visibility
+    cover = cover_of(visibility, required=0.9)
+    seen = np.zeros((visibility.rows, visibility.targets.total), dtype=bool)
+    for row in range(visibility.rows):
+        seen[row, visibility.seen_by(row)] = True
+    assert cover.total == seen.any(axis=0).sum()
+    patterns = {column.tobytes() for column in seen.T if column.any()}
+    assert len(cover.weight) == len(patterns)
+    random = np.random.default_rng(0)
+    for _ in range(50):
+        rows = random.permutation(visibility.rows)[: random.integers(1, 6)]
+        assert cover.units(cover.covered_by(rows)) == seen[rows].any(axis=0).sum()
+
+
+@pytest.mark.parametrize("name", sorted(METHODS))
+def test_coverage_rises_with_every_stop_and_reaches_what_is_required(name: str) -> None:
+    floor = two_rooms(1.0, more=(column("c", 2.0, 1.0), column("k", 6.0, 3.0)))
+    for required in (0.5, 0.9, 1.0):
+        _, nouns = planned(floor, Settings(selector=name, coverage=required, range=3))
+        steps = nouns[Selection].coverage_steps
+        assert all(one <= other for one, other in pairwise(steps))
+        assert steps[-1] >= required
+        assert len(steps) < 2 or steps[-2] < required
+
+
+def test_one_stop_in_the_middle_of_a_small_hall_is_enough() -> None:
+    mission, nouns = planned(hall(4, 4), Settings(coverage=1.0))
+    assert len(mission.stops) == 1
+    assert nouns[Selection].bound == 1
+    assert mission.return_ is None
