@@ -21,6 +21,8 @@ AROUND = 0.4
 """Millimetres kept free round a label."""
 OUTSIDE = 6.0
 """Cost of each of nine points of a label that lies outside its room."""
+LABEL = 2.0
+"""Cost of each of 28 points of another label."""
 _TRIES = 28
 """Places tried along each side of a room's bounding box."""
 
@@ -39,31 +41,57 @@ class Busy:
         weights = [np.full(len(points), weight) for weight, points in kept]
         return cls(np.concatenate([points for _, points in kept]), np.concatenate(weights))
 
+    def and_also(self, weight: float, points: FloatArray) -> Busy:
+        weights = np.full(len(points), weight)
+        return Busy(np.concatenate([self.xy, points]), np.concatenate([self.weight, weights]))
+
     def near(self, low: FloatArray, high: FloatArray) -> Busy:
         there = ((self.xy > low) & (self.xy < high)).all(axis=1)
         return Busy(self.xy[there], self.weight[there])
 
 
+@dataclass(frozen=True, eq=False)
+class Label:
+    """Lines of (text, size) about a centre on paper, and what they cover there."""
+
+    lines: list[tuple[str, float]]
+    centre: FloatArray
+    half: FloatArray
+    """Half its width and height."""
+    cost: float
+
+    @property
+    def points(self) -> FloatArray:
+        """Points all over it, for other labels to keep off."""
+        grid = np.stack(np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 4)), axis=-1).reshape(-1, 2)
+        return self.centre + grid * self.half
+
+
 def room_labels(rooms: tuple[Room, ...], sheet: Sheet, *, avoid: Busy) -> str:
-    """Name and area of each room, off the points of `avoid` where the room is large enough."""
-    labels = (_label(room, sheet, avoid) for room in rooms if room.polygons)
+    """Name and area of each room, off `avoid` and each other where the room is large enough."""
+    labels: list[Label] = []
+    # The smallest rooms first: they have the least choice.
+    for room in sorted((room for room in rooms if room.polygons), key=lambda room: room.area):
+        labels.append(_label(room, sheet, avoid))
+        avoid = avoid.and_also(LABEL, labels[-1].points)
     style: dict[str, object] = {"paint_order": "stroke", "stroke": "#ffffff", "stroke_width": 0.5}
-    return group("names", labels, text_anchor="middle", fill="#222222", stroke_linejoin="round", **style)
+    drawn = ("".join(_lines(label)) for label in labels)
+    return group("names", drawn, text_anchor="middle", fill="#222222", stroke_linejoin="round", **style)
 
 
-def _label(room: Room, sheet: Sheet, avoid: Busy) -> str:
+def _label(room: Room, sheet: Sheet, avoid: Busy) -> Label:
     """On one line or two, whichever covers less."""
     rings = [sheet.on_paper(ring) for part in room.polygons for ring in part.rings]
     widest = max(float(np.ptp(np.concatenate(rings)[:, 0])) - 1.0, LEAST)
-    placed: list[tuple[float, int, list[tuple[str, float]], FloatArray]] = []
-    for names in (wrapped(room.label, width=widest), wrapped(room.label, width=0.0, cut=widest)):
+    layouts = (wrapped(room.label, width=widest), wrapped(room.label, width=0.0, cut=widest))
+    labels = []
+    for names in layouts:
         lines = [(name, NAME) for name in names] + [(f"{room.area:.1f} m²", AREA)]
         size = (max(text_width(*item) for item in lines), sum(size + 0.4 for _, size in lines))
         half = np.array(size) / 2
         cost, centre = _best_place(rings, half, avoid)
-        placed.append((cost, len(placed), lines, centre - (0.0, half[1])))
-    _, _, lines, top = min(placed, key=lambda item: item[:2])
-    return "".join(_lines(lines, x=float(top[0]), top=float(top[1])))
+        labels.append(Label(lines, centre, half, cost))
+    return min(labels, key=lambda label: label.cost)
 
 
 def wrapped(name: str, *, width: float, cut: float | None = None) -> list[str]:
@@ -76,8 +104,9 @@ def wrapped(name: str, *, width: float, cut: float | None = None) -> list[str]:
     return [shortened(half, size=NAME, width=cut or width) for half in halves if half]
 
 
-def _lines(lines: list[tuple[str, float]], *, x: float, top: float) -> Iterator[str]:
-    for content, size in lines:
+def _lines(label: Label) -> Iterator[str]:
+    x, top = (label.centre - (0.0, label.half[1])).tolist()
+    for content, size in label.lines:
         top += size + 0.4
         yield text(x, top - 0.2 * size, content, size=size)
 
