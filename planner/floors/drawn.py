@@ -92,7 +92,7 @@ def drawn(strokes: Iterable[Stroke], *, gap: float = SNAP) -> Drawn:
 
 
 def _shape(stroke: Stroke, *, gap: float) -> Closed | Open:
-    points = without_repeats(stroke.points, closed=False)
+    points = without_repeats(stroke.points)
     odd = _repeats(stroke, points)
     ring = closed_ring(points, closed=stroke.closed, gap=gap)
     if ring is None:

@@ -17,6 +17,8 @@ _NEAR = 1.0
 """An unknown shape farther than this from the floor, in metres, is not part of the plan."""
 _OUTLINES = ("walls", "windows", "railings", "other")
 """Kinds that people also draw as a ring around something that is not solid."""
+_STANDING = 0.35
+"""Half of the width in metres that no wall has and that a person or a robot stands in."""
 _ROOM = 1.0
 """Least area in m² of a room that no solid fills."""
 
@@ -114,7 +116,7 @@ def _on_the_floor(closed: Sequence[Closed], spaces: _Spaces) -> tuple[list[Close
 def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Part]:
     """Solids without their holes; a ring around rooms becomes a line, and what lies in it its own solid."""
     above = parents([shape.region for shape in closed])
-    holes = hole_indices(closed, above, _is_hole)
+    holes = hole_indices(closed, above, _is_hollow if kind == "walls" else _is_hole)
     parts: list[_Part] = []
     for index in (item for item in range(len(closed)) if item not in holes):
         inner = [closed[item] for item in sorted(holes) if above[item] == index]
@@ -130,6 +132,11 @@ def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Part]
 def _is_hole(inner: Closed, outer: Closed) -> bool:
     same = inner.global_id is not None and inner.global_id == outer.global_id
     return same or inner.clockwise != outer.clockwise
+
+
+def _is_hollow(inner: Closed, outer: Closed) -> bool:
+    """A ring in a wall that leaves room to stand in is the wall's other face, however it is drawn."""
+    return _is_hole(inner, outer) or not inner.region.buffer(-_STANDING).is_empty
 
 
 def _body_or_outline(kind: str, shape: Closed, spaces: _Spaces) -> _Part:

@@ -41,15 +41,10 @@ def closed_ring(points: FloatArray, *, closed: bool, gap: float = SNAP) -> Float
     return points[:-1] if ends <= SNAP else points
 
 
-def without_repeats(points: FloatArray, *, closed: bool, within: float = 1e-6) -> FloatArray:
+def without_repeats(points: FloatArray, *, within: float = 1e-6) -> FloatArray:
     """The polyline without points that repeat the one before."""
-    if len(points) < 2:
-        return points
-    before = np.roll(points, 1, axis=0)
-    moved = np.hypot(*(points - before).T) > within
-    if not closed:
-        moved[0] = True
-    return points[moved] if moved.any() else points[:1]
+    moved = np.hypot(*np.diff(points, axis=0).T) > within
+    return points[np.concatenate(([True], moved))]
 
 
 def repaired(ring: FloatArray) -> tuple[list[shapely.Polygon], bool]:
@@ -59,7 +54,8 @@ def repaired(ring: FloatArray) -> tuple[list[shapely.Polygon], bool]:
     drawn = shapely.Polygon(ring)
     if drawn.is_valid:
         return ([drawn], False) if drawn.area > SLIVER else ([], True)
-    return polygons_of(shapely.make_valid(drawn)), True
+    # "structure" fills what a ring goes round twice; by "linework" a part of an obstacle would be free.
+    return polygons_of(shapely.make_valid(drawn, method="structure", keep_collapsed=False)), True
 
 
 def polygons_of(region: Region) -> list[shapely.Polygon]:

@@ -112,6 +112,17 @@ def test_a_ring_that_crosses_itself_is_repaired(read: Read) -> None:
     assert plan.findings[0].at == (1.0, 1.0)
 
 
+def test_what_a_ring_goes_round_twice_is_filled(read: Read) -> None:
+    """By the parity of crossings 6 m² of these 19 would be free to drive on."""
+
+    def draw(model: Modelspace) -> None:
+        corners = [(1, 1), (5, 1), (5, 4), (2, 4), (2, 2), (6, 2), (6, 5), (1, 5)]
+        model.add_lwpolyline(corners, close=True, dxfattribs={"layer": "COLUMNS"})
+
+    (column,) = read(draw).elements
+    assert sum(solid.area for solid in column.solids) == pytest.approx(19)
+
+
 def test_a_ring_without_area_is_a_line(read: Read) -> None:
     def draw(model: Modelspace) -> None:
         model.add_lwpolyline([(1, 1), (3, 1)], close=True, dxfattribs={"layer": "WALLS"})
@@ -300,6 +311,26 @@ def test_a_ring_against_the_one_around_it_is_a_hole_in_a_wall(read: Read) -> Non
 
     (wall,) = read(draw).elements
     assert wall.solids[0].area == pytest.approx(16 - 4)
+
+
+def test_two_faces_of_a_wall_around_a_core_leave_it_hollow(read: Read) -> None:
+    """Both drawn in one direction, as people draw them."""
+
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "WALLS", 1, 1, 4, 4)
+        rectangle(model, "WALLS", 1.2, 1.2, 3.8, 3.8)
+
+    (wall,) = read(draw).elements
+    assert wall.solids[0].area == pytest.approx(9 - 2.6**2)
+
+
+def test_a_thin_wall_within_another_is_solid(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "WALLS", 1, 1, 7, 1.4)
+        rectangle(model, "WALLS", 2, 1.1, 6, 1.3)
+
+    walls = read(draw).elements
+    assert [wall.solids[0].area for wall in walls] == pytest.approx([2.4, 0.8])
 
 
 def test_a_ring_around_rooms_is_a_line_and_not_solid(read: Read) -> None:
