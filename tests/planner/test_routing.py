@@ -102,9 +102,6 @@ def test_a_way_round_one_corner_is_two_tangents_and_an_arc() -> None:
 
 
 def test_ways_are_symmetric_and_keep_the_triangle_inequality() -> None:
-    floor = two_rooms(
-        0.8, more=(column("c", 2, 1), column("k", 6, 3), element("s", "stairs", box(5, 0, 6, 1)))
-    )
     points = np.array([(0.6, 0.6), (3.3, 3.4), (4.6, 2.0), (7.4, 0.5), (7.4, 3.5), (4.6, 0.5)])
     lengths = ways_between(navigable(floor_with_things(), Settings()), points).lengths
     assert np.isfinite(lengths).all()
