@@ -15,6 +15,8 @@ BACKGROUND = (18, 20, 26, 255)
 
 Bounds = tuple[float, float, float, float]
 """Least x, least y, greatest x, greatest y in local metres, y up."""
+STEPS_PER_SECOND = 4.0
+"""How fast the candidates and the selection are played."""
 MARGIN = 0.04
 """Empty space around the drawing, as a share of its size."""
 
@@ -23,7 +25,7 @@ def blueprint(bounds: Bounds | None = None, *, of_run: bool = False) -> rrb.Blue
     """Tabs for the mission, its planning stages, the run, and the log; 2D views show `bounds`."""
     return rrb.Blueprint(
         rrb.Tabs(_mission(bounds, of_run), _stages(bounds), _run(), _log(), active_tab=0),
-        rrb.TimePanel(timeline=at.MISSION_TIME, play_state="paused", state="collapsed"),
+        rrb.TimePanel(timeline=at.MISSION_TIME, play_state="paused", state="collapsed", fps=STEPS_PER_SECOND),
         auto_views=False,
         auto_layout=False,
         collapse_panels=True,
@@ -65,7 +67,7 @@ def _stages(bounds: Bounds | None) -> rrb.Grid:
 def _run() -> rrb.Vertical:
     return rrb.Vertical(
         rrb.StateTimelineView(origin=at.FIELD, contents=under(at.FIELD), name="States", time_view=_whole()),
-        _plot("Distance from the route, m (left positive)", at.METRIC_CROSS_TRACK),
+        _plot("Distance from the route, mm (left positive)", at.METRIC_CROSS_TRACK),
         _plot("Deviation at each stop, mm", at.METRIC_DEVIATION),
         _plot("Battery, %", at.METRIC_BATTERY, (0.0, 100.0)),
         name="Run",

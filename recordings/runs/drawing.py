@@ -141,7 +141,7 @@ class RunDrawing:
         ways: list[FloatArray] = [np.array(stop.approach) for stop in legs if len(stop.approach) > 1]
         if ways:
             distance = cross_track(ways, x=pose.x, y=pose.y)
-            self._at(self._metric(entities.METRIC_CROSS_TRACK), rr.Scalars(distance), robot_ns)
+            self._at(self._metric(entities.METRIC_CROSS_TRACK), rr.Scalars(distance * 1000), robot_ns)
 
     def _mark(self, event: AnyEvent) -> None:
         meaning = MARKS.get(type(event))
@@ -156,7 +156,7 @@ class RunDrawing:
             radii=on_screen(3),
             labels=[label] if label else None,
             show_labels=False,
-            draw_order=ORDER["robot"],
+            draw_order=ORDER["robot"] + (isinstance(event, Scanned) * 0.5),
         )
         self._at(self._flat(meaning.label), mark, event.robot_ns)
 
@@ -212,7 +212,7 @@ def _same(a: PoseReport, b: PoseReport) -> bool:
 
 def _about(event: AnyEvent) -> str:
     """The event's particulars in a few words."""
-    words = [getattr(event, "stop", ""), getattr(event, "reason", "")]
+    words = [getattr(event, name, "") for name in ("stop", "reason", "commander")]
     if isinstance(event, Arrived):
         words.append(f"{event.deviation_m * 1000:.0f} mm beside")
     if isinstance(event, Scanned):

@@ -112,7 +112,8 @@ def _plot_coverage(canvas: Canvas, selection: Selection, index: rr.TimeColumn) -
     canvas.show(chosen, rr.SeriesLines(colors=palette.STOP, names="coverage of the chosen stops", widths=2))
     canvas.show(required, rr.SeriesLines(colors=palette.ROOM_NAME, names="required", widths=1))
     for step, share in enumerate(selection.coverage_steps, start=1):
-        canvas.say(f"stop {step} of {steps} chosen: coverage {share:.1%}", step=step)
+        line = rr.TextLog(f"stop {step} of {steps} chosen: coverage {share:.1%}", level="INFO")
+        canvas.at(entities.LOG_PLAN, line, step=step)
     canvas.say(
         f"selection ({selection.method}): {steps} stops, coverage {selection.coverage:.1%},"
         f" at least {selection.bound} are needed",

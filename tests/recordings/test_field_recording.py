@@ -74,7 +74,7 @@ def test_deviation_and_distance_from_the_route_are_plotted(field: Path) -> None:
     beside = on(field, f"{entities.METRIC_CROSS_TRACK}/{run.RUN}", "Scalars:scalars", entities.MISSION_TIME)
     # 3 cm to the left of a leg driven along +x; on the stop itself it is as far, to either side.
     driving = [value[0] for time, value in beside.items() if 62 * NS < time < 67 * NS]
-    assert driving == pytest.approx([run.OFFSET] * len(driving), abs=1e-6)
+    assert driving == pytest.approx([1000 * run.OFFSET] * len(driving), abs=1e-3)
     assert driving
 
 

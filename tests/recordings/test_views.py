@@ -32,7 +32,7 @@ VIEWS = {
         "Mission": {"Plan and run": palette.DRIVEN, "3D": palette.DRIVEN, "Run report": None},
         "Run": {
             "States": None,
-            "Distance from the route, m (left positive)": palette.DRIVEN,
+            "Distance from the route, mm (left positive)": palette.DRIVEN,
             "Deviation at each stop, mm": palette.FAILED.colour,
             "Battery, %": palette.DRIVEN,
         },
