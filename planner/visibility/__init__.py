@@ -9,10 +9,11 @@ from collections.abc import Callable
 
 from mission.errors import AnswerIsNo, InputError
 from mission.planning import Candidates, Visibility
+from planner.visibility.bresenham import bresenham
 from planner.visibility.exact import exact
 
 Method = Callable[[Candidates], Visibility]
-METHODS: dict[str, Method] = {"exact": exact}
+METHODS: dict[str, Method] = {"exact": exact, "bresenham": bresenham}
 
 
 def visibility(candidates: Candidates) -> Visibility:
