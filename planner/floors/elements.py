@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import shapely
@@ -11,7 +12,7 @@ import shapely
 from mission.floor import KINDS, Element, Finding, Room
 from mission.geometry import FloatArray, Polygon, frozen
 from planner.floors.drawn import Closed, Drawn, Oddity, Open, faces_of, hole_indices, place
-from planner.floors.rings import SNAP, Region, canonical_region, parents, to_shapely
+from planner.floors.rings import SNAP, Region, canonical_region, parents, polygons_of, to_shapely
 
 _NEAR = 1.0
 """An unknown shape farther than this from the floor, in metres, is not part of the plan."""
@@ -116,12 +117,12 @@ def _on_the_floor(closed: Sequence[Closed], spaces: _Spaces) -> tuple[list[Close
 def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Part]:
     """Solids without their holes; a ring around rooms becomes a line, and what lies in it its own solid."""
     above = parents([shape.region for shape in closed])
-    holes = hole_indices(closed, above, _is_hollow if kind == "walls" else _is_hole)
+    holes = hole_indices(closed, above, partial(_is_hole, kind))
     parts: list[_Part] = []
     for index in (item for item in range(len(closed)) if item not in holes):
         inner = [closed[item] for item in sorted(holes) if above[item] == index]
         body = closed[index].region.difference(shapely.union_all([hole.region for hole in inner]))
-        if kind in _OUTLINES and spaces.filled_by(body):
+        if not polygons_of(body) or (kind in _OUTLINES and spaces.filled_by(body)):
             parts += [_body_or_outline(kind, shape, spaces) for shape in (closed[index], *inner)]
         else:
             odd = tuple(item for shape in (closed[index], *inner) for item in shape.odd)
@@ -129,14 +130,19 @@ def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Part]
     return parts
 
 
-def _is_hole(inner: Closed, outer: Closed) -> bool:
-    same = inner.global_id is not None and inner.global_id == outer.global_id
-    return same or inner.clockwise != outer.clockwise
+def _is_hole(kind: str, inner: Closed, outer: Closed) -> bool:
+    """Whether a ring in another is its inside: said by the GlobalId, else by direction and by size.
 
-
-def _is_hollow(inner: Closed, outer: Closed) -> bool:
-    """A ring in a wall that leaves room to stand in is the wall's other face, however it is drawn."""
-    return _is_hole(inner, outer) or not inner.region.buffer(-_STANDING).is_empty
+    A tread drawn against its flight must not free the stairs; the two faces of a wall around a core are
+    often drawn in one direction.
+    """
+    if inner.global_id is not None and inner.global_id == outer.global_id:
+        return True
+    against = inner.clockwise != outer.clockwise
+    roomy = not inner.region.buffer(-_STANDING).is_empty
+    if kind == "walls":
+        return against or roomy
+    return kind != "stairs" and against and roomy
 
 
 def _body_or_outline(kind: str, shape: Closed, spaces: _Spaces) -> _Part:

@@ -2,35 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-import ezdxf
 import pytest
-from ezdxf.document import Drawing
-from ezdxf.layouts import Modelspace
+from floor_drawings import Draw, Read, new_drawing, rectangle
 
 from mission.floor import FloorPlan
 from planner.floors import read_floor
-
-Draw = Callable[[Modelspace], object]
-Read = Callable[..., FloorPlan]
-
-
-def rectangle(
-    model: Modelspace, layer: str, x0: float, y0: float, x1: float, y1: float, *, clockwise: bool = False
-) -> object:
-    """A closed polyline on `layer`."""
-    corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
-    corners = corners[::-1] if clockwise else corners
-    return model.add_lwpolyline(corners, close=True, dxfattribs={"layer": layer})
-
-
-def new_drawing(units: int = 6, *, version: str = "R2010") -> Drawing:
-    drawing = ezdxf.new(version, units=units)
-    drawing.header["$INSUNITS"] = units
-    drawing.appids.add("IFC")
-    return drawing
 
 
 @pytest.fixture
@@ -49,7 +27,3 @@ def read(tmp_path: Path) -> Read:
         return read_floor(path, d_dis=d_dis)
 
     return read_drawn
-
-
-def codes(plan: FloorPlan) -> list[str]:
-    return [finding.code for finding in plan.findings]

@@ -7,7 +7,7 @@ import io
 from pathlib import Path
 
 import pytest
-from conftest import codes, new_drawing, rectangle
+from floor_drawings import codes, new_drawing, rectangle
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

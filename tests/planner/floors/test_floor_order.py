@@ -6,8 +6,8 @@ import random
 from collections.abc import Callable
 
 import pytest
-from conftest import Read, codes, rectangle
 from ezdxf.layouts import Modelspace
+from floor_drawings import Read, codes, rectangle
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

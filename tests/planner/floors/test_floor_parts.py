@@ -6,9 +6,10 @@ import math
 from itertools import pairwise
 
 import pytest
-from conftest import Read, codes, rectangle
+import shapely
 from ezdxf.layouts import Modelspace
 from ezdxf.xclip import XClip
+from floor_drawings import Read, codes, rectangle
 
 from mission.floor import KINDS, FloorPlan
 
@@ -359,6 +360,31 @@ def test_a_column_of_single_lines_is_solid(read: Read) -> None:
     column, line = read(draw).elements
     assert column.solids[0].area == pytest.approx(0.16)
     assert line.lines[0].tolist() == [[3, 1], [3, 2]]
+
+
+def test_treads_drawn_against_their_flight_do_not_free_it(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "STAIRS", 1, 1, 2.5, 4)
+        for y in (1, 2, 3):
+            rectangle(model, "STAIRS", 1, y, 2.5, y + 1, clockwise=True)
+
+    flight = shapely.union_all(
+        [
+            shapely.Polygon(solid.exterior, solid.holes)
+            for item in read(draw).elements
+            for solid in item.solids
+        ]
+    )
+    assert flight.area == pytest.approx(4.5)
+
+
+def test_a_railing_around_a_place_leaves_it_free(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "RAILINGS", 1, 1, 4, 4)
+        rectangle(model, "RAILINGS", 1.05, 1.05, 3.95, 3.95, clockwise=True)
+
+    (railing,) = read(draw).elements
+    assert railing.solids[0].area == pytest.approx(9 - 2.9**2)
 
 
 def test_treads_stay_lines(read: Read) -> None:

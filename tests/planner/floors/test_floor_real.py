@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import codes
+from floor_drawings import codes
 
 from mission.errors import InputError
 from planner.floors import read_floor

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from conftest import Read, codes, rectangle
 from ezdxf.layouts import Modelspace
 from ezdxf.render.forms import cube
+from floor_drawings import Read, codes, rectangle
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

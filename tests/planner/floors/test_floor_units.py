@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from conftest import Read, codes, rectangle
 from ezdxf.layouts import Modelspace
+from floor_drawings import Read, codes, rectangle
 
 UNITS = {1: 1 / 0.0254, 2: 1 / 0.3048, 4: 1000.0, 5: 100.0, 6: 1.0, 14: 10.0}
 
