@@ -6,6 +6,8 @@ origin. `SPACE` carries the flip that turns Rerun's y-down 2D views into y-up dr
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 APPLICATION = "stopgo"
 
 STEP = "stage_step"
@@ -20,21 +22,38 @@ ROBOT_TIME = "robot_time"
 ROOT = "/"
 PLAN = "/plan"
 FLOOR = "/plan/floor"
+OUTLINE = "/plan/floor/outline"
+HOLES = "/plan/floor/holes"
+OPENINGS = "/plan/floor/openings"
+ROOMS = "/plan/floor/rooms"
+ROOM_NAMES = "/plan/floor/room_names"
 NAVIGABLE = "/plan/navigable"
+DRIVE_AREA = "/plan/navigable/drive"
+STOP_AREA = "/plan/navigable/stop"
+STOP_AREA_EDGE = "/plan/navigable/stop_edge"
+GAPS = "/plan/navigable/gaps"
 CANDIDATES = "/plan/candidates"
 TARGETS = "/plan/targets"
 VISIBILITY = "/plan/visibility"
+RAYS = "/plan/visibility/rays"
+SEEN = "/plan/visibility/seen"
+EYE = "/plan/visibility/candidate"
 SELECTION = "/plan/selection"
+SELECTION_TARGETS = "/plan/selection/targets"
+SELECTION_STOPS = "/plan/selection/stops"
 COVERAGE = "/plan/coverage"
 ROUTE = "/plan/route"
 STOPS = "/plan/stops"
+HEADINGS = "/plan/stops/heading"
 PLANNED_ROBOT = "/plan/robot"
 
 WORLD = "/world"
 WORLD_FLOOR = "/world/floor"
+SLAB = "/world/floor/slab"
 WORLD_COVERAGE = "/world/coverage"
 WORLD_ROUTE = "/world/route"
 WORLD_STOPS = "/world/stops"
+POLES = "/world/stops/poles"
 WORLD_PLANNED_ROBOT = "/world/robot"
 WORLD_FIELD = "/world/field"
 
@@ -42,6 +61,10 @@ FIELD = "/field"
 
 METRICS = "/metrics"
 METRIC_COVERAGE = "/metrics/coverage"
+COVERAGE_CHOSEN = "/metrics/coverage/chosen"
+COVERAGE_REQUIRED = "/metrics/coverage/required"
+COVERAGE_PLANNED = "/metrics/coverage/planned"
+SIGHT = "/metrics/coverage/candidate"
 METRIC_CROSS_TRACK = "/metrics/cross_track"
 METRIC_DEVIATION = "/metrics/deviation"
 METRIC_BATTERY = "/metrics/battery"
@@ -57,25 +80,67 @@ PROPERTY_PARAMETERS = "parameters"
 PROPERTY_RUN = "run"
 
 
-def of_run(parent: str, run_id: str, *names: str) -> str:
-    """The entity of one run below `parent`."""
-    return "/".join((parent, run_id, *names))
-
-
 def under(entity: str) -> str:
     """The expression that takes an entity and everything below it into a view."""
     return f"{entity}/**"
 
 
-def events_of_run(run_id: str) -> str:
-    """Where the events of a run are kept as values."""
-    return of_run(FIELD, run_id, _EVENTS)
+def part(entity: str, name: str) -> str:
+    """One of several alike below an entity, such as the elements of a kind."""
+    return f"{entity}/{name}"
+
+
+def shape(robot: str) -> str:
+    """What is drawn of a robot; the robot's own entity is its pose."""
+    return f"{robot}/shape"
+
+
+@dataclass(frozen=True)
+class Run:
+    """The entities of one run."""
+
+    run_id: str
+
+    def flat(self, name: str) -> str:
+        """In 2D; also states and texts, which are in no space."""
+        return f"{FIELD}/{self.run_id}/{name}"
+
+    def solid(self, name: str) -> str:
+        """In 3D."""
+        return f"{WORLD_FIELD}/{self.run_id}/{name}"
+
+    def metric(self, metric: str) -> str:
+        """Of the METRIC_s that are of runs."""
+        return f"{metric}/{self.run_id}"
+
+    @property
+    def tolerance(self) -> str:
+        return f"{self.metric(METRIC_DEVIATION)}/tolerance"
+
+    @property
+    def log(self) -> str:
+        return f"{LOG_FIELD}/{self.run_id}"
+
+    @property
+    def events(self) -> str:
+        """Events as values."""
+        return self.flat("events")
+
+
+ROBOT = "robot"
+DRIVEN = "driven"
+STATE = "state"
+STOP_STATE = "stop_state"
+STOP = "stop"
+RUN_REPORT = "report"
+ARRIVED = "arrived"
+SCANNED = "scanned"
+SKIPPED = "skipped"
+FAILED = "failed"
+"""Names within a run, for `Run.flat` and `Run.solid`."""
 
 
 def run_of_events(entity: str) -> str | None:
     """The run whose events the entity holds, if it does."""
     parts = entity.split("/")
-    return parts[2] if len(parts) == 4 and entity == events_of_run(parts[2]) else None
-
-
-_EVENTS = "events"
+    return parts[2] if len(parts) == 4 and entity == Run(parts[2]).events else None

@@ -12,9 +12,12 @@ from recordings.canvas import Canvas, on_screen
 from recordings.palette import Colour
 
 ORDER = {
-    name: float(order)
-    for order, name in enumerate(
-        ("room", "area", "floor", "solid", "line", "target", "ray", "route", "candidate", "stop", "robot")
+    name: float(place)
+    for place, name in enumerate(
+        (
+            *("room", "area", "floor", "solid", "line", "target", "ray", "route"),
+            *("candidate", "stop", "arrival", "scan", "robot"),
+        )
     )
 }
 """What lies above what; Rerun's own defaults are 20 for lines and 30 for points."""

@@ -6,19 +6,20 @@ import numpy as np
 import rerun as rr
 
 from mission.geometry import FloatArray
-from recordings import palette, strokes
+from recordings import entities, strokes
 from recordings.canvas import Canvas, on_screen
+from recordings.palette import Colour
 from recordings.pens import ORDER
 
 
-def draw_robot(canvas: Canvas, flat: str, solid: str, radius: float, colour: palette.Colour) -> None:
+def draw_robot(canvas: Canvas, flat: str, solid: str, *, radius: float, colour: Colour) -> None:
     """The robot's shape in 2D and 3D; its pose is the transform of the entities `flat` and `solid`."""
     body, nose = strokes.circle(radius), np.array([[0.0, 0.0], [radius * 1.6, 0.0]])
     lines = rr.LineStrips2D([body, nose], colors=colour, radii=on_screen(1.5), draw_order=ORDER["robot"])
-    canvas.show(f"{flat}/shape", lines)
+    canvas.show(entities.shape(flat), lines)
     rings = [strokes.level(body, z) for z in (0.02, 0.25, 0.5)]
     shape = rr.LineStrips3D([*rings, strokes.level(nose, 0.5)], colors=colour, radii=0.02)
-    canvas.show(f"{solid}/shape", shape)
+    canvas.show(entities.shape(solid), shape)
 
 
 def quaternions(heading: FloatArray) -> FloatArray:

@@ -24,14 +24,14 @@ SPANS = {"beams": (CUT, CUT + 0.15), "stairs": (0.0, 0.4), "windows": (0.8, CUT)
 def draw_floor(canvas: Canvas, floor: FloorPlan) -> None:
     """Outline, holes, rooms with names, elements by kind, openings."""
     edges = strokes.outlines(floor.outline)
-    draw(canvas, f"{entities.FLOOR}/outline", edges, Pen(palette.OUTLINE, "floor", THICK))
+    draw(canvas, entities.OUTLINE, edges, Pen(palette.OUTLINE, "floor", THICK))
     holes = [hole for polygon in floor.outline for hole in polygon.holes]
-    draw(canvas, f"{entities.FLOOR}/holes", map(strokes.closed, holes), Pen(palette.HOLE, "line", THICK))
+    draw(canvas, entities.HOLES, map(strokes.closed, holes), Pen(palette.HOLE, "line", THICK))
     _draw_rooms(canvas, floor.rooms)
     for kind in palette.KIND_COLOURS:
         _draw_elements(canvas, floor, kind)
     openings = [opening.line for opening in floor.openings]
-    draw(canvas, f"{entities.FLOOR}/openings", openings, Pen(palette.PASSABLE, "line", THICK))
+    draw(canvas, entities.OPENINGS, openings, Pen(palette.PASSABLE, "line", THICK))
     say_findings(canvas, floor.findings)
     canvas.say(f"floor {floor.name}: {floor.area:.1f} m², {len(floor.rooms)} rooms, {len(openings)} openings")
 
@@ -39,13 +39,13 @@ def draw_floor(canvas: Canvas, floor: FloorPlan) -> None:
 def raise_floor(canvas: Canvas, floor: FloorPlan) -> None:
     """Slab, and every kind of element up to the cut."""
     slab = strokes.level(canvas.local(strokes.triangles(floor.outline)), -0.02)
-    _mesh(canvas, f"{entities.WORLD_FLOOR}/slab", slab, palette.SLAB)
+    _mesh(canvas, entities.SLAB, slab, palette.SLAB)
     for kind, colour in palette.KIND_COLOURS.items():
         solids, lines = _shapes(floor, kind)
         low, high = SPANS.get(kind, (0.0, CUT))
         sides = strokes.walls(canvas.strips(strokes.outlines(solids) + lines), low=low, high=high)
         top = strokes.level(canvas.local(strokes.triangles(solids)), high)
-        _mesh(canvas, f"{entities.WORLD_FLOOR}/{kind}", np.concatenate([sides, top]), colour)
+        _mesh(canvas, entities.part(entities.WORLD_FLOOR, kind), np.concatenate([sides, top]), colour)
 
 
 def say_findings(canvas: Canvas, findings: Iterable[Finding]) -> None:
@@ -56,7 +56,7 @@ def say_findings(canvas: Canvas, findings: Iterable[Finding]) -> None:
 
 def _draw_rooms(canvas: Canvas, rooms: tuple[Room, ...]) -> None:
     polygons = [polygon for room in rooms for polygon in room.polygons]
-    draw(canvas, f"{entities.FLOOR}/rooms", strokes.outlines(polygons), Pen(palette.ROOM, "room", THIN))
+    draw(canvas, entities.ROOMS, strokes.outlines(polygons), Pen(palette.ROOM, "room", THIN))
     named = [room for room in rooms if room.polygons]
     if not named:
         return
@@ -69,20 +69,20 @@ def _draw_rooms(canvas: Canvas, rooms: tuple[Room, ...]) -> None:
         show_labels=len(named) <= MOST_NAMES,
         draw_order=ORDER["line"],
     )
-    canvas.show(f"{entities.FLOOR}/room_names", points)
+    canvas.show(entities.ROOM_NAMES, points)
 
 
 def _draw_elements(canvas: Canvas, floor: FloorPlan, kind: str) -> None:
     solids, lines = _shapes(floor, kind)
-    colour = palette.KIND_COLOURS[kind]
+    colour, element = palette.KIND_COLOURS[kind], entities.part(entities.FLOOR, kind)
     filled = strokes.fill(solids, spacing=0.05)
     if len(filled.lines):
         shape = rr.LineStrips2D(
             canvas.local(filled.lines), radii=filled.radii, colors=colour, draw_order=ORDER["solid"]
         )
-        canvas.show(f"{entities.FLOOR}/{kind}/fill", shape)
+        canvas.show(entities.part(element, "fill"), shape)
     edges = strokes.outlines(solids) + lines
-    draw(canvas, f"{entities.FLOOR}/{kind}", edges, Pen(colour, "solid", THIN))
+    draw(canvas, element, edges, Pen(colour, "solid", THIN))
 
 
 def _shapes(floor: FloorPlan, kind: str) -> tuple[list[Polygon], list[FloatArray]]:

@@ -52,7 +52,7 @@ def plot_planned_coverage(canvas: Canvas, mission: Mission, drive: Drive, *, vis
     """Coverage over mission time, if every scan is done as planned."""
     gained = np.cumsum([stop.sees.new_units for stop in mission.stops]) * (100.0 / max(visible, 1))
     seconds = np.concatenate([[0.0], drive.leaving_s])
-    planned = f"{entities.METRIC_COVERAGE}/planned"
+    planned = entities.COVERAGE_PLANNED
     index = rr.TimeColumn(entities.MISSION_TIME, duration=seconds)
     canvas.columns(planned, index, rr.Scalars.columns(scalars=np.concatenate([[0.0], gained])))
     style = rr.SeriesLines(
@@ -69,7 +69,8 @@ def draw_drive(canvas: Canvas, drive: Drive, *, radius: float) -> None:
     for robot in (entities.PLANNED_ROBOT, entities.WORLD_PLANNED_ROBOT):
         columns = rr.Transform3D.columns(translation=strokes.level(xy, 0.0), quaternion=turn)
         canvas.columns(robot, index, columns)
-    draw_robot(canvas, entities.PLANNED_ROBOT, entities.WORLD_PLANNED_ROBOT, radius, palette.PLANNED)
+    robots = (entities.PLANNED_ROBOT, entities.WORLD_PLANNED_ROBOT)
+    draw_robot(canvas, *robots, radius=radius, colour=palette.PLANNED)
 
 
 def _draw_route(canvas: Canvas, mission: Mission) -> None:
@@ -110,8 +111,8 @@ def _draw_stops(canvas: Canvas, mission: Mission) -> None:
         radii=on_screen(1.5),
         draw_order=ORDER["stop"],
     )
-    canvas.show(f"{entities.STOPS}/heading", arrows)
+    canvas.show(entities.HEADINGS, arrows)
     poles = rr.Points3D(strokes.level(xy, 1.5), labels=labels, colors=colours, radii=0.12)
     canvas.show(entities.WORLD_STOPS, poles)
     legs = np.stack([strokes.level(xy, 0.0), strokes.level(xy, 1.5)], axis=1)
-    canvas.show(f"{entities.WORLD_STOPS}/legs", rr.LineStrips3D(legs, colors=palette.STOP, radii=0.02))
+    canvas.show(entities.POLES, rr.LineStrips3D(legs, colors=palette.STOP, radii=0.02))

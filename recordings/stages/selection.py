@@ -38,7 +38,7 @@ def paint_coverage(canvas: Canvas, selection: Selection) -> None:
         band = [strokes.level(canvas.local(line), CUT + SKIN) for line in lines[value == number]]
         if band:
             shape = rr.LineStrips3D(band, colors=meaning.colour, radii=0.03)
-            canvas.show(f"{entities.WORLD_COVERAGE}/{name}", shape)
+            canvas.show(entities.part(entities.WORLD_COVERAGE, name), shape)
 
 
 def step_of_units(selection: Selection) -> IntArray:
@@ -56,7 +56,7 @@ def _draw_targets(
     canvas: Canvas, lines: FloatArray, first_step: IntArray, index: rr.TimeColumn, *, steps: int
 ) -> None:
     """Pieces of the targets that change their class as stops are chosen; where they are never changes."""
-    targets = f"{entities.SELECTION}/targets"
+    targets = entities.SELECTION_TARGETS
     canvas.show(targets, _pieces(canvas, lines))
     classes = np.concatenate([_classes(first_step, step) for step in range(steps + 1)])
     column = rr.LineStrips2D.columns(class_ids=classes)
@@ -87,7 +87,7 @@ def _final(first_step: IntArray, steps: int) -> IntArray:
 
 def _draw_chosen(canvas: Canvas, selection: Selection, index: rr.TimeColumn) -> None:
     """The stops chosen so far, numbered in the order of choice."""
-    stops = f"{entities.SELECTION}/stops"
+    stops = entities.SELECTION_STOPS
     counts = np.arange(len(selection.chosen) + 1)
     xy = canvas.local(selection.xy)
     labels = [str(number + 1) for number in range(len(xy))]
@@ -106,7 +106,7 @@ def _draw_chosen(canvas: Canvas, selection: Selection, index: rr.TimeColumn) -> 
 def _plot_coverage(canvas: Canvas, selection: Selection, index: rr.TimeColumn) -> None:
     steps = len(selection.chosen)
     reached = np.concatenate([[0.0], selection.coverage_steps]) * 100
-    chosen, required = f"{entities.METRIC_COVERAGE}/chosen", f"{entities.METRIC_COVERAGE}/required"
+    chosen, required = entities.COVERAGE_CHOSEN, entities.COVERAGE_REQUIRED
     canvas.columns(chosen, index, rr.Scalars.columns(scalars=reached))
     canvas.columns(required, index, rr.Scalars.columns(scalars=np.full(steps + 1, selection.required * 100)))
     canvas.show(chosen, rr.SeriesLines(colors=palette.STOP, names="coverage of the chosen stops", widths=2))

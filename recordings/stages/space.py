@@ -18,13 +18,13 @@ def draw_space(canvas: Canvas, space: NavigableSpace) -> None:
     """Where the robot may drive and stop, which openings it passes, what it is to look at."""
     spacing = _hatch_spacing(space.floor)
     drive = strokes.hatch(space.drive_area, spacing=spacing, angle=np.pi / 4)
-    draw(canvas, f"{entities.NAVIGABLE}/drive", drive, Pen(palette.DRIVE, "area", THIN))
+    draw(canvas, entities.DRIVE_AREA, drive, Pen(palette.DRIVE, "area", THIN))
     stop_polygons = [polygon for room in space.rooms for polygon in room.stop_area]
     stop_area = strokes.hatch(stop_polygons, spacing=spacing, angle=-np.pi / 4)
-    draw(canvas, f"{entities.NAVIGABLE}/stop", stop_area, Pen(palette.STOP_AREA, "area", THIN))
+    draw(canvas, entities.STOP_AREA, stop_area, Pen(palette.STOP_AREA, "area", THIN))
     edges = strokes.outlines(stop_polygons)
-    draw(canvas, f"{entities.NAVIGABLE}/stop_edge", edges, Pen(palette.STOP_AREA, "area", THIN))
-    draw(canvas, f"{entities.NAVIGABLE}/gaps", space.gaps, Pen(palette.GAP, "line", THICK))
+    draw(canvas, entities.STOP_AREA_EDGE, edges, Pen(palette.STOP_AREA, "area", THIN))
+    draw(canvas, entities.GAPS, space.gaps, Pen(palette.GAP, "line", THICK))
     _draw_openings(canvas, space.openings)
     targets = space.targets
     lines = np.stack([targets.a, targets.b], axis=1)
@@ -52,4 +52,4 @@ def _draw_openings(canvas: Canvas, openings: tuple[OpeningState, ...]) -> None:
     )
     widths = [state.clear_width for state in openings]
     why = [state.why or "passable" for state in openings]
-    canvas.show(f"{entities.FLOOR}/openings", lines, rr.AnyValues(clear_width=widths, why=why))
+    canvas.show(entities.OPENINGS, lines, rr.AnyValues(clear_width=widths, why=why))

@@ -21,11 +21,11 @@ def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
     counts = np.diff(visibility.pointer)
     seen = strokes.runs(visibility.targets, visibility.segment, visibility.first, visibility.last)
     fans = np.stack([seen[:, 0], np.repeat(eyes, counts, axis=0), seen[:, 1]], axis=1)
-    _rows_of_lines(canvas, f"{entities.VISIBILITY}/rays", index, fans, counts)
-    _rows_of_lines(canvas, f"{entities.VISIBILITY}/seen", index, seen, counts)
-    style(canvas, f"{entities.VISIBILITY}/rays", Pen(palette.RAY, "ray", HAIR))
-    style(canvas, f"{entities.VISIBILITY}/seen", Pen(palette.SEEN.colour, "target", BOLD))
-    eye = f"{entities.VISIBILITY}/candidate"
+    _rows_of_lines(canvas, entities.RAYS, index, fans, counts)
+    _rows_of_lines(canvas, entities.SEEN, index, seen, counts)
+    style(canvas, entities.RAYS, Pen(palette.RAY, "ray", HAIR))
+    style(canvas, entities.SEEN, Pen(palette.SEEN.colour, "target", BOLD))
+    eye = entities.EYE
     canvas.columns(eye, index, rr.Points2D.columns(positions=canvas.local(eyes)))
     canvas.show(
         eye, rr.Points2D.from_fields(colors=palette.EYE, radii=on_screen(6), draw_order=ORDER["stop"])
@@ -38,7 +38,7 @@ def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
 def _plot_sight(canvas: Canvas, visibility: Visibility, index: rr.TimeColumn) -> None:
     visible = max(1, int(visibility.visible.sum()))
     seen = [len(visibility.seen_by(row)) / visible * 100 for row in range(visibility.rows)]
-    sight = f"{entities.METRIC_COVERAGE}/candidate"
+    sight = entities.SIGHT
     canvas.columns(sight, index, rr.Scalars.columns(scalars=seen))
     canvas.show(sight, rr.SeriesLines(colors=palette.EYE, names="seen by the candidate", widths=1))
 

@@ -11,7 +11,7 @@ import pytest
 
 from mission.document import Mission
 from mission.errors import InputError
-from mission.events import StateReport
+from mission.events import PoseReport, StateReport
 from recordings import entities
 from recordings.compact import compact
 from recordings.field import FieldRecording
@@ -22,7 +22,7 @@ from tests.recordings.conftest import tell, write_field, write_plan
 from tests.recordings.reading import components, on, static
 
 NS = 1_000_000_000
-RUN = entities.of_run(entities.FIELD, run.RUN)
+RUN = f"/field/{run.RUN}"
 
 
 def test_it_has_the_id_of_the_plan_and_entities_under_the_run(plan: Path, field: Path) -> None:
@@ -66,6 +66,15 @@ def test_the_driven_path_grows_piece_by_piece(field: Path) -> None:
     lengths = [float(np.hypot(*np.subtract(*strip))) for (strip,) in pieces.values()]
     assert sum(lengths) == pytest.approx(2.2, abs=0.01)
     assert min(lengths) >= 0.05
+
+
+def test_no_way_is_drawn_across_a_long_silence(tmp_path: Path, mission: Mission) -> None:
+    path = tmp_path / "field.rrd"
+    poses = [item for item in run.reports(mission) if isinstance(item, PoseReport)]
+    with FieldRecording(path, mission) as recording:
+        recording.pose(poses[0])
+        recording.pose(poses[-1])
+    assert f"{RUN}/driven" not in check(path).rows
 
 
 def test_deviation_and_distance_from_the_route_are_plotted(field: Path) -> None:
