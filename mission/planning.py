@@ -153,6 +153,8 @@ class Candidates:
     """Whether each candidate stands in a doorway (n,); empty where none does."""
     must: BoolArray = field(default_factory=lambda: frozen([], np.bool_))
     """Whether a stop must be at each candidate (n,); empty where none must."""
+    heading: FloatArray = field(default_factory=lambda: frozen([]))
+    """The scanner's heading at each candidate (n,); empty where it looks all round."""
 
     @cached_property
     def kept(self) -> IntArray:

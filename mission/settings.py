@@ -25,6 +25,11 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     visibility: str = "exact"
     selector: str = "default"
     router: str = "default"
+    graph: str = "exact"
+    den_grid_min: float = 0.5
+    """Least nodes per m² of a room's grid. The paper gives no value for this and the next: ours."""
+    max_err_dist: float = 0.5
+    """Greatest distance in metres from a stop to the grid's node that stands for it."""
     coverage: float = 0.9
     """c_min: share of the visible units that the chosen stops must see."""
     d_sec: float = 0.7
@@ -77,6 +82,8 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     # [scanner]
     range: float = 5.0
     """r: the scanner's range."""
+    fov: float = 360.0
+    """v: the scanner's field of view in degrees; below 360 every stop has a heading to scan along."""
     profile: str = "default"
     settle: float = 2.0
     scan_time: float = 60.0
@@ -98,12 +105,13 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 SECTIONS: dict[str, tuple[str, ...]] = {
     "plan": (
         *("candidates", "visibility", "selector", "router", "coverage", "d_sec", "d_dis", "grid"),
+        *("graph", "den_grid_min", "max_err_dist"),
         *("d_max", "l_min", "dens_min"),
         *("door_access", "edge", "doors", "targets", "tour", "start", "end", "use", "avoid"),
         *("door_scan", "door_candidates", "node_limit", "time_limit", "origin", "seed"),
     ),
     "robot": ("robot_radius", "speed", "turn_rate", "acceleration"),
-    "scanner": ("range", "profile", "settle", "scan_time"),
+    "scanner": ("range", "fov", "profile", "settle", "scan_time"),
     "policy": (*("tolerance", "on_failure", "retries", "link_loss", "link_loss_after", "battery_min"),),
 }
 """The tables of plan.toml and the keys in each."""
@@ -112,12 +120,13 @@ _POSITIVE = (
     *("d_dis", "grid", "d_max", "door_access", "robot_radius", "speed", "turn_rate"),
     "acceleration",
     "time_limit",
+    "max_err_dist",
     "range",
     "tolerance",
 )
 _NOT_NEGATIVE = (
     *("d_sec", "l_min", "dens_min", "edge", "settle", "scan_time", "retries", "link_loss_after"),
-    *("seed", "node_limit"),
+    *("den_grid_min", "seed", "node_limit"),
 )
 _LARGEST = 1e6
 _FARTHEST = 1e9
@@ -202,6 +211,8 @@ def _check_shares(settings: Settings) -> None:
         raise InputError(f"battery_min = {settings.battery_min}: must be at least 0 and below 1")
     if settings.d_dis < 1e-3:
         raise InputError(f"d_dis = {settings.d_dis}: units below 1 mm are not planned; use 0.001 or more")
+    if not 10 <= settings.fov <= 360:
+        raise InputError(f"fov = {settings.fov}: must be at least 10 and at most 360 degrees")
     if settings.d_max < 0.05:
         raise InputError(f"d_max = {settings.d_max}: seeds below 5 cm are not planned; use 0.05 or more")
     if settings.grid < 0.05:

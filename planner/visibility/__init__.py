@@ -11,13 +11,17 @@ from mission.errors import AnswerIsNo, InputError
 from mission.planning import Candidates, Visibility
 from planner.visibility.bresenham import bresenham
 from planner.visibility.exact import exact
+from planner.visibility.headings import with_headings
 
 Method = Callable[[Candidates], Visibility]
 METHODS: dict[str, Method] = {"exact": exact, "bresenham": bresenham}
 
 
 def visibility(candidates: Candidates) -> Visibility:
-    """What the kept candidates see, by the method named in the settings."""
+    """What the kept candidates see, by the method named in the settings.
+
+    With a field of view below 360° the candidates of the result are positions with headings.
+    """
     settings = candidates.space.settings
     if settings.visibility not in METHODS:
         raise InputError(f"visibility = {settings.visibility}: unknown; known: {', '.join(METHODS)}")
@@ -27,7 +31,7 @@ def visibility(candidates: Candidates) -> Visibility:
             f"{candidates.space.floor.name}: no target is within {settings.range:g} m of a candidate "
             "and in its sight; raise --range or lower --grid"
         )
-    return found
+    return with_headings(found) if settings.fov < 360 else found
 
 
 __all__ = ["METHODS", "Method", "visibility"]

@@ -11,14 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from mission.geometry import BoolArray, IntArray, frozen
+from mission.geometry import BoolArray, IntArray
 from mission.planning import Candidates, Visibility
 from planner.compiling import compiled
 from planner.shapes import SLACK, local_origin
 from planner.visibility.raster import Raster, raster_of
+from planner.visibility.runs import visibility_of
 
-COMPILE_ABOVE = 300_000
-"""Cells to be walked above which loading the compiled kernel pays for itself."""
+COMPILE_ABOVE = 10_000_000
+"""Cells to be walked, were all units as far away as the range, above which compiling pays."""
 
 
 def bresenham(candidates: Candidates, *, aligned: bool = True) -> Visibility:
@@ -35,17 +36,8 @@ def bresenham(candidates: Candidates, *, aligned: bool = True) -> Visibility:
         the axes of the drawing.
     """
     raster = raster_of(candidates, aligned=aligned)
-    runs = [_runs(candidates, seen) for seen in _seen_by_each(candidates, raster)]
-    first = np.concatenate([np.empty(0, np.int64), *(first for first, _ in runs)])
-    last = np.concatenate([np.empty(0, np.int64), *(last for _, last in runs)])
-    return Visibility(
-        candidates=candidates,
-        pointer=frozen(np.cumsum([0, *(len(first) for first, _ in runs)]), np.int64),
-        segment=frozen(candidates.space.targets.unit_segment[first], np.int64),
-        first=frozen(first, np.int64),
-        last=frozen(last, np.int64),
-        method="bresenham" if aligned else "bresenham, not aligned",
-    )
+    method = "bresenham" if aligned else "bresenham, not aligned"
+    return visibility_of(candidates, _seen_by_each(candidates, raster), method=method)
 
 
 def _seen_by_each(candidates: Candidates, raster: Raster) -> Iterator[IntArray]:
@@ -101,12 +93,3 @@ def clear_line(occupied: Any, width: int, x: int, y: int, end_x: int, end_y: int
             error += dx
             y += step_y
     return own or not occupied[y * width + x]
-
-
-def _runs(candidates: Candidates, seen: IntArray) -> tuple[IntArray, IntArray]:
-    """First and last units of the stretches of consecutive units on one segment."""
-    segment = candidates.space.targets.unit_segment[seen]
-    new = np.ones(len(seen), dtype=bool)
-    new[1:] = (np.diff(seen) != 1) | (np.diff(segment) != 0)
-    starts = np.flatnonzero(new)
-    return seen[starts], seen[np.append(starts[1:], len(seen))[: len(starts)] - 1]

@@ -1,0 +1,84 @@
+"""A field of view below 360°: each position becomes one candidate per heading of the scanner.
+
+The paper has the field of view as a parameter and plans with v = 360°, where no heading is needed. Below
+that the heading is a choice like the position, so the selection makes it: a place that must be looked
+at all round is chosen more than once, each time turned elsewhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from mission.geometry import FloatArray, IntArray, frozen
+from mission.planning import Candidates, Visibility
+from planner.candidates.grid import main_axes
+from planner.shapes import local_origin, to_shape
+from planner.visibility.runs import visibility_of
+
+FEWEST = 8
+"""Headings of each position, at least; more where the field of view is below 90°."""
+SLACK = 1e-9
+"""Radians by which a field of view is wider: what lies on its limits belongs to it."""
+
+
+def with_headings(seen: Visibility) -> Visibility:
+    """What the candidates see when each looks along one of several headings, as rows of their own.
+
+    Where a stop must be, and in doorways, only the heading that sees most is kept, so that one stop is
+    made there. Whether a unit's midpoint is within heading ± fov / 2 is decided in floating point.
+    """
+    candidates = seen.candidates
+    fov = math.radians(candidates.space.settings.fov)
+    headings = headings_of(candidates, fov=fov)
+    once = set(candidates.must_rows.tolist()) | set(candidates.doorway_rows.tolist())
+    views = [list(_views(seen, row, headings, fov=fov, once=row in once)) for row in range(seen.rows)]
+    turned = _turned(candidates, [[heading for heading, _ in view] for view in views])
+    units = (units for view in views for _, units in view)
+    name = f"{seen.method}, field of view {candidates.space.settings.fov:g}°"
+    return visibility_of(turned, units, method=name)
+
+
+def headings_of(candidates: Candidates, *, fov: float) -> FloatArray:
+    """Headings all round, at most fov / 2 apart, beginning at the floor's main axis.
+
+    Their number is a multiple of four, so that a floor turned by 90° or mirrored has the same ones.
+    """
+    floor = candidates.space.floor
+    axis = main_axes(to_shape(floor.outline, local_origin(floor)))[0]
+    number = 4 * math.ceil(max(FEWEST, 2 * math.tau / fov - 1e-9) / 4)
+    return frozen(math.atan2(axis[1], axis[0]) + np.arange(number) * (math.tau / number))
+
+
+def _views(
+    seen: Visibility, row: int, headings: FloatArray, *, fov: float, once: bool
+) -> Iterator[tuple[float, IntArray]]:
+    """Headings of one position and the units seen along each; with `once` the best one only."""
+    candidates, units = seen.candidates, seen.seen_by(row)
+    way = seen.targets.unit_xy[units] - candidates.xy[candidates.kept[row]]
+    bearing = np.arctan2(way[:, 1], way[:, 0])
+    aside = np.abs((bearing - headings[:, None] + math.pi) % math.tau - math.pi)
+    inside = aside <= fov / 2 + SLACK
+    wanted = [int(inside.sum(axis=1).argmax())] if once else range(len(headings))
+    for k in wanted:
+        yield math.remainder(headings[k], math.tau), units[inside[k]]
+
+
+def _turned(candidates: Candidates, headings: list[list[float]]) -> Candidates:
+    """The candidates with each kept one repeated for its headings; dropped ones stay as they are."""
+    heading_of = {int(index): list(view) for index, view in zip(candidates.kept, headings, strict=True)}
+    per_candidate = [heading_of.get(index, [0.0]) for index in range(len(candidates.xy))]
+    source = np.repeat(np.arange(len(candidates.xy)), [len(view) for view in per_candidate])
+    return replace(
+        candidates,
+        xy=frozen(candidates.xy[source]),
+        room=frozen(candidates.room[source], np.int64),
+        reason=frozen(candidates.reason[source], np.int64),
+        part=frozen(candidates.part[source], np.int64),
+        doorway=frozen(candidates.doorway[source] if len(candidates.doorway) else [], np.bool_),
+        must=frozen(candidates.must[source] if len(candidates.must) else [], np.bool_),
+        heading=frozen(np.concatenate([np.empty(0), *per_candidate])),
+    )
