@@ -131,14 +131,16 @@ def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Part]
 
 
 def _is_hole(kind: str, inner: Closed, outer: Closed) -> bool:
-    """Whether a ring in another is its inside: said by the GlobalId, else by direction and by size.
+    """Whether a ring in another is its inside: said by GlobalId or hatch, else by direction and size.
 
     A tread drawn against its flight must not free the stairs; the two faces of a wall around a core are
     often drawn in one direction.
     """
+    against = inner.clockwise != outer.clockwise
     if inner.global_id is not None and inner.global_id == outer.global_id:
         return True
-    against = inner.clockwise != outer.clockwise
+    if inner.fill and outer.fill:
+        return against
     roomy = not inner.region.buffer(-_STANDING).is_empty
     if kind == "walls":
         return against or roomy
