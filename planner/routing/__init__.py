@@ -1,6 +1,7 @@
 """Selection -> route: the order of the stops, and the ways between them.
 
-A router is a function `(lengths, seed) -> order` over a symmetric matrix of lengths, point 0 first.
+A router is a function `(lengths, seed) -> order` over a symmetric matrix of lengths in metres. A graph is
+a function `(space, points) -> Ways`.
 """
 
 from __future__ import annotations
@@ -13,17 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from mission.errors import AnswerIsNo, InputError
-from mission.geometry import FloatArray, IntArray, frozen
+from mission.geometry import FloatArray, IntArray, frozen, polyline_length
 from mission.planning import NavigableSpace, Route, Selection
 from planner.connected import parts_of
-from planner.routing.bound import tour_bound
+from planner.routing.proof import proved
 from planner.routing.roadmap import Ways, ways_between
-from planner.routing.tour import path_length, shortest_tour
+from planner.routing.tour import NANOMETRES, nanometres, shortest_tour
 from planner.shapes import local_origin, to_shape
 
 Router = Callable[..., IntArray]
 ROUTERS: dict[str, Router] = {"default": shortest_tour}
-NAMES = {"default": "2-opt, Or-opt, iterated"}
+METHODS = {"default": "2-opt, Or-opt, iterated"}
+Graph = Callable[[NavigableSpace, FloatArray], Ways]
+GRAPHS: dict[str, Graph] = {"exact": ways_between}
 
 
 @dataclass(frozen=True)
@@ -40,18 +43,15 @@ def route(selection: Selection) -> Route:
     """The shortest tour found over the chosen stops, closed or open, with a proven bound."""
     space = selection.visibility.candidates.space
     settings = space.settings
-    if settings.router not in ROUTERS:
-        raise InputError(f"router = {settings.router}: unknown; known: {', '.join(ROUTERS)}")
-    stops = len(selection.chosen)
+    for key, known in (("router", ROUTERS), ("graph", GRAPHS)):
+        if getattr(settings, key) not in known:
+            raise InputError(f"{key} = {getattr(settings, key)}: unknown; known: {', '.join(known)}")
     points, ends = _points_and_ends(selection)
-    ways = ways_between(space, points)
+    ways = GRAPHS[settings.graph](space, points)
     if not np.isfinite(ways.lengths).all():
         raise AnswerIsNo(f"{space.floor.name}: the route's end is not connected with its stops")
-    lengths = tour_matrix(ways.lengths, ends)
-    order = ROUTERS[settings.router](lengths, seed=settings.seed)
-    bound = tour_bound(lengths, best=path_length(lengths, order)) - _offset(lengths, ways.lengths)
-    sequence = _sequence(order, ends, len(points))
-    return _assembled(selection, points, ways, sequence, ends, stops, max(0.0, bound))
+    sequence, bound, method = _ordered(ways.lengths, ends, settings.router, seed=settings.seed)
+    return _assembled(selection, points, ways, sequence, ends, bound, method)
 
 
 def _points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:
@@ -101,32 +101,40 @@ def _stop_at_door(selection: Selection) -> tuple[int | None, str]:
     return int(np.argmin(away)), f"the stop nearest the widest exterior door, {widest.opening.id}"
 
 
+def _ordered(lengths: FloatArray, ends: Ends, router: str, *, seed: int) -> tuple[list[int], float, str]:
+    """The points in the order of driving, what no such route is shorter than, and how that is known.
+
+    The default router takes the proof's tour where that is shorter; others are reported as they are.
+    """
+    matrix = tour_matrix(lengths, ends)
+    proof = proved(nanometres(matrix), ROUTERS[router](matrix, seed=seed), improve=router == "default")
+    bound = proof.bound / NANOMETRES - far_edge(lengths, ends)
+    method = METHODS[router] + (", proved optimal" if proof.closed else "")
+    return _sequence(proof.order, ends, len(lengths)), max(0.0, bound), method
+
+
 def tour_matrix(lengths: FloatArray, ends: Ends) -> FloatArray:
     """Lengths for a closed tour; an open path gets one more point between its last and its first.
 
-    That point is as far as everything together from all but the ends, which makes it join them.
+    That point is next to where the path may end and far from everywhere else, farther than any two edges
+    exchanged for others can gain, so that a shortest tour is a shortest path.
     """
     if ends.closed:
         return lengths
-    n = len(lengths)
-    far = float(lengths.sum()) + 1.0
-    extra = np.zeros(n) if ends.first is None and ends.last is None else np.full(n, far)
-    if ends.first is not None and ends.last is None:
-        extra[:] = far
-        extra[ends.first] = 0.0
-    elif ends.last is not None:
-        extra[ends.last] = 0.0
-        if ends.first is not None:
-            extra[ends.first] = 0.0
+    fixed = [end for end in (ends.first, ends.last) if end is not None]
+    extra = np.full(len(lengths), _far(lengths) if fixed else 0.0)
+    extra[fixed] = 0.0
     return np.block([[lengths, extra[:, None]], [extra[None, :], np.zeros((1, 1))]])
 
 
-def _offset(matrix: FloatArray, lengths: FloatArray) -> float:
-    """What the extra point adds to every sensible tour: one far edge if only one end is fixed."""
-    if len(matrix) == len(lengths):
-        return 0.0
-    extra = matrix[-1, :-1]
-    return float(extra.max()) if np.count_nonzero(extra == 0.0) == 1 and len(extra) > 1 else 0.0
+def far_edge(lengths: FloatArray, ends: Ends) -> float:
+    """What the extra point adds to a shortest tour: one far edge if just one end of several is fixed."""
+    one_end = not ends.closed and (ends.first is None) != (ends.last is None)
+    return _far(lengths) if one_end and len(lengths) > 1 else 0.0
+
+
+def _far(lengths: FloatArray) -> float:
+    return float(np.ceil(3 * lengths.max()) + 1)
 
 
 def _sequence(order: IntArray, ends: Ends, points: int) -> list[int]:
@@ -150,17 +158,19 @@ def _assembled(
     ways: Ways,
     sequence: list[int],
     ends: Ends,
-    stops: int,
     bound: float,
+    method: str,
 ) -> Route:
-    space = selection.visibility.candidates.space
+    stops = len(selection.chosen)
     visited = [k for k in sequence if k < stops]
     places = [sequence[0], *visited[1 if sequence[0] < stops else 0 :]]
     approaches = [ways.way(a, b) for a, b in itertools.pairwise(places)]
     if sequence[0] < stops:
         approaches.insert(0, frozen(points[sequence[:1]]))
-    back = places[0] if ends.closed else (ends.last if ends.last is not None else None)
+    back = places[0] if ends.closed else ends.last
     return_leg = ways.way(places[-1], back) if back is not None and len(places) > 1 else None
+    driven = sum(polyline_length(leg) for leg in (*approaches, *([] if return_leg is None else [return_leg])))
+    space = selection.visibility.candidates.space
     return Route(
         selection=selection,
         order=frozen(visited, np.int64),
@@ -169,8 +179,8 @@ def _assembled(
         approaches=tuple(approaches),
         return_leg=return_leg,
         tour="closed" if ends.closed else "open",
-        bound=bound,
-        method=NAMES[space.settings.router],
+        bound=min(bound, driven),  # lengths may differ in the last digit by the order of summing
+        method=method,
     )
 
 
@@ -184,4 +194,4 @@ def _heading(space: NavigableSpace, approaches: list[FloatArray]) -> float:
     return 0.0
 
 
-__all__ = ["ROUTERS", "Router", "route", "tour_matrix"]
+__all__ = ["GRAPHS", "ROUTERS", "Graph", "Router", "route", "tour_matrix"]

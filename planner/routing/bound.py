@@ -1,65 +1,109 @@
-"""A proven lower bound on a tour's length: Held and Karp's one-tree bound (Operations Research, 1970)."""
+"""A lower bound on a tour's length, from smallest one-trees, and the edges a shorter tour may use.
+
+Held and Karp, "The traveling-salesman problem and minimum spanning trees", Operations Research 1970;
+step sizes after Volgenant and Jonker, EJOR 1982. Weights are whole numbers like the lengths, so a
+one-tree's value is exact, whatever way its weights were found.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from scipy.sparse.csgraph import minimum_spanning_tree
 
-from mission.geometry import FloatArray
+from mission.geometry import BoolArray, IntArray
 
-STEPS = 200
-"""Subgradient steps; a count, so that the bound does not depend on speed."""
-EXACT_UP_TO = 11
-"""Points for which all tours are compared (dynamic programming)."""
-
-
-def tour_bound(lengths: FloatArray, *, best: float) -> float:
-    """No closed tour over the symmetric matrix (n, n) is shorter; `best` is a tour's length, to steer by."""
-    n = len(lengths)
-    if n <= 3:
-        return best
-    return min(best, _optimum(lengths)) if n <= EXACT_UP_TO else _one_tree_bound(lengths, best)
+STEPS = 300
+"""One-trees looked at; a count, so that the bound does not depend on speed."""
+MANY = 300
+"""Points above which fewer one-trees are looked at, since each takes longer."""
+PATIENCE = 12
+"""One-trees without a higher bound after which steps are halved."""
+MEMORY = 0.3
+"""Weight of the direction before in each step's direction."""
+NEVER = np.iinfo(np.int64).max
+"""The cost of what must not be taken."""
 
 
-def _optimum(lengths: FloatArray) -> float:
-    """Length of the shortest tour, by dynamic programming over subsets (Held and Karp, 1962)."""
-    n = len(lengths) - 1
-    reach = np.full((1 << n, n), np.inf)
-    for k in range(n):
-        reach[1 << k, k] = lengths[n, k]
-    for subset in range(1, 1 << n):
-        for last in range(n):
-            if np.isfinite(reach[subset, last]):
-                for then in range(n):
-                    if not subset >> then & 1:
-                        new = subset | 1 << then
-                        reach[new, then] = min(reach[new, then], reach[subset, last] + lengths[last, then])
-    return float(np.min(reach[-1] + lengths[n, :n]))
+@dataclass(frozen=True, eq=False)
+class OneTree:
+    """A smallest spanning tree of all points but the last, and the last point's two shortest edges."""
+
+    value: int
+    """No closed tour is shorter."""
+    degree: IntArray
+    costs: IntArray
+    """Lengths plus the weights of both ends (n, n)."""
+    before: IntArray
+    """Points 0 to n - 2 in the order in which the tree reached them, with the point each hangs on."""
+    reached: IntArray
 
 
-def _one_tree_bound(lengths: FloatArray, best: float) -> float:
-    """Raise the cost of points that a smallest one-tree uses too often, lower it where too seldom."""
-    n = len(lengths)
-    weight, bound = np.zeros(n), -np.inf
-    step = 1.0
-    for _ in range(STEPS):
-        value, degree = _one_tree(lengths, weight)
-        bound = max(bound, value)
-        off = degree - 2
-        if not off.any() or step < 1e-6:
+def one_tree_bound(cost: IntArray, *, best: int) -> OneTree:
+    """The one-tree of the highest value found; `best` is the length of a tour, to steer by.
+
+    Points that a one-tree uses too often are made dearer, those it uses too seldom cheaper; every tour
+    changes by the same amount then, so that the value less that amount remains a bound.
+    """
+    weight, way = np.zeros(len(cost)), np.zeros(len(cost))
+    highest = tree = one_tree(cost, weight.astype(np.int64))
+    scale, waited = 1.0, 0
+    for _ in range(STEPS * MANY // max(MANY, len(cost))):
+        off = (tree.degree - 2).astype(float)
+        if not off.any() or highest.value >= best:
             break
-        weight = weight + step * max(best - value, 1e-3) / float(off @ off) * off
-        step *= 0.97
-    return min(bound, best)
+        way = off + MEMORY * way
+        weight += scale * max(best - tree.value, 1) / float(off @ off) * way
+        tree = one_tree(cost, np.rint(weight).astype(np.int64))
+        waited = 0 if tree.value > highest.value else waited + 1
+        highest = tree if tree.value > highest.value else highest
+        if waited == PATIENCE:
+            scale, waited = scale / 2, 0
+    return highest
 
 
-def _one_tree(lengths: FloatArray, weight: FloatArray) -> tuple[float, FloatArray]:
-    """Cost and point degrees of a smallest spanning tree plus the two shortest edges of the last point."""
-    costs = lengths + weight[:, None] + weight[None, :]
-    shift = 1.0 - min(0.0, float(costs.min()))  # the sparse solver takes only positive edges
-    n = len(lengths)
-    tree = minimum_spanning_tree(np.triu(costs[:-1, :-1] + shift, 1)).tocoo()
+def one_tree(cost: IntArray, weight: IntArray) -> OneTree:
+    """The smallest one-tree where every edge costs its ends' weights more (Prim's algorithm)."""
+    costs = cost + weight[:, None] + weight[None, :]
+    n = len(cost)
+    away, hangs_on = costs[0, :-1].copy(), np.zeros(n - 1, dtype=np.int64)
+    reached = np.zeros(n - 1, dtype=np.int64)
+    away[0] = NEVER
+    open_ = np.ones(n - 1, dtype=bool)
+    open_[0] = False
+    for k in range(1, n - 1):
+        point = int(np.argmin(away))
+        reached[k] = point
+        open_[point] = False
+        row = costs[point, :-1]
+        nearer = open_ & (row < away)
+        away[nearer] = row[nearer]
+        hangs_on[nearer] = point
+        away[point] = NEVER
+    before = hangs_on[reached]
     ends = np.argsort(costs[-1, :-1], kind="stable")[:2]
-    degree = np.bincount(np.concatenate([tree.row, tree.col, ends, [n - 1, n - 1]]), minlength=n)
-    value = float(tree.data.sum()) - shift * (n - 2) + float(costs[-1, ends].sum()) - 2 * float(weight.sum())
-    return value, degree.astype(float)
+    value = costs[reached[1:], before[1:]].sum() + costs[-1, ends].sum() - 2 * weight.sum()
+    used = np.concatenate([reached[1:], before[1:], ends, [n - 1, n - 1]])
+    return OneTree(int(value), np.bincount(used, minlength=n), costs, before, reached)
+
+
+def useful_edges(tree: OneTree, *, best: int) -> BoolArray:
+    """Edges (n, n) that a tour no longer than `best` may use.
+
+    A one-tree that must hold an edge costs that edge more and the longest edge of the circle it closes
+    less (Volgenant and Jonker 1983).
+    """
+    n = len(tree.costs)
+    longest = np.full((n - 1, n - 1), -(2**62))
+    for k in range(1, n - 1):
+        point, on = tree.reached[k], tree.before[k]
+        so_far = tree.reached[:k]
+        longest[point, so_far] = np.maximum(longest[on, so_far], tree.costs[point, on])
+        longest[so_far, point] = longest[point, so_far]
+    second = np.sort(tree.costs[-1, :-1])[1]
+    spare = best - tree.value
+    useful = np.zeros((n, n), dtype=bool)
+    useful[:-1, :-1] = tree.costs[:-1, :-1] - longest <= spare
+    useful[-1, :-1] = useful[:-1, -1] = tree.costs[-1, :-1] - second <= spare
+    np.fill_diagonal(useful, False)
+    return useful

@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from mission.geometry import FloatArray, IntArray, frozen
 from mission.planning import NavigableSpace
 from planner.mesh import mesh_of
-from planner.shapes import local_origin, polygon_parts, snapped, to_grid, to_shape
+from planner.shapes import GRID, local_origin, polygon_parts, snapped, to_grid, to_shape
 from planner.sight import scene_of, sight
 
 
@@ -47,8 +47,10 @@ def ways_between(space: NavigableSpace, points: FloatArray) -> Ways:
     """Shortest ways between all pairs of points (n, 2) of the drive area."""
     origin = local_origin(space.floor)
     corners = outward_corners(space)
-    nodes = np.concatenate([points - origin, corners, space.gaps.reshape(-1, 2) - origin])
-    graph = _graph(space, nodes, len(points), len(corners))
+    ends, crossing = np.unique(space.gaps.reshape(-1, 2) - origin, axis=0, return_inverse=True)
+    nodes = np.concatenate([points - origin, corners, ends])
+    links = crossing.reshape(-1, 2) + len(points) + len(corners)
+    graph = _graph(space, nodes, np.concatenate([links, _on_crossings(points - origin, nodes, links)]))
     lengths, before = dijkstra(
         graph, directed=False, indices=np.arange(len(points)), return_predecessors=True
     )
@@ -81,17 +83,25 @@ def _drive_area(space: NavigableSpace) -> BaseGeometry:
     return snapped(to_shape(space.drive_area, local_origin(space.floor)))
 
 
-def _graph(space: NavigableSpace, nodes: FloatArray, points: int, corners: int) -> csr_array:
-    """Straight ways between nodes that see each other, and the gap crossings."""
+def _on_crossings(points: FloatArray, nodes: FloatArray, links: IntArray) -> IntArray:
+    """Links (k, 2) from points that lie on a gap crossing, such as stops in doorways, to its ends."""
+    if not len(links):
+        return np.empty((0, 2), dtype=np.int64)
+    ways = shapely.linestrings(nodes[links])
+    near = shapely.dwithin(shapely.points(points)[:, None], ways[None, :], GRID)
+    point, way = np.nonzero(near)
+    return np.stack([np.repeat(point, 2), links[way].ravel()], axis=1).astype(np.int64)
+
+
+def _graph(space: NavigableSpace, nodes: FloatArray, links: IntArray) -> csr_array:
+    """Straight ways between nodes that see each other, and the given links (k, 2)."""
     mesh = mesh_of(_drive_area(space))
     ones = np.ones(len(nodes), dtype=np.int64)
     scene = scene_of(mesh, nodes, nodes, ones, np.zeros(len(nodes), dtype=bool))
     runs = sight(scene, to_grid(nodes), reach=None)
     start = np.repeat(np.arange(len(nodes)), np.diff(runs.pointer))
-    first_gap = points + corners
-    gap = np.arange(first_gap, len(nodes)).reshape(-1, 2)
-    start = np.concatenate([start, gap[:, 0]])
-    end = np.concatenate([runs.segment, gap[:, 1]])
+    start = np.concatenate([start, links[:, 0]])
+    end = np.concatenate([runs.segment, links[:, 1]])
     useful = start != end
     start, end = start[useful], end[useful]
     low, high = np.minimum(start, end), np.maximum(start, end)

@@ -1,0 +1,99 @@
+"""Inequalities that every tour keeps and a solution of the relaxation does not.
+
+A tour leaves any set of points at least twice (Dantzig, Fulkerson, Johnson 1954), and an even number of
+times (Edmonds' blossom inequalities, with the sets proposed by Padberg and Rinaldi, 1990).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from mission.geometry import BoolArray, FloatArray, IntArray
+from planner.routing.relaxation import Cut
+
+LITTLE = 1e-6
+"""Shares and violations below this are the solver's noise."""
+
+
+def violated_cuts(points: int, edges: IntArray, share: FloatArray) -> list[Cut]:
+    """Cuts that the shares (m,) of the edges (m, 2) violate; none if only dearer ones may be left."""
+    labels = _components(points, edges[share > LITTLE])
+    if labels.max() > 0:
+        sets = [labels == k for k in range(int(labels.max()) + 1)]
+        return [_leave_twice(edges, inside) for inside in sets]
+    return _small_cuts(points, edges, share) or _odd_cuts(points, edges, share)
+
+
+def _components(points: int, edges: IntArray) -> IntArray:
+    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(points, points))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def _leaving(edges: IntArray, inside: BoolArray) -> BoolArray:
+    """Edges (m,) with one end in a set of points."""
+    return inside[edges[:, 0]] != inside[edges[:, 1]]
+
+
+def _leave_twice(edges: IntArray, inside: BoolArray) -> Cut:
+    return Cut(_leaving(edges, inside).astype(np.int64), 2)
+
+
+def _small_cuts(points: int, edges: IntArray, share: FloatArray) -> list[Cut]:
+    """Sets that are left less than twice (Stoer and Wagner, J. ACM 1997).
+
+    Points joined by a whole edge are taken as one: some smallest cut does not part them.
+    """
+    group = _components(points, edges[share > 1 - LITTLE])
+    m = int(group.max()) + 1
+    weight = np.zeros((m, m))
+    np.add.at(weight, (group[edges[:, 0]], group[edges[:, 1]]), share)
+    weight += weight.T
+    np.fill_diagonal(weight, 0.0)
+    members = [group == k for k in range(m)]
+    left, found = list(range(m)), []
+    while len(left) > 1:
+        before, last, value = _most_tightly(weight, left)
+        if value < 2 - 10 * LITTLE:
+            found.append(_leave_twice(edges, members[last]))
+        members[before] = members[before] | members[last]
+        weight[before] += weight[last]
+        weight[:, before] += weight[:, last]
+        weight[before, before] = 0.0
+        left.remove(last)
+    return found
+
+
+def _most_tightly(weight: FloatArray, left: list[int]) -> tuple[int, int, float]:
+    """The last two groups when always the one is added that is tied most to those before, and its ties."""
+    ties = np.full(len(weight), -np.inf)
+    ties[left] = weight[left[0], left]
+    last, before, value = left[0], left[0], 0.0
+    ties[last] = -np.inf
+    for _ in range(len(left) - 1):
+        before, last = last, int(np.argmax(ties))
+        value = float(ties[last])
+        ties += weight[last]
+        ties[last] = -np.inf
+    return before, last, value
+
+
+def _odd_cuts(points: int, edges: IntArray, share: FloatArray) -> list[Cut]:
+    """Sets that are left an odd number of times: the groups that edges used in part hold together."""
+    partly = (share > LITTLE) & (share < 1 - LITTLE)
+    labels = _components(points, edges[partly])
+    cuts = []
+    for label in range(int(labels.max()) + 1):
+        leaving = np.flatnonzero(_leaving(edges, labels == label))
+        if not len(leaving):
+            continue
+        used = share[leaving] > 0.5
+        if used.sum() % 2 == 0:
+            doubtful = int(np.argmin(np.abs(share[leaving] - 0.5)))
+            used[doubtful] = not used[doubtful]
+        if np.where(used, 1 - share[leaving], share[leaving]).sum() < 1 - 10 * LITTLE:
+            times = np.zeros(len(edges), dtype=np.int64)
+            times[leaving] = np.where(used, -1, 1)
+            cuts.append(Cut(times, 1 - int(used.sum())))
+    return cuts

@@ -1,0 +1,129 @@
+"""How good a tour is: a bound below which no tour is, and up to some hundred points the shortest tour.
+
+Few points: all tours are compared. More: branch and bound over the relaxation of Dantzig, Fulkerson and
+Johnson (1954) with cuts found on the way. Most: the one-tree bound alone.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+
+import networkx as nx
+import numpy as np
+
+from mission.geometry import FloatArray, IntArray
+from planner.routing.bound import one_tree_bound, useful_edges
+from planner.routing.cuts import violated_cuts
+from planner.routing.relaxation import Relaxation
+from planner.routing.subsets import best_of_all
+from planner.routing.tour import canonical, length_of
+
+COMPARE_ALL_UP_TO = 12
+"""Points up to which all tours are compared."""
+BRANCH_UP_TO = 120
+"""Points up to which the relaxation is worth its time."""
+SOLVE_LIMIT = 400
+"""Relaxations solved at most; a count, so that the bound does not depend on speed."""
+CLOSE = 1_000
+"""Nanometres by which a tour called optimal may be too long: what a mission is rounded to."""
+WHOLE = 1e-6
+"""How far from 0 or 1 the share of an edge may be to count as whole."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """A tour and what no tour is shorter than, both in the matrix's unit."""
+
+    order: IntArray
+    length: int
+    bound: int
+
+    @property
+    def closed(self) -> bool:
+        """Whether the tour is proved to be the shortest, to within a micrometre."""
+        return self.length - self.bound <= CLOSE
+
+
+def proved(cost: IntArray, order: IntArray, *, improve: bool = True) -> Proof:
+    """The tour with a bound, over a symmetric matrix (n, n); if `improve`, a shorter tour the proof meets.
+
+    The tour is kept where the proof meets another one of the same length.
+    """
+    length = length_of(cost, order)
+    found = _searched(cost, order, length)
+    if improve and found.length < length:
+        return Proof(canonical(found.order), found.length, found.bound)
+    return Proof(order, length, found.bound)
+
+
+def _searched(cost: IntArray, order: IntArray, length: int) -> Proof:
+    n = len(cost)
+    if n <= COMPARE_ALL_UP_TO:
+        best = best_of_all(cost)
+        return Proof(best, length_of(cost, best), length_of(cost, best))
+    tree = one_tree_bound(cost, best=length)
+    known = Proof(order, length, min(tree.value, length))
+    if known.closed or n > BRANCH_UP_TO:
+        return known
+    edges = np.argwhere(np.triu(useful_edges(tree, best=length)))
+    return _branch_and_bound(cost, edges, known)
+
+
+def _branch_and_bound(cost: IntArray, edges: IntArray, known: Proof) -> Proof:
+    """Split the tours by one edge at a time, the part with the lowest bound first.
+
+    A part is done with when its bound comes within CLOSE of the best tour: no tour of it is worth more.
+    """
+    relaxation = Relaxation(cost, edges, limit=known.length)
+    none, all_ = np.zeros(len(edges), dtype=np.int64), np.ones(len(edges), dtype=np.int64)
+    heap = [(known.bound, 0, none, all_)]
+    done, made = known.length, 0
+    while heap and relaxation.solved < SOLVE_LIMIT:
+        least, _, low, high = heapq.heappop(heap)
+        least, share = _bounded(relaxation, low, high, least, known.length)
+        whole = np.abs(share - 0.5) >= 0.5 - WHOLE
+        if whole.all():
+            known = _better(cost, edges[share > 0.5], known)
+        if whole.all() or known.length - least <= CLOSE:
+            done = min(done, least)
+            continue
+        split = int(np.argmin(np.abs(share - 0.5)))
+        for part in (_fixed(low, high, split, 1), _fixed(low, high, split, 0)):
+            made += 1
+            heapq.heappush(heap, (least, made, *part))
+    return Proof(known.order, known.length, min([known.length, done, *(item[0] for item in heap)]))
+
+
+def _bounded(
+    relaxation: Relaxation, low: IntArray, high: IntArray, least: int, best: int
+) -> tuple[int, FloatArray]:
+    """A bound on the tours that use each edge from `low` to `high` times, and the relaxation's use of it."""
+    while True:
+        share = relaxation.solve(low, high)
+        least = max(least, relaxation.bound(low, high))
+        if best - least <= CLOSE or relaxation.solved >= SOLVE_LIMIT:
+            return least, share
+        cuts = violated_cuts(relaxation.points, relaxation.edges, share)
+        if not cuts:
+            return least, share
+        for cut in cuts:
+            relaxation.add(cut)
+
+
+def _fixed(low: IntArray, high: IntArray, edge: int, times: int) -> tuple[IntArray, IntArray]:
+    """The same limits with one edge used or left out."""
+    low, high = low.copy(), high.copy()
+    low[edge] = high[edge] = times
+    return low, high
+
+
+def _better(cost: IntArray, edges: IntArray, known: Proof) -> Proof:
+    """The tour made of `edges` if it is one and shorter than the best one known."""
+    graph = nx.Graph(edges.tolist())
+    ring = nx.is_connected(graph) and len(graph) == len(cost) and all(d == 2 for _, d in graph.degree)
+    if not ring:
+        return known
+    order = np.array([a for a, _ in nx.find_cycle(graph, 0)], dtype=np.int64)
+    length = length_of(cost, order)
+    return Proof(order, length, known.bound) if length < known.length else known
