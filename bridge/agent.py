@@ -7,8 +7,10 @@ least every second, its pose many times a second, and every event as soon as the
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import datetime
+from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
 
@@ -16,6 +18,7 @@ from bridge.clock import Clock
 from bridge.controller import Controller
 from bridge.inbox import Inbox
 from bridge.journal import Journal
+from bridge.keys import Untrusted, verified_holder
 from bridge.link import Link, Request
 from bridge.protocol import (
     CHUNK_BYTES,
@@ -23,10 +26,13 @@ from bridge.protocol import (
     MAX_DOCUMENT_BYTES,
     VERSION,
     Command,
+    Commit,
     Info,
     Keys,
     LogPage,
     Malformed,
+    Message,
+    Rejected,
     count_of,
     decode,
     encode,
@@ -35,12 +41,33 @@ from bridge.robots import Base, Scanner
 from mission import __version__
 from mission.events import PoseReport
 
+if TYPE_CHECKING:
+    from cryptography import x509
+
 STATE_EVERY_S = 1.0
 POSE_EVERY_S = 0.05
 LEAST_POSE_PAUSE_S = 0.02
 """However fast the simulated clock runs, poses go out at most fifty times a second."""
 POSES_KEPT = 3000
 EVENTS_KEPT = 1000
+
+
+Order = TypeVar("Order", Command, Commit)
+Trust = Callable[[Request, str], None]
+"""Raises `Untrusted` unless the request was signed by the commander whose name it bears."""
+
+
+def trusting(authority: x509.Certificate, now: Callable[[], datetime]) -> Trust:
+    """Trust in stations that the site's authority has issued keys to."""
+
+    def trust(request: Request, commander: str) -> None:
+        holder = verified_holder(authority, request.key, request.payload, request.signature, now=now())
+        if holder.role != "station":
+            raise Untrusted(f"{holder.name} is a {holder.role}; only stations give orders")
+        if holder.name != commander:
+            raise Untrusted(f"signed by {holder.name}, not by {commander}")
+
+    return trust
 
 
 class Agent:
@@ -58,6 +85,7 @@ class Agent:
         clock: Clock,
         command_clock: Clock,
         speed_up: float = 1.0,
+        trust: Trust | None = None,
     ) -> None:
         self._keys = keys
         self._link = link
@@ -69,6 +97,7 @@ class Agent:
         self._profiles = scanner.profiles
         self._pose_pause_s = max(POSE_EVERY_S / speed_up, LEAST_POSE_PAUSE_S)
         self._inbox = Inbox(journal, controller, scanner.profiles)
+        self._trust = trust
         self._closing = threading.Event()
         self._news = threading.Event()
         self._threads: list[threading.Thread] = []
@@ -120,7 +149,26 @@ class Agent:
 
     def _mission(self, request: Request) -> bytes:
         self._contact()
+        if request.key.endswith("/commit"):
+            return self._ordered(request, Commit, self._commit)
         return encode(self._inbox.receive(request))
+
+    def _commit(self, request: Request, commit: Commit) -> Message:
+        return self._inbox.receive(request)
+
+    def _ordered(
+        self, request: Request, kind: type[Order], carry_out: Callable[[Request, Order], Message]
+    ) -> bytes:
+        """Carry out what only a commander may order, if it is from the one it says it is from."""
+        try:
+            order = decode(request.payload, kind)
+            if self._trust is not None:
+                self._trust(request, order.commander)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            return encode(Malformed(message=f"{kind.__name__}: {error}"))
+        except Untrusted as error:
+            return encode(Rejected(reason="untrusted", messages=(str(error),)))
+        return encode(carry_out(request, order))
 
     def _info(self, request: Request) -> bytes:
         self._contact()
@@ -140,13 +188,12 @@ class Agent:
 
     def _command(self, request: Request) -> bytes:
         self._contact()
-        try:
-            command = decode(request.payload, Command)
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
-            return encode(Malformed(message=f"command: {error}"))
+        return self._ordered(request, Command, self._obey)
+
+    def _obey(self, request: Request, command: Command) -> Message:
         if not request.key.endswith(f"/cmd/{command.verb}"):
-            return encode(Malformed(message=f"command {command.verb} on {request.key}"))
-        return encode(self._controller.obey(command))
+            return Malformed(message=f"command {command.verb} on {request.key}")
+        return self._controller.obey(command)
 
     def _log(self, request: Request) -> bytes:
         self._contact()

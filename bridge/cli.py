@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,6 +34,9 @@ Timeout = Annotated[
 Insecure = Annotated[
     bool, typer.Option("--insecure", help="Allow addresses beyond this machine without keys.")
 ]
+KeyFolder = Annotated[
+    Path | None, typer.Option("--keys", metavar="DIR", help="Folder of the keys that stopgo keys issued.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 TakeOver = Annotated[bool, typer.Option("--take-over", help="Command it though somebody else does.")]
 StopId = Annotated[str | None, typer.Option("--stop", metavar="ID", help="The stop that is meant.")]
@@ -48,6 +52,7 @@ def add_commands(app: typer.Typer) -> None:
         app.command(name=verb)(order_of(verb))
     app.command()(status)
     app.command()(watch)
+    app.add_typer(key_commands(), name="keys")
 
 
 def robot(
@@ -71,6 +76,7 @@ def robot(
         typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="Let something go wrong, as slip@2=0.2."),
     ] = None,
     insecure: Insecure = False,
+    keys: KeyFolder = None,
 ) -> None:
     """Be a robot, with a simulated base and scanner, until SIGTERM.
 
@@ -82,7 +88,7 @@ def robot(
     options = RobotOptions(
         name=name, listen=listen, connect=connect, state=state, site=site, speed_up=speed_up,
         at=None if at is None else read_pose(at), insecure=insecure,
-        faults=Faults(tuple(read_fault(text) for text in fault or ())),
+        keys=keys, faults=Faults(tuple(read_fault(text) for text in fault or ())),
     )  # fmt: skip
     where = f"listens on {listen}" if connect is None else f"connects to {connect}"
     run_robot(options, ready=lambda: say(f"ready {name} {where}"))
@@ -98,6 +104,7 @@ def push(
     take_over: TakeOver = False,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
+    keys: KeyFolder = None,
     json_: Json = False,
 ) -> None:
     """Send a mission to a robot, and see it stored there whole, or rejected with the reasons.
@@ -108,7 +115,7 @@ def push(
 
     document = read(mission)
     with (
-        reached(robot, connect, site=site, who=who, timeout=timeout, insecure=insecure) as station,
+        reached(Way(robot, connect, site, who, timeout, insecure, keys)) as station,
         Bar("pushing") as bar,
     ):
         accepted = station.push(document, progress=bar.show)
@@ -129,6 +136,7 @@ def start(
     take_over: TakeOver = False,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
+    keys: KeyFolder = None,
     again: Annotated[bool, typer.Option("--again", help="Run a mission that was run before.")] = False,
     from_here: Annotated[
         bool, typer.Option("--from-here", help="Start at the nearest point of the route.")
@@ -139,7 +147,7 @@ def start(
 
     Example: stopgo start --robot r1 --connect tcp/127.0.0.1:7447
     """
-    with reached(robot, connect, site=site, who=who, timeout=timeout, insecure=insecure) as station:
+    with reached(Way(robot, connect, site, who, timeout, insecure, keys)) as station:
         answer = station.command("start", again=again, from_here=from_here, take_over=take_over)
     report_answer(answer, robot, json_)
 
@@ -169,9 +177,10 @@ def order_of(verb: Verb) -> Callable[..., None]:
         take_over: TakeOver = False,
         timeout: Timeout = 5.0,
         insecure: Insecure = False,
+        keys: KeyFolder = None,
         json_: Json = False,
     ) -> None:
-        with reached(robot, connect, site=site, who=who, timeout=timeout, insecure=insecure) as station:
+        with reached(Way(robot, connect, site, who, timeout, insecure, keys)) as station:
             answer = station.command(verb, stop=stop, take_over=take_over)
         report_answer(answer, robot, json_)
 
@@ -188,6 +197,7 @@ def status(
     site: Site = None,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
+    keys: KeyFolder = None,
     json_: Json = False,
 ) -> None:
     """Tell what the robot is doing, or what all robots of the site are.
@@ -197,10 +207,10 @@ def status(
     from bridge.station import fleet
 
     if robot is None:
-        reports = fleet(connect, site=site, timeout_s=timeout, insecure=insecure)
+        reports = fleet(connect, site=site, timeout_s=timeout, insecure=insecure, keys=keys)
         as_json: dict[str, Any] = {"robots": [status_json(report) for report in reports]}
     else:
-        with reached(robot, connect, site=site, who=None, timeout=timeout, insecure=insecure) as station:
+        with reached(Way(robot, connect, site, None, timeout, insecure, keys)) as station:
             reports = (station.status(),)
         as_json = status_json(reports[0])
     if json_:
@@ -211,6 +221,70 @@ def status(
 
 def status_json(report: StateReport) -> dict[str, Any]:
     return {key: getattr(report, key) for key in STATUS_KEYS}
+
+
+def key_commands() -> typer.Typer:
+    """`stopgo keys` with its verbs."""
+    commands = typer.Typer(
+        no_args_is_help=True,
+        help="Make a site's keys: an authority, and a certificate for every station, viewer and robot."
+        "\n\nExample: stopgo keys init site-keys && stopgo keys issue robot r1 --in site-keys",
+    )
+    commands.command("init")(keys_init)
+    commands.command("issue")(keys_issue)
+    commands.command("show")(keys_show)
+    return commands
+
+
+SiteFolder = Annotated[Path, typer.Option("--in", metavar="DIR", help="The site's folder of keys.")]
+
+
+def keys_init(folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder.")]) -> None:
+    """Make a site's authority; whoever has its folder can issue keys, so keep it off the robots.
+
+    Example: stopgo keys init site-keys
+    """
+    from bridge.keys import AUTHORITY, init_site, now_utc
+
+    init_site(folder, now=now_utc())
+    typer.echo(f"{folder / AUTHORITY}: the site's authority; keep it away from robots and stations")
+
+
+def keys_issue(
+    role: Annotated[str, typer.Argument(help="station, viewer or robot.")],
+    name: Annotated[str, typer.Argument(help="Who it is for; for a robot, its --name.")],
+    *,
+    folder: SiteFolder,
+    days: Annotated[int, typer.Option(min=1, max=825, help="How long they are valid.")] = 90,
+) -> None:
+    """Issue keys to a station, a viewer or a robot.
+
+    Example: stopgo keys issue station alice --in site-keys
+    """
+    from bridge.keys import ROLES, issue, now_utc
+
+    if role not in ROLES:
+        raise InputError(f"role {role!r}: one of {', '.join(ROLES)}")
+    files = issue(folder, role, name, now=now_utc(), days=days)
+    typer.echo(f"{files.folder}: keys of {role} {name} for {days} days; give it the folder as --keys")
+
+
+def keys_show(*, folder: SiteFolder, json_: Json = False) -> None:
+    """List who holds keys, and until when.
+
+    Example: stopgo keys show --in site-keys
+    """
+    from bridge.keys import holders, now_utc
+
+    found = holders(folder)
+    if json_:
+        keys = [{"role": who.role, "name": who.name, "not_after": who.not_after.isoformat()} for who in found]
+        print_json({"keys": keys})
+        return
+    for who in found:
+        left = (who.not_after - now_utc()).days
+        until = f"until {who.not_after:%Y-%m-%d}, {left} days" if left >= 0 else "expired"
+        typer.echo(f"{who.role:8} {who.name:20} {until}")
 
 
 STATUS_KEYS = (
@@ -225,6 +299,7 @@ def watch(
     site: Site = None,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
+    keys: KeyFolder = None,
     rrd: Annotated[
         Path | None, typer.Option("--rrd", metavar="FIELD.rrd", help="Record the run for Rerun.")
     ] = None,
@@ -239,7 +314,7 @@ def watch(
     from bridge.watch import Lines, Table, watch_showing
 
     with (
-        reached(robot, connect, site=site, who=None, timeout=timeout, insecure=insecure) as station,
+        reached(Way(robot, connect, site, None, timeout, insecure, keys)) as station,
         recording(rrd) as record,
     ):
         state = watch_showing(station, record, Table() if sys.stderr.isatty() else Lines(say))
@@ -257,12 +332,26 @@ def recording(path: Path | None) -> AbstractContextManager[Recording | None]:
     return FieldRecording(path, None)
 
 
-def reached(
-    robot: str, endpoint: str, *, site: str | None, who: str | None, timeout: float, insecure: bool
-) -> AbstractContextManager[Station]:
+@dataclass(frozen=True)
+class Way:
+    """How a robot is to be reached, and by whom."""
+
+    robot: str
+    endpoint: str
+    site: str | None
+    who: str | None
+    timeout_s: float
+    insecure: bool
+    keys: Path | None
+
+
+def reached(way: Way) -> AbstractContextManager[Station]:
     from bridge.station import connect
 
-    return connect(endpoint, robot=robot, site=site, commander=who, timeout_s=timeout, insecure=insecure)
+    return connect(
+        way.endpoint, robot=way.robot, site=way.site, commander=way.who,
+        timeout_s=way.timeout_s, insecure=way.insecure, keys=way.keys,
+    )  # fmt: skip
 
 
 def report_answer(answer: Answer, robot: str, json_: bool) -> None:

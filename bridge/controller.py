@@ -93,7 +93,7 @@ class Controller:
         if kept.state == "READY" and self._mission is not None:
             self._mission_taken(self._mission)
         change = runs.rebooted(kept)
-        if change.run != kept:
+        if change.events:
             self._keep(change)
 
     def _stored(self, mission_id: str | None, revision: int | None) -> Mission | None:
@@ -168,18 +168,29 @@ class Controller:
             if isinstance(lease, Denied):
                 return Rejected(reason=lease.reason, messages=(lease.message,))
             current = (self._run.mission_id, self._run.revision) == (mission.id, mission.revision)
-            if not current and not self._run.over:
-                message = f"the robot is {self._run.state} with mission {self._run.mission_id}"
-                return Rejected(reason="running", messages=(message,))
+            refused = self._out_of_time(commit, current)
+            if refused:
+                return Rejected(reason=refused.reason, messages=(refused.message,))
             run = self._run if current else runs.installed(self._run, mission)
             with self._journal.transaction():
                 self._journal.keep_transfer(commit.manifest)
+                self._journal.store_nonce(commit.nonce, mission.digest)
                 self._store_lease(lease)
                 self._write(Change(run, handed_over(before, lease)))
             if not current:
                 self._mission = mission
                 self._mission_taken(mission)
                 self._adopt(run, ordered=True)
+        return None
+
+    def _out_of_time(self, commit: Commit, current: bool) -> Refused | None:
+        """Why a commit comes too late, or at the wrong time."""
+        if self._command_clock.now_ns() > commit.not_after_ns:
+            return Refused("expired", "the commit is older than it allows; push again")
+        if not current and self._journal.nonce(commit.nonce) is not None:
+            return Refused("replayed", "this commit was taken before, and another mission since; push again")
+        if not current and not self._run.over:
+            return Refused("running", f"the robot is {self._run.state} with mission {self._run.mission_id}")
         return None
 
     def hear_of_link(self, silent_s: float) -> None:

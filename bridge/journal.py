@@ -30,6 +30,7 @@ CREATE TABLE IF NOT EXISTS answers (cmd_id TEXT PRIMARY KEY, order_sha TEXT NOT 
 CREATE TABLE IF NOT EXISTS missions (
     mission_id TEXT NOT NULL, revision INTEGER NOT NULL, manifest BLOB NOT NULL, document BLOB NOT NULL,
     PRIMARY KEY (mission_id, revision));
+CREATE TABLE IF NOT EXISTS nonces (nonce TEXT PRIMARY KEY, digest TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS transfers (mission_id TEXT PRIMARY KEY, manifest BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS chunks (
     sha256 TEXT NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL, PRIMARY KEY (sha256, number));
@@ -155,6 +156,14 @@ class Journal:
                     self.chunks(manifest.sha256),
                 )
             self.end_transfer(manifest)
+
+    def nonce(self, nonce: str) -> str | None:
+        """The digest of the mission that was committed with it before."""
+        rows = self._rows("SELECT digest FROM nonces WHERE nonce = ?", nonce)
+        return str(rows[0][0]) if rows else None
+
+    def store_nonce(self, nonce: str, digest: str) -> None:
+        self._write("INSERT OR IGNORE INTO nonces VALUES (?, ?)", nonce, digest)
 
     def transfer(self, mission_id: str) -> Manifest | None:
         """What is being received of this mission."""

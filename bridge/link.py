@@ -17,6 +17,7 @@ class Request:
     key: str
     payload: bytes
     parameters: Mapping[str, str] = field(default_factory=dict)
+    signature: bytes = b""
 
 
 Answering = Callable[[Request], bytes]
@@ -45,6 +46,7 @@ class Link(Protocol):
         timeout_s: float,
         parameters: Mapping[str, str] | None = None,
         bulk: bool = False,
+        signature: bytes = b"",
     ) -> bytes | None:
         """The answer of the one who serves `key`, or `None` if none came in time."""
 
@@ -110,12 +112,13 @@ class MemoryLink:
         timeout_s: float,
         parameters: Mapping[str, str] | None = None,
         bulk: bool = False,
+        signature: bytes = b"",
     ) -> bytes | None:
         if self._board.cut:
             return None
         for pattern, answer in self._board.serving.items():
             if matches(pattern, key):
-                return answer(Request(key, payload, parameters or {}))
+                return answer(Request(key, payload, parameters or {}, signature))
         return None
 
     def ask_all(self, key: str, *, timeout_s: float) -> list[bytes]:

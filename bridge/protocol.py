@@ -35,7 +35,7 @@ Reason = Literal[
     "malformed", "expired", "id_reused", "wrong_state", "wrong_run", "wrong_mission", "no_mission",
     "finished_before", "not_at_start", "off_route", "not_at_stop", "not_the_commander", "fenced",
     "running", "revision_taken", "older_revision", "too_large", "incomplete", "digest", "infeasible",
-    "storage",
+    "storage", "untrusted", "replayed",
 ]  # fmt: skip
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
@@ -167,6 +167,9 @@ class Commit(Message, frozen=True):
 
     manifest: Manifest
     commander: Word
+    nonce: Word
+    """Taken once: the same commit may be sent again, but not to undo a later one."""
+    not_after_ns: int
     fence: Count | None = None
     take_over: bool = False
 
@@ -242,6 +245,9 @@ class LogPage(Message, frozen=True):
     events: tuple[AnyEvent, ...]
     newest: int
 
+
+Reply = Info | Ready | ChunkHeld | Accepted | Rejected | Answer | LogPage | MissionPart | Malformed
+"""Everything a robot answers with."""
 
 M = TypeVar("M")
 

@@ -11,13 +11,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridge.agent import Agent, on_link
+from bridge import keys as key_files
+from bridge.access import access_control
+from bridge.agent import Agent, on_link, trusting
 from bridge.clock import WallClock
 from bridge.controller import Controller
 from bridge.journal import open_journal
 from bridge.link import Link
 from bridge.protocol import Keys
 from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner
+from mission.errors import InputError
 from mission.events import Pose
 
 
@@ -35,28 +38,31 @@ class RobotOptions:
     at: Pose | None = None
     """Where the simulated robot stands; else where it last stood, or its first mission's start."""
     insecure: bool = False
+    keys: Path | None = None
+    """Folder with the robot's keys; required beyond this machine."""
     faults: Faults = NO_FAULTS
     """What the simulated robot is to get wrong."""
 
 
 def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     """Be a robot until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
-    from bridge.zenoh_link import joining, listening
+    from bridge.zenoh_link import Guard, joining, listening
 
     signal.signal(signal.SIGTERM, _leave)
     keys = Keys(options.name, options.site)
-    if options.connect is None:
-        opened = listening(options.listen, insecure=options.insecure)
-    else:
-        opened = joining(options.connect, insecure=options.insecure)
-    with opened as link, robot_on(link, keys, options):
+    held = None if options.keys is None else robots_keys(options.keys, options.name)
+    guard = Guard(held, options.insecure, None if held is None else access_control(keys))
+    opened = joining(options.connect, guard) if options.connect else listening(options.listen, guard)
+    with opened as link, robot_on(link, keys, options, held):
         ready()
         threading.Event().wait()
 
 
 @contextmanager
-def robot_on(link: Link, keys: Keys, options: RobotOptions) -> Iterator[Agent]:
-    """A simulated robot on `link`."""
+def robot_on(
+    link: Link, keys: Keys, options: RobotOptions, held: key_files.Keys | None = None
+) -> Iterator[Agent]:
+    """A simulated robot on `link`; with keys of its own it obeys only what stations have signed."""
     with open_journal(options.state, options.name) as journal:
         # A sped-up clock may have run ahead of the wall's: after a reboot it goes on from there.
         wall = WallClock()
@@ -73,9 +79,20 @@ def robot_on(link: Link, keys: Keys, options: RobotOptions) -> Iterator[Agent]:
         agent = Agent(
             keys=keys, link=link, journal=journal, controller=controller, base=base, scanner=scanner,
             clock=clock, command_clock=wall, speed_up=options.speed_up,
+            trust=None if held is None else trusting(held.authority, key_files.now_utc),
         )  # fmt: skip
         with on_link(agent):
             yield agent
+
+
+def robots_keys(folder: Path, name: str) -> key_files.Keys:
+    """The robot's own keys; anybody else's are refused."""
+    held = key_files.read_keys(folder, now=key_files.now_utc())
+    if (held.holder.role, held.holder.name) != ("robot", name):
+        raise InputError(
+            f"--keys {folder}: are those of {held.holder.role} {held.holder.name}, not of robot {name}"
+        )
+    return held
 
 
 def crashing(faults: Faults) -> Callable[[str], None]:

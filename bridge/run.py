@@ -96,15 +96,9 @@ def rebooted(run: Run) -> Change:
     if run.over:
         return Change(run)
     stop_state = "VERIFYING" if run.stop_state == "VERIFYING" else "WAITING"
-    halted = changed(
-        run,
-        state="PAUSED",
-        stop_state=stop_state,
-        reason="reboot",
-        homing=run.homing or run.state == "HOMING",
-    )
-    if run.state == "PAUSED":
-        return Change(changed(halted, reason=run.reason))
+    reason = run.reason if run.state == "PAUSED" else "reboot"
+    homing = run.homing or run.state == "HOMING"
+    halted = changed(run, state="PAUSED", stop_state=stop_state, reason=reason, homing=homing)
     return Change(halted, (partial(Paused, reason="reboot"),))
 
 

@@ -14,11 +14,14 @@ import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from bridge import follow
+from bridge.keys import Keys as HeldKeys
+from bridge.keys import now_utc, read_keys
 from bridge.lease import FREE_VERBS
 from bridge.link import Link
 from bridge.protocol import (
@@ -31,13 +34,13 @@ from bridge.protocol import (
     Commit,
     Info,
     Keys,
-    LogPage,
     Malformed,
     Manifest,
     Message,
     MissionPart,
     Ready,
     Rejected,
+    Reply,
     Verb,
     decode,
     encode,
@@ -53,10 +56,10 @@ PAUSE_S = 0.05
 """Between tries: a query just after a reconnect may come back empty at once."""
 GATHER_S = 0.3
 """Once one robot of a fleet has shown itself, the others get this long."""
+COMMIT_VALID_S = 60.0
 TRIES_S = 10.0
 """How long the steps of a push are tried, each."""
 
-Reply = Info | Ready | ChunkHeld | Accepted | Rejected | Answer | LogPage | MissionPart | Malformed
 Progress = Callable[[int, int], None]
 """Called with bytes held by the robot and bytes in all."""
 
@@ -70,25 +73,36 @@ def connect(
     commander: str | None = None,
     timeout_s: float = 5.0,
     insecure: bool = False,
+    keys: Path | None = None,
 ) -> Iterator[Station]:
     """A robot that has been reached at `endpoint`, such as `tcp/127.0.0.1:7447`.
+
+    With `keys`, a folder made by `stopgo keys`, the commander is the one they were issued to.
 
     Raises
     ------
     RobotUnreachable
         If the robot did not show itself within `timeout_s`; nothing was sent.
     """
-    from bridge.zenoh_link import connecting
+    from bridge.zenoh_link import Guard, connecting
 
-    keys = Keys(robot, site)
-    with connecting(endpoint, insecure=insecure) as link:
-        station = Station(link, keys, commander=commander or whoami(), timeout_s=timeout_s)
+    held = None if keys is None else read_keys(keys, now=now_utc())
+    who = commander or (held.holder.name if held else whoami())
+    if held and who != held.holder.name:
+        raise InputError(f"--as {who}: the keys in {keys} are those of {held.holder.name}")
+    with connecting(endpoint, Guard(held, insecure)) as link:
+        station = Station(link, Keys(robot, site), commander=who, timeout_s=timeout_s, held=held)
         station.reach(endpoint)
         yield station
 
 
 def fleet(
-    endpoint: str, *, site: str | None = None, timeout_s: float = 5.0, insecure: bool = False
+    endpoint: str,
+    *,
+    site: str | None = None,
+    timeout_s: float = 5.0,
+    insecure: bool = False,
+    keys: Path | None = None,
 ) -> tuple[StateReport, ...]:
     """The state of every robot of the site that can be reached through `endpoint`, by name.
 
@@ -97,9 +111,10 @@ def fleet(
     RobotUnreachable
         If not a single robot showed itself within `timeout_s`.
     """
-    from bridge.zenoh_link import connecting
+    from bridge.zenoh_link import Guard, connecting
 
-    with connecting(endpoint, insecure=insecure) as link:
+    held = None if keys is None else read_keys(keys, now=now_utc())
+    with connecting(endpoint, Guard(held, insecure)) as link:
         station = Station(link, Keys("*", site), commander=whoami(), timeout_s=timeout_s)
         station.reach(endpoint)
         time.sleep(GATHER_S)
@@ -115,8 +130,17 @@ def whoami() -> str:
 class Station:
     """One robot, seen from here."""
 
-    def __init__(self, link: Link, keys: Keys, *, commander: str, timeout_s: float = 5.0) -> None:
+    def __init__(
+        self,
+        link: Link,
+        keys: Keys,
+        *,
+        commander: str,
+        timeout_s: float = 5.0,
+        held: HeldKeys | None = None,
+    ) -> None:
         self.link = link
+        self._held = held
         self.keys = keys
         self.commander = commander
         self.timeout_s = timeout_s
@@ -159,6 +183,7 @@ class Station:
         OutcomeUnknown
             If the robot stopped answering; pushing again goes on where this ended.
         """
+        self._may_order("push")
         document = msgspec.json.encode(mission)
         manifest = Manifest(
             mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
@@ -166,10 +191,11 @@ class Station:
         )  # fmt: skip
         begun = self._step(manifest, "begin", encode(manifest), Ready)
         self._send_chunks(manifest, document, set(begun.held), progress)
-        lease = self.info().lease
+        info = self.info()
         commit = Commit(
-            manifest=manifest, commander=self.commander, take_over=take_over,
-            fence=lease.fence if lease else None,
+            manifest=manifest, commander=self.commander, take_over=take_over, nonce=uuid.uuid4().hex,
+            not_after_ns=info.clock_ns + round(COMMIT_VALID_S * 1e9),
+            fence=info.lease.fence if info.lease else None,
         )  # fmt: skip
         accepted = self._step(manifest, "commit", encode(commit), Accepted)
         self._read_back(manifest)
@@ -215,7 +241,14 @@ class Station:
         OutcomeUnknown
             If no answer came: the order may or may not have been carried out.
         """
+        self._may_order(verb)
         return self.give(self.order(verb, **details))
+
+    def _may_order(self, what: str) -> None:
+        """Viewers are told here; the robot would not even answer them."""
+        if self._held is not None and self._held.holder.role != "station":
+            holder = self._held.holder
+            raise AnswerIsNo(f"{what}: {holder.name} is a {holder.role}, and only stations give orders")
 
     def give(self, order: Command) -> Answer:
         """Give an order that was written before; given again it is still carried out once."""
@@ -278,8 +311,16 @@ class Station:
     ) -> bytes | None:
         """Ask the same thing until it is answered or the time is up."""
         deadline = time.monotonic() + within_s
+        signature = b"" if self._held is None or bulk else self._held.sign(key, payload)
         while (left := deadline - time.monotonic()) > 0:
-            reply = self.link.ask(key, payload, timeout_s=min(TRY_S, left), parameters=parameters, bulk=bulk)
+            reply = self.link.ask(
+                key,
+                payload,
+                timeout_s=min(TRY_S, left),
+                parameters=parameters,
+                bulk=bulk,
+                signature=signature,
+            )
             if reply is not None:
                 return reply
             time.sleep(min(PAUSE_S, left))

@@ -12,16 +12,20 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import zenoh
 import zenoh.ext
 
+from bridge.keys import Keys
 from bridge.link import Answering, Hearing, Presence, Publish, Request
 from mission.errors import InputError
 
 LEASE_MS = 2000
 MAX_MESSAGE_BYTES = 1_000_000
+OPEN = ("tcp", "udp", "ws")
+ENCRYPTED = ("tls", "quic")
 JSON = zenoh.Encoding.APPLICATION_JSON
 
 COMMON: dict[str, Any] = {
@@ -36,30 +40,44 @@ COMMON: dict[str, Any] = {
 RETRY = {"period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 1.5}
 
 
+@dataclass(frozen=True)
+class Guard:
+    """How a link is guarded: by keys, or by staying on this machine, or knowingly not at all."""
+
+    keys: Keys | None = None
+    insecure: bool = False
+    access: dict[str, Any] | None = None
+    """zenoh's access control, at the end that is asked."""
+
+
+UNGUARDED = Guard()
+"""Good for this machine only."""
+
+
 @contextmanager
-def listening(endpoint: str, *, insecure: bool = False) -> Iterator[ZenohLink]:
+def listening(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
     """A link on which others connect to `endpoint`, such as `tcp/127.0.0.1:7447`; it routes between them."""
-    check_endpoint(endpoint, option="--listen", insecure=insecure)
-    with _opened({"mode": "router", "listen/endpoints": [endpoint]}, endpoint) as link:
+    check_endpoint(endpoint, guard, option="--listen")
+    with _opened({"mode": "router", "listen/endpoints": [endpoint]}, endpoint, guard) as link:
         yield link
 
 
 @contextmanager
-def joining(endpoint: str, *, insecure: bool = False) -> Iterator[ZenohLink]:
+def joining(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
     """A robot's link to the router at `endpoint`, which stations connect to as well.
 
     The robot is a router too: a router does not carry between two peers that it takes for neighbours.
     """
-    check_endpoint(endpoint, option="--connect", insecure=insecure)
-    with _opened({"mode": "router", **_reaching(endpoint)}, endpoint) as link:
+    check_endpoint(endpoint, guard, option="--connect")
+    with _opened({"mode": "router", **_reaching(endpoint)}, endpoint, guard) as link:
         yield link
 
 
 @contextmanager
-def connecting(endpoint: str, *, insecure: bool = False) -> Iterator[ZenohLink]:
+def connecting(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
     """A station's link to `endpoint`; returned at once, it connects, again and again, in the background."""
-    check_endpoint(endpoint, option="--connect", insecure=insecure)
-    with _opened({"mode": "peer", **_reaching(endpoint)}, endpoint) as link:
+    check_endpoint(endpoint, guard, option="--connect")
+    with _opened({"mode": "peer", **_reaching(endpoint)}, endpoint, guard) as link:
         yield link
 
 
@@ -68,12 +86,31 @@ def _reaching(endpoint: str) -> dict[str, Any]:
             "connect/exit_on_failure": False}  # fmt: skip
 
 
+def _guarding(guard: Guard) -> dict[str, Any]:
+    """What zenoh must be told of keys and access; each setting is refused at opening if it cannot be."""
+    settings: dict[str, Any] = {} if guard.access is None else {"access_control": guard.access}
+    if guard.keys is None:
+        return settings
+    files, tls = guard.keys.files, "transport/link/tls"
+    return settings | {
+        f"{tls}/root_ca_certificate": str(files.authority),
+        f"{tls}/enable_mtls": True,
+        # Robots have addresses, not names; what they are is in their certificates' roles.
+        f"{tls}/verify_name_on_connect": False,
+        f"{tls}/close_link_on_expiration": True,
+        f"{tls}/listen_certificate": str(files.certificate),
+        f"{tls}/listen_private_key": str(files.key),
+        f"{tls}/connect_certificate": str(files.certificate),
+        f"{tls}/connect_private_key": str(files.key),
+    }
+
+
 @contextmanager
-def _opened(settings: dict[str, Any], endpoint: str) -> Iterator[ZenohLink]:
+def _opened(settings: dict[str, Any], endpoint: str, guard: Guard) -> Iterator[ZenohLink]:
     config = zenoh.Config()
-    for key, value in {**COMMON, **settings}.items():
-        config.insert_json5(key, json.dumps(value))
     try:
+        for key, value in {**COMMON, **settings, **_guarding(guard)}.items():
+            config.insert_json5(key, json.dumps(value))
         session = zenoh.open(config)
     except zenoh.ZError as error:
         raise InputError(f"{endpoint}: cannot be opened ({_short(error)}); is the address free?") from None
@@ -97,7 +134,8 @@ class ZenohLink:
         def answered(query: zenoh.Query) -> None:
             with query:
                 payload = b"" if query.payload is None else query.payload.to_bytes()
-                request = Request(str(query.key_expr), payload, _parameters(query.parameters))
+                signature = b"" if query.attachment is None else query.attachment.to_bytes()
+                request = Request(str(query.key_expr), payload, _parameters(query.parameters), signature)
                 query.reply(query.key_expr, answer(request), encoding=JSON)
 
         self._declared.append(self._session.declare_queryable(key, answered, complete=True))
@@ -126,12 +164,14 @@ class ZenohLink:
         timeout_s: float,
         parameters: Mapping[str, str] | None = None,
         bulk: bool = False,
+        signature: bytes = b"",
     ) -> bytes | None:
         selector = zenoh.Selector(key, dict(parameters or {}))
         priority = zenoh.Priority.BACKGROUND if bulk else zenoh.Priority.INTERACTIVE_HIGH
         replies = self._session.get(
             selector,
             payload=payload,
+            attachment=signature or None,
             encoding=JSON,
             target=zenoh.QueryTarget.ALL_COMPLETE,
             consolidation=zenoh.ConsolidationMode.NONE,
@@ -179,8 +219,8 @@ class ZenohLink:
         self._declared.clear()
 
 
-def check_endpoint(endpoint: str, *, option: str, insecure: bool) -> None:
-    """Refuse what is not an endpoint, and addresses beyond this machine unless `insecure`.
+def check_endpoint(endpoint: str, guard: Guard, *, option: str) -> None:
+    """Refuse what is not an endpoint, and one that is not guarded as it should be.
 
     Raises
     ------
@@ -190,11 +230,16 @@ def check_endpoint(endpoint: str, *, option: str, insecure: bool) -> None:
     protocol, _, rest = endpoint.partition("/")
     address = rest.partition("?")[0].partition("#")[0]
     host, _, port = address.rpartition(":")
-    if protocol not in ("tcp", "udp", "ws", "tls", "quic") or not host or not port.isdecimal():
+    if protocol not in (*OPEN, *ENCRYPTED) or not host or not port.isdecimal():
         raise InputError(f"{option} {endpoint}: not an endpoint; write it like tcp/127.0.0.1:7447")
-    if not insecure and not is_loopback(host):
+    if guard.keys is None and protocol in ENCRYPTED:
+        raise InputError(f"{option} {endpoint}: {protocol} needs --keys DIR; make them with stopgo keys")
+    if guard.keys is not None and protocol in OPEN:
+        raise InputError(f"{option} {endpoint}: {protocol} cannot carry keys; write it like tls/{address}")
+    if guard.keys is None and not guard.insecure and not is_loopback(host):
         raise InputError(
-            f"{option} {endpoint}: leaves this machine without keys; use 127.0.0.1, or add --insecure"
+            f"{option} {endpoint}: leaves this machine without keys; use 127.0.0.1, tls/ with --keys DIR,"
+            " or add --insecure"
         )
 
 

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from bridge.link import Request
-from bridge.protocol import CHUNK_BYTES, Accepted, Commit, Malformed, Manifest, Ready, Rejected, encode
+from bridge.protocol import CHUNK_BYTES, Accepted, Malformed, Manifest, Ready, Rejected, encode
 from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, OutcomeUnknown
 from tests.bridge.world import Field, corridor
@@ -88,7 +88,7 @@ def test_a_commit_without_every_chunk_is_rejected() -> None:
     field, mission = Field(), corridor()
     manifest = manifest_of(mission, msgspec.json.encode(mission))
     asked(field, mission, "begin", encode(manifest))
-    answer = asked(field, mission, "commit", encode(Commit(manifest=manifest, commander="test")))
+    answer = asked(field, mission, "commit", encode(field.commit(manifest)))
     assert isinstance(answer, Rejected)
     assert answer.reason == "incomplete"
     assert field.controller.run.state == "IDLE"
@@ -107,7 +107,7 @@ def test_a_document_that_is_not_what_it_claims_is_rejected(document: bytes, reas
     manifest = manifest_of(mission, document)
     asked(field, mission, "begin", encode(manifest))
     asked(field, mission, "chunk/0", document, of=manifest.sha256)
-    answer = asked(field, mission, "commit", encode(Commit(manifest=manifest, commander="test")))
+    answer = asked(field, mission, "commit", encode(field.commit(manifest)))
     assert isinstance(answer, Rejected)
     assert answer.reason == reason
 

@@ -14,7 +14,7 @@ import pytest
 from bridge.follow import Report
 from bridge.spawn import end_robot, free_port, robot_process, start_robot
 from bridge.station import connect
-from bridge.zenoh_link import check_endpoint
+from bridge.zenoh_link import Guard, check_endpoint
 from mission.errors import InputError, RobotUnreachable
 from mission.events import Finished, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor
@@ -128,14 +128,14 @@ def test_a_session_that_is_open_does_not_keep_the_interpreter() -> None:
 @pytest.mark.parametrize("endpoint", ["tcp/0.0.0.0:7447", "tcp/10.1.2.3:7447", "udp/[::]:7447"])
 def test_addresses_beyond_this_machine_are_refused_unless_insecure(endpoint: str) -> None:
     with pytest.raises(InputError, match="--insecure"):
-        check_endpoint(endpoint, option="--listen", insecure=False)
-    check_endpoint(endpoint, option="--listen", insecure=True)
+        check_endpoint(endpoint, Guard(), option="--listen")
+    check_endpoint(endpoint, Guard(insecure=True), option="--listen")
 
 
 @pytest.mark.parametrize("endpoint", ["", "127.0.0.1:7447", "tcp/127.0.0.1", "serial//dev/ttyS0"])
 def test_what_is_no_endpoint_is_named(endpoint: str) -> None:
     with pytest.raises(InputError, match="not an endpoint"):
-        check_endpoint(endpoint, option="--connect", insecure=True)
+        check_endpoint(endpoint, Guard(insecure=True), option="--connect")
 
 
 def test_threads_end_with_the_link() -> None:

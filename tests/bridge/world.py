@@ -104,7 +104,8 @@ class Field:
         return Station(self.board.link(), self.keys, commander="test", timeout_s=0.3)
 
     def commit(self, manifest: Manifest) -> Commit:
-        return Commit(manifest=manifest, commander="test")
+        not_after_ns = self.clock.now_ns() + 10**15
+        return Commit(manifest=manifest, commander="test", nonce="n1", not_after_ns=not_after_ns)
 
     def order(self, verb: Verb, **details: Any) -> Answer:
         return self.controller.obey(self.command(verb, **details))

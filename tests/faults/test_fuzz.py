@@ -9,8 +9,7 @@ import msgspec
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bridge.protocol import Command, Malformed, encode
-from bridge.station import Reply
+from bridge.protocol import Command, Malformed, Reply, encode
 from tests.bridge.test_push import manifest_of
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
@@ -100,7 +99,7 @@ def test_no_payload_on_any_key_brings_the_robot_down() -> None:
     station.push(MISSION)
 
     @settings(
-        max_examples=size(short=1500, full=30_000),
+        max_examples=size(short=1000, full=30_000),
         deadline=None,
         derandomize=True,
         database=None,

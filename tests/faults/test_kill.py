@@ -171,6 +171,7 @@ def check(folder: Path, paused: int) -> None:
     assert [event.stop for event in events if isinstance(event, Scanned)] == ["s1", "s2", "s3"]
     ordered = [event for event in events if isinstance(event, Paused) and event.reason == "pause by trial"]
     assert len(ordered) == paused
+    # A boot that died before it could say so leaves no event, but it has scanned nothing either.
     reboots = sum(isinstance(event, Paused) and event.reason == "reboot" for event in events)
     scans = Counter(
         line.split("-")[1] for line in (folder / "scans.log").read_text().splitlines() if "end" in line
@@ -180,7 +181,7 @@ def check(folder: Path, paused: int) -> None:
 
 
 def test_kills_of_the_robot_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
-    outcomes = [trial(seed, tmp_path / str(seed)) for seed in range(size(short=8, full=300))]
+    outcomes = [trial(seed, tmp_path / str(seed)) for seed in range(size(short=6, full=300))]
     kills, orders = sum(item.kills for item in outcomes), sum(item.orders for item in outcomes)
     unknown = sum(item.unknown for item in outcomes)
     print(f"{len(outcomes)} trials: {kills} kills, {orders} orders, each given twice; {unknown} unknown")
