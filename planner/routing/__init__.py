@@ -17,14 +17,15 @@ from mission.errors import AnswerIsNo, InputError
 from mission.geometry import FloatArray, IntArray, frozen, polyline_length
 from mission.planning import NavigableSpace, Route, Selection
 from planner.connected import parts_of
+from planner.routing.colony import ant_colony
 from planner.routing.proof import proved
 from planner.routing.roadmap import Ways, ways_between
 from planner.routing.tour import NANOMETRES, nanometres, shortest_tour
 from planner.shapes import local_origin, to_shape
 
 Router = Callable[..., IntArray]
-ROUTERS: dict[str, Router] = {"default": shortest_tour}
-METHODS = {"default": "2-opt, Or-opt, iterated"}
+ROUTERS: dict[str, Router] = {"default": shortest_tour, "aco": ant_colony}
+METHODS = {"default": "2-opt, Or-opt, iterated", "aco": "ant colony"}
 Graph = Callable[[NavigableSpace, FloatArray], Ways]
 GRAPHS: dict[str, Graph] = {"exact": ways_between}
 
