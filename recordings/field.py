@@ -9,6 +9,7 @@ from types import TracebackType
 from typing import Any
 
 from mission.document import Mission
+from mission.errors import InputError
 from mission.events import AnyEvent, PoseReport, StateReport
 from recordings.canvas import Canvas, Sheet, mission_origin, must_be_writable, open_canvas
 from recordings.compact import compact
@@ -44,7 +45,11 @@ class FieldRecording:
         return self
 
     def mission(self, mission: Mission) -> None:
-        """Take the mission that is driven; of a second one of the same id the stops are drawn anew."""
+        """Take the mission that is driven; of another revision of it the stops are drawn anew."""
+        if self._mission is not None and self._mission.id != mission.id:
+            raise InputError(
+                f"{self.path}: is of mission {self._mission.id}, not {mission.id}: use another file"
+            )
         self._mission = mission
         if self._canvas is None:
             self._begin(mission)

@@ -52,13 +52,9 @@ def check(path: Path) -> Contents:
     timelines: set[str] = set()
     properties: dict[str, dict[str, Any]] = {}
     for chunk in chunks(path, reader):
-        entity = str(chunk.entity_path)
-        counts[entity] += chunk.num_rows
+        counts[str(chunk.entity_path)] += chunk.num_rows
         timelines.update(chunk.timeline_names)
-        if entity.startswith(entities.PROPERTIES + "/"):
-            name = entity.rpartition("/")[2]
-            for _, values in rows(chunk):
-                properties.setdefault(name, {}).update(values)
+        _take_property(properties, chunk)
     return Contents(
         application=stores[0].application_id,
         recording_id=stores[0].recording_id,
@@ -106,6 +102,13 @@ _INDEXES = (entities.STEP, entities.CANDIDATE, entities.MISSION_TIME, entities.R
 
 def _bare(cell: list[Any]) -> Any:
     return cell[0] if len(cell) == 1 else cell
+
+
+def _take_property(properties: dict[str, dict[str, Any]], chunk: Chunk) -> None:
+    parent, _, name = str(chunk.entity_path).rpartition("/")
+    if parent == entities.PROPERTIES:
+        for _, values in rows(chunk):
+            properties.setdefault(name, {}).update(values)
 
 
 def _open(path: Path) -> tuple[RrdReader, list[StoreEntry]]:

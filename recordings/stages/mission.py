@@ -5,8 +5,11 @@ Plan and field recordings both draw it, at the same entities.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from mission.document import Mission
 from mission.geometry import bounds
@@ -19,7 +22,11 @@ from recordings.robot import draw_robot, quaternions
 from recordings.stages.drive import Drive
 
 ABOVE_FLOOR = 0.05
+"""How high above the floor 3D lines lie, in metres, so that the floor does not hide them."""
 ARROW = 0.6
+"""Length of a stop's heading, in metres."""
+HEAD = 1.5
+"""Height of the marks on stops in 3D, in metres."""
 
 
 def draw_mission(canvas: Canvas, mission: Mission) -> None:
@@ -93,26 +100,29 @@ def _draw_stops(canvas: Canvas, mission: Mission) -> None:
     xy = canvas.local(np.array([(stop.x, stop.y) for stop in mission.stops]))
     labels = [stop.id for stop in mission.stops]
     colours = [palette.DOORWAY if stop.doorway else palette.STOP for stop in mission.stops]
-    heading = np.array([stop.heading for stop in mission.stops])
-    facing = ARROW * np.stack([np.cos(heading), np.sin(heading)], axis=1)
     points = rr.Points2D(
         xy, labels=labels, colors=colours, radii=on_screen(5), show_labels=True, draw_order=ORDER["stop"]
     )
-    details = rr.AnyValues(
+    canvas.show(entities.STOPS, points, _details(mission))
+    canvas.show(entities.HEADINGS, _headings(xy, mission))
+    heads = strokes.level(xy, HEAD)
+    canvas.show(entities.WORLD_STOPS, rr.Points3D(heads, labels=labels, colors=colours, radii=0.12))
+    poles = np.stack([strokes.level(xy, 0.0), heads], axis=1)
+    canvas.show(entities.POLES, rr.LineStrips3D(poles, colors=palette.STOP, radii=0.02))
+
+
+def _details(mission: Mission) -> rr.AnyValues:
+    """What pointing at a stop tells."""
+    return rr.AnyValues(
         doorway=[stop.doorway for stop in mission.stops],
         units=[stop.sees.units for stop in mission.stops],
         new_units=[stop.sees.new_units for stop in mission.stops],
     )
-    canvas.show(entities.STOPS, points, details)
-    arrows = rr.Arrows2D(
-        origins=xy,
-        vectors=facing,
-        colors=palette.STOP,
-        radii=on_screen(1.5),
-        draw_order=ORDER["stop"],
+
+
+def _headings(xy: NDArray[Any], mission: Mission) -> rr.Arrows2D:
+    heading = np.array([stop.heading for stop in mission.stops])
+    facing = ARROW * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    return rr.Arrows2D(
+        origins=xy, vectors=facing, colors=palette.STOP, radii=on_screen(1.5), draw_order=ORDER["stop"]
     )
-    canvas.show(entities.HEADINGS, arrows)
-    poles = rr.Points3D(strokes.level(xy, 1.5), labels=labels, colors=colours, radii=0.12)
-    canvas.show(entities.WORLD_STOPS, poles)
-    legs = np.stack([strokes.level(xy, 0.0), strokes.level(xy, 1.5)], axis=1)
-    canvas.show(entities.POLES, rr.LineStrips3D(legs, colors=palette.STOP, radii=0.02))

@@ -43,6 +43,15 @@ def components(path: Path) -> dict[str, tuple[set[str], set[str]]]:
     return found
 
 
+def everything(path: Path) -> list[str]:
+    """Every cell of the recording as text, in an order of its own."""
+    found = []
+    for entity, names in components(path).items():
+        for component in sorted(set().union(*names)):
+            found += [f"{entity} {component} {cell}" for cell in cells(path, entity, component)]
+    return sorted(found)
+
+
 def _cells(chunk: Any, component: str) -> list[Cell]:
     batch = chunk.to_record_batch()
     if component not in batch.schema.names:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -112,6 +113,14 @@ def test_the_mission_may_be_told_again(tmp_path: Path, mission: Mission) -> None
         for report in run.reports(mission):
             tell(recording, report)
     assert check(tmp_path / "field.rrd").complete
+
+
+def test_another_mission_needs_another_file(tmp_path: Path, mission: Mission) -> None:
+    other = msgspec.structs.replace(mission, id="f" * 32)
+    recorded = FieldRecording(tmp_path / "field.rrd", mission)
+    with pytest.raises(InputError, match="use another file"), recorded as recording:
+        recording.mission(other)
+    assert check(tmp_path / "field.rrd").recording_id == mission.id
 
 
 def test_two_runs_lie_side_by_side(tmp_path: Path, mission: Mission) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,13 +10,14 @@ import pytest
 
 from mission.errors import AnswerIsNo
 from mission.floor import KINDS
+from mission.geometry import frozen
 from mission.planning import DROP_REASONS
 from recordings import entities, palette
 from recordings.plan import PlanRecording
 from recordings.read import check
 from tests.recordings import world
 from tests.recordings.conftest import write_plan
-from tests.recordings.reading import cells, components, on, static
+from tests.recordings.reading import cells, components, everything, on, static
 
 NS = 1_000_000_000
 
@@ -122,6 +124,12 @@ def test_findings_and_results_are_told(plan: Path) -> None:
     assert "| stops | 2 |" in report
 
 
+def test_the_same_plan_makes_the_same_recording(plan: Path, tmp_path: Path) -> None:
+    """Rerun files are never byte-identical; what they hold is."""
+    again = write_plan(tmp_path / "again.rrd")
+    assert everything(again) == everything(plan)
+
+
 def test_far_coordinates_keep_their_millimetres(tmp_path: Path) -> None:
     x, y = 500_123.4567, 5_400_987.6543
     path = write_plan(tmp_path / "far.rrd", x, y)
@@ -161,4 +169,19 @@ def test_a_plan_may_end_after_any_stage(tmp_path: Path, count: int) -> None:
         for noun in world.nouns_at()[:count]:
             recording.observe(noun)
         recording.observe(object())
+    assert check(tmp_path / "plan.rrd").complete
+
+
+def test_stages_that_found_nothing_are_recorded_too(tmp_path: Path) -> None:
+    floor, space, candidates, visibility, selection, *_ = world.nouns_at()
+    nothing = frozen([], np.int64)
+    blind = replace(
+        visibility, pointer=frozen([0] * 4, np.int64), segment=nothing, first=nothing, last=nothing
+    )
+    with PlanRecording(tmp_path / "plan.rrd", world.MISSION_ID) as recording:
+        recording.observe(replace(floor, rooms=(), openings=(), elements=()))
+        recording.observe(replace(space, rooms=(), openings=(), drive_area=()))
+        recording.observe(replace(candidates, xy=frozen(np.empty((0, 2))), reason=nothing, room=nothing))
+        recording.observe(blind)
+        recording.observe(replace(selection, visibility=blind, chosen=nothing, coverage_steps=frozen([])))
     assert check(tmp_path / "plan.rrd").complete
