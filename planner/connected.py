@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from shapely.geometry.base import BaseGeometry
@@ -16,13 +17,17 @@ from planner.shapes import GRID, polygon_parts
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Pieces of the drive area and the connected part each belongs to."""
+    """Pieces of the drive area and the connected part each belongs to, looked up by triangles."""
 
     pieces: tuple[BaseGeometry, ...]
     part: IntArray
     """Part of each piece, numbered from the largest area down."""
     gaps: FloatArray
     gap_part: IntArray
+    cells: NDArray[np.object_]
+    """Triangles of all pieces."""
+    cell_part: IntArray
+    tree: shapely.STRtree
 
     @property
     def areas(self) -> tuple[float, ...]:
@@ -34,48 +39,59 @@ class Parts:
     def part_at(self, xy: FloatArray) -> IntArray:
         """Part of each point (n, 2), -1 where the robot's centre may not be."""
         found = np.full(len(xy), -1, dtype=np.int64)
-        if len(self.pieces) and len(xy):
-            point, piece = shapely.STRtree(self.pieces).query(
-                shapely.points(xy), predicate="dwithin", distance=GRID
-            )
-            found[point] = self.part[piece]
+        points = shapely.points(xy)
+        point, cell = self.tree.query(points, predicate="dwithin", distance=GRID)
+        found[point] = self.cell_part[cell]
         for way, part in zip(self.gaps, self.gap_part, strict=True):
-            found[shapely.dwithin(shapely.LineString(way), shapely.points(xy), GRID)] = part
+            found[shapely.dwithin(shapely.LineString(way), points, GRID)] = part
         return found
 
     def touching(self, line: BaseGeometry) -> set[int]:
         """Parts that a line runs through or whose gap crossings it cuts."""
-        parts = {int(p) for piece, p in zip(self.pieces, self.part, strict=True) if piece.intersects(line)}
-        for way, part in zip(self.gaps, self.gap_part, strict=True):
-            if shapely.LineString(way).distance(line) <= GRID:
-                parts.add(int(part))
+        parts = set(self.cell_part[self.tree.query(line, predicate="intersects")].tolist())
+        if len(self.gaps):
+            near = shapely.dwithin(shapely.linestrings(self.gaps), line, GRID)
+            parts |= set(self.gap_part[near].tolist())
         return parts
 
     def area_by_part(self, shape: BaseGeometry) -> dict[int, float]:
         """Drive area within `shape`, by part."""
-        areas: dict[int, float] = {}
-        for piece, part in zip(self.pieces, self.part, strict=True):
-            if piece.intersects(shape):
-                areas[int(part)] = areas.get(int(part), 0.0) + piece.intersection(shape).area
-        return areas
+        inside = np.sort(self.tree.query(shape, predicate="intersects"))
+        sizes = shapely.area(shapely.intersection(self.cells[inside], shape))
+        totals = np.bincount(self.cell_part[inside], weights=sizes, minlength=0)
+        return {part: float(totals[part]) for part in np.unique(self.cell_part[inside]).tolist()}
 
 
 def parts_of(drive_area: BaseGeometry, gaps: FloatArray) -> Parts:
-    """Join the pieces of the drive area by the gap crossings (k, 2, 2) whose ends lie in them."""
+    """Join the pieces of the drive area by the chains of gap crossings (k, 2, 2) between them."""
     pieces = tuple(sorted(polygon_parts(drive_area), key=lambda piece: piece.bounds))
-    ends = _piece_at(pieces, gaps.reshape(-1, 2)).reshape(-1, 2)
-    links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(pieces), len(pieces)))
-    labels = connected_components(links, directed=False)[1] if pieces else np.empty(0, np.int64)
-    part = _by_area(labels, np.array([piece.area for piece in pieces]))
-    return Parts(pieces, part, gaps, part[ends[:, 0]] if len(ends) else np.empty(0, np.int64))
+    triangles = [shapely.get_parts(shapely.constrained_delaunay_triangles(piece)) for piece in pieces]
+    cells = np.concatenate([np.empty(0, dtype=object), *triangles])
+    piece_of = np.repeat(np.arange(len(pieces)), [len(some) for some in triangles]).astype(np.int64)
+    tree = shapely.STRtree(cells)
+    nodes = _nodes(len(pieces), tree, piece_of, gaps)
+    total = int(max(len(pieces), nodes.max(initial=-1) + 1))
+    links = coo_array((np.ones(len(nodes)), (nodes[:, 0], nodes[:, 1])), shape=(total, total))
+    labels = connected_components(links, directed=False)[1] if total else np.empty(0, np.int64)
+    part = _by_area(labels, np.array([*(piece.area for piece in pieces), *[0.0] * (total - len(pieces))]))
+    return Parts(
+        pieces=pieces,
+        part=part[: len(pieces)],
+        gaps=gaps,
+        gap_part=part[nodes[:, 0]],
+        cells=cells,
+        cell_part=part[piece_of],
+        tree=tree,
+    )
 
 
-def _piece_at(pieces: tuple[BaseGeometry, ...], xy: FloatArray) -> IntArray:
-    found = np.zeros(len(xy), dtype=np.int64)
-    if len(xy):
-        point, piece = shapely.STRtree(pieces).query(shapely.points(xy), predicate="dwithin", distance=GRID)
-        found[point] = piece
-    return found
+def _nodes(pieces: int, tree: shapely.STRtree, piece_of: IntArray, gaps: FloatArray) -> IntArray:
+    """Both ends of each crossing as numbers (k, 2): the piece they lie in, else a number of their own."""
+    _, own = np.unique(gaps.reshape(-1, 2), axis=0, return_inverse=True)
+    nodes = own.reshape(-1) + pieces
+    point, cell = tree.query(shapely.points(gaps.reshape(-1, 2)), predicate="dwithin", distance=GRID)
+    nodes[point] = piece_of[cell]
+    return nodes.reshape(-1, 2).astype(np.int64)
 
 
 def _by_area(labels: IntArray, areas: FloatArray) -> IntArray:

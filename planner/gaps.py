@@ -1,13 +1,15 @@
-"""Openings exactly as wide as the robot: found between corners and walls, decided by distance.
+"""Gaps that the robot just fits through: found between corners and walls, decided by distance.
 
-The drive area is drawn with a little more clearance than the robot needs, so it closes gaps that the
-robot just fits through. Each such gap gets a straight crossing here, checked by exact distances, and
-so no drawn polygon decides what is connected.
+The drive area is drawn with a little more clearance than the robot needs, so it closes such gaps. Each
+gets a crossing here, a chain of straight ways checked by exact distances, and so no drawn polygon
+decides what is connected.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations, pairwise
 
 import numpy as np
 import shapely
@@ -19,6 +21,8 @@ from planner.shapes import GRID, GROWTH, SLACK
 
 STEPS = 0.02 * 1.4 ** np.arange(15)
 """Distances from a gap's middle, up to about 2 m, at which the drive area is looked for."""
+LONGEST = 10.0
+"""Gaps at most this far apart (m) are tried as the two ends of one narrow corridor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +35,11 @@ class Walls:
     def shapes(self) -> NDArray[np.object_]:
         return shapely.linestrings(self.segments) if len(self.segments) else np.empty(0, dtype=object)
 
+    def near(self, shape: BaseGeometry) -> Walls:
+        """The walls that touch a shape."""
+        index = np.sort(shapely.STRtree(self.shapes()).query(shape, predicate="intersects"))
+        return Walls(self.segments[index], self.clearance[index])
+
 
 @dataclass(frozen=True, eq=False)
 class Gap:
@@ -41,15 +50,15 @@ class Gap:
     """Unit vector from the corner to the wall."""
     width: float
     walls: tuple[int, int]
-    """A segment that ends at the corner, and the wall's segment."""
+    """A segment that begins at the corner, and the wall's segment."""
 
 
 def keeps_clear(shape: BaseGeometry, walls: Walls, tree: shapely.STRtree) -> bool:
     """Whether a point or line keeps every wall's clearance, to within SLACK."""
     if not len(walls.segments):
         return True
-    near = tree.query(shape.buffer(float(walls.clearance.max())))
-    distances = shapely.distance(shape, shapely.linestrings(walls.segments[near]))
+    near = tree.query(shape, predicate="dwithin", distance=float(walls.clearance.max()))
+    distances = shapely.distance(shape, tree.geometries[near])
     return bool(np.all(distances >= walls.clearance[near] - SLACK))
 
 
@@ -70,11 +79,12 @@ def gaps_between(walls: Walls, *, short: float, long: float) -> list[Gap]:
     foot = _feet(corners[corner], walls.segments[wall])
     width = np.hypot(*(foot - corners[corner]).T)
     spare = width - walls.clearance[corner] - walls.clearance[wall]
-    fits = (spare >= short) & (spare <= long) & (width > GRID)
-    gaps = [
-        _gap(corners[c], f, w, s, walls, (int(c), int(k)))
-        for c, k, f, w, s in zip(corner[fits], wall[fits], foot[fits], width[fits], spare[fits], strict=True)
-    ]
+    fits = np.flatnonzero((spare >= short) & (spare <= long) & (width > GRID))
+    gaps = []
+    for k in fits:
+        across = (foot[k] - corners[corner[k]]) / width[k]
+        middle = corners[corner[k]] + (walls.clearance[corner[k]] + spare[k] / 2) * across
+        gaps.append(Gap(middle, across, float(width[k]), (int(corner[k]), int(wall[k]))))
     return _distinct(gaps)
 
 
@@ -82,14 +92,6 @@ def _feet(points: FloatArray, segments: FloatArray) -> FloatArray:
     a, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     t = np.einsum("ij,ij->i", points - a, along) / np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
     return a + np.clip(t, 0.0, 1.0)[:, None] * along
-
-
-def _gap(
-    corner: FloatArray, foot: FloatArray, width: float, spare: float, walls: Walls, pair: tuple[int, int]
-) -> Gap:
-    across = (foot - corner) / width
-    middle = corner + (walls.clearance[pair[0]] + spare / 2) * across
-    return Gap(middle, across, float(width), pair)
 
 
 def _distinct(gaps: list[Gap]) -> list[Gap]:
@@ -105,30 +107,66 @@ def _distinct(gaps: list[Gap]) -> list[Gap]:
 def crossings_through(
     gaps: list[Gap], walls: Walls, drive_area: BaseGeometry, ground: BaseGeometry
 ) -> FloatArray:
-    """Straight ways (k, 2, 2) through gaps, from drive area to drive area.
+    """Straight ways (k, 2, 2) through gaps that chain up from drive area to drive area.
 
-    A gap counts only if the whole way keeps every clearance and stays on the ground.
+    Every way keeps every clearance and stays on the ground. A gap that is left on one side only is
+    one end of a narrow corridor and is joined with other such ends that can be seen from it.
     """
     if not gaps:
         return np.empty((0, 2, 2))
-    tree = shapely.STRtree(walls.shapes())
-    shapely.prepare(drive_area)
-    shapely.prepare(ground)
-    ways = []
+    site = Site(walls, drive_area, ground)
+    ways: list[tuple[FloatArray, FloatArray]] = []
+    ends: list[FloatArray] = []
     for gap in gaps:
         along = np.array([-gap.across[1], gap.across[0]])
-        here = _way_out(gap.middle, along, walls, tree, drive_area)
-        there = _way_out(gap.middle, -along, walls, tree, drive_area)
-        if here is not None and there is not None and ground.covers(shapely.LineString([here, there])):
-            ways.append(np.stack([here, there]))
+        here, there = (site.way_out(gap, sign * along) for sign in (1.0, -1.0))
+        if (len(here) > 1) != (len(there) > 1):
+            ends.append(gap.middle)
+        if len(here) > 1 or len(there) > 1:
+            ways += pairwise([*here[:0:-1], gap.middle, *there[1:]])
+    ways += site.corridors(ends)
     return np.array(ways).reshape(-1, 2, 2)
 
 
-def _way_out(
-    middle: FloatArray, along: FloatArray, walls: Walls, tree: shapely.STRtree, drive_area: BaseGeometry
-) -> FloatArray | None:
-    for step in STEPS:
-        end = middle + step * along
-        if drive_area.contains_properly(shapely.Point(end)):
-            return end if keeps_clear(shapely.LineString([middle, end]), walls, tree) else None
-    return None
+class Site:
+    """Walls, ground and drive area, prepared for trying many ways."""
+
+    def __init__(self, walls: Walls, drive_area: BaseGeometry, ground: BaseGeometry) -> None:
+        self.walls, self.drive_area, self.ground = walls, drive_area, ground
+        self.tree = shapely.STRtree(walls.shapes())
+        shapely.prepare(drive_area)
+        shapely.prepare(ground)
+
+    def allows(self, a: FloatArray, b: FloatArray) -> bool:
+        """Whether the robot may drive straight from a to b."""
+        way = shapely.LineString([a, b])
+        return keeps_clear(way, self.walls, self.tree) and self.ground.covers(way)
+
+    def way_out(self, gap: Gap, along: FloatArray) -> list[FloatArray]:
+        """Points from the gap's middle to the drive area; only the middle where there is no way.
+
+        Past the gap the robot may still be as near to a wall as it may be at all; the last point then
+        lies beside the way, where the drive area begins.
+        """
+        for step in STEPS:
+            end = gap.middle + step * along
+            if not self.allows(gap.middle, end):
+                break
+            for aside in self._asides(gap):
+                if self.drive_area.contains_properly(shapely.Point(end + aside)):
+                    if not aside.any():
+                        return [gap.middle, end]
+                    if self.allows(end, end + aside):
+                        return [gap.middle, end, end + aside]
+        return [gap.middle]
+
+    def _asides(self, gap: Gap) -> Iterator[FloatArray]:
+        slop = 2 * (GROWTH - 1) * float(self.walls.clearance.max()) + 8 * GRID
+        yield np.zeros(2)
+        yield -slop * gap.across
+        yield slop * gap.across
+
+    def corridors(self, ends: list[FloatArray]) -> list[tuple[FloatArray, FloatArray]]:
+        """Ways between the two ends of corridors exactly as wide as the robot."""
+        near = [(a, b) for a, b in combinations(ends, 2) if 0 < np.hypot(*(a - b)) <= LONGEST]
+        return [(a, b) for a, b in near if self.allows(a, b)]

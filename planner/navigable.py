@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from mission.errors import AnswerIsNo, InputError
@@ -15,15 +18,16 @@ from mission.planning import NavigableSpace, OpeningState, RoomSpace
 from mission.settings import Settings
 from planner.connected import Parts, parts_of
 from planner.gaps import Walls, crossings_through, gaps_between, tight_gaps
-from planner.openings import Crossing, barrier, crossings_of, middle_and_normal, threshold
+from planner.openings import Crossing, barrier, crossings_of, middle_and_normal, part_near, threshold
 from planner.shapes import (
     GRID,
+    HAIRLINE,
+    SLACK,
     grown,
     local_origin,
     polygon_parts,
     segments_of,
     snapped,
-    snapped_union,
     to_polygons,
     to_shape,
 )
@@ -91,8 +95,8 @@ class Ground:
     @classmethod
     def of(cls, floor: FloorPlan, settings: Settings) -> Ground:
         origin = local_origin(floor)
-        solids = [solid_of(item, origin) for item in floor.elements if item.obstacle]
-        obstacles = snapped_union(solids)
+        solids = [solid_of(item, origin, HAIRLINE) for item in floor.elements if item.obstacle]
+        obstacles = shapely.union_all(solids)  # not snapped: clearances are decided on it
         crossings = crossings_of(floor, obstacles, settings)
         inner = [threshold(item) for item in crossings if not item.closed_because]
         slab = to_shape(floor.outline, origin)
@@ -128,10 +132,14 @@ def opening_states(
 ) -> tuple[tuple[OpeningState, ...], tuple[Finding, ...]]:
     """What each opening is to the robot, and a finding for each inner one it cannot pass."""
     parts = parts_of(drive_area, gaps)
-    rooms = [to_shape(room.polygons, ground.origin) for room in ground.floor.rooms]
+
+    @cache
+    def free_in(room: int) -> dict[int, float]:
+        return parts.area_by_part(to_shape(ground.floor.rooms[room].polygons, ground.origin))
+
     states, findings = [], []
     for crossing in ground.crossings:
-        why = crossing.closed_because or _not_reached(crossing, parts, rooms, ground, settings)
+        why = crossing.closed_because or _not_reached(crossing, parts, free_in, ground, settings)
         states.append(OpeningState(crossing.opening, crossing.rooms, crossing.width, not why, why))
         if why and not why.startswith("exterior"):
             findings.append(_opening_finding(crossing, why, ground))
@@ -147,45 +155,70 @@ def _opening_finding(crossing: Crossing, why: str, ground: Ground) -> Finding:
 
 
 def _not_reached(
-    crossing: Crossing, parts: Parts, rooms: list[BaseGeometry], ground: Ground, settings: Settings
+    crossing: Crossing,
+    parts: Parts,
+    free_in: Callable[[int], dict[int, float]],
+    ground: Ground,
+    settings: Settings,
 ) -> str:
     """Why the robot does not get from the opening into both rooms; empty if it does."""
     here = parts.touching(crossing.clear)
-    for side in crossing.rooms:
-        if side is None:
-            continue
-        free = parts.area_by_part(rooms[side])
-        total = sum(free.values())
-        if not any(free.get(part, 0.0) >= REACHED_SHARE * total for part in here):
-            return _narrowest(crossing, ground, settings)
-    return "" if here else _narrowest(crossing, ground, settings)
+    wanted = {side: _main_parts(free_in(side)) for side in crossing.rooms if side is not None}
+    if here and all(here & main or not main for main in wanted.values()):
+        return ""
+    return _narrowest(crossing, parts, wanted, ground, settings)
 
 
-def _narrowest(crossing: Crossing, ground: Ground, settings: Settings) -> str:
-    """The obstacle near an opening that leaves the robot too little room, in words."""
-    middle, _ = middle_and_normal(crossing.clear)
-    near = shapely.Point(middle).buffer(NEAR_OPENING)
-    walls = ground.walls(settings)
-    index = shapely.STRtree(walls.shapes()).query(near, predicate="intersects")
-    local = Walls(walls.segments[np.sort(index)], walls.clearance[np.sort(index)])
-    outside = shapely.union_all([ground.obstacles])
-    gaps = [
-        gap
-        for gap in gaps_between(local, short=-2 * float(local.clearance.max(initial=0.0)) + 0.05, long=0.0)
-        if not outside.contains(shapely.Point(gap.middle))
-    ]
-    if not gaps:
-        return f"no place for a robot of radius {settings.radius:.3f} m next to it"
-    gap = max(gaps, key=lambda item: item.width)
-    names = " and ".join(_owner(local.segments[k], ground) for k in gap.walls)
-    need = local.clearance[list(gap.walls)].sum()
-    return f"{gap.width:.3f} m between {names} near it, the robot needs {need:.3f} m"
+def _main_parts(free: dict[int, float]) -> set[int]:
+    """Parts that make up a good share of where the robot may drive in a room."""
+    total = sum(free.values())
+    return {part for part, area in free.items() if area >= REACHED_SHARE * total and area > 0}
+
+
+def _narrowest(
+    crossing: Crossing, parts: Parts, wanted: dict[int, set[int]], ground: Ground, settings: Settings
+) -> str:
+    """The place near an opening that is widest among those a robot must pass, in words."""
+    window = shapely.Point(middle_and_normal(crossing.clear)[0]).buffer(NEAR_OPENING)
+    walls = ground.walls(settings).near(window)
+    gaps = gaps_between(walls, short=-2 * float(walls.clearance.max(initial=0.0)) + 0.05, long=-SLACK)
+    cells = [_cells_of(parts, main, ground, room, window) for room, main in wanted.items()]
+    for gap in sorted(gaps, key=lambda item: -item.width):
+        if _opens(crossing, cells, ground, window, gap.width / 2 - SLACK):
+            names = " and ".join(dict.fromkeys(_owner(walls.segments[k], ground) for k in gap.walls))
+            need = float(walls.clearance[list(gap.walls)].sum())
+            return f"{gap.width:.3f} m between {names} near it, the robot needs {need:.3f} m"
+    return f"no place for a robot of radius {settings.radius:.3f} m next to it"
+
+
+def _cells_of(
+    parts: Parts, main: set[int], ground: Ground, room: int, window: BaseGeometry
+) -> NDArray[np.object_]:
+    """Where the robot drives in a room near an opening, leaving out pockets it cannot get to."""
+    shape = to_shape(ground.floor.rooms[room].polygons, ground.origin).intersection(window)
+    near = parts.tree.query(shape, predicate="intersects")
+    return parts.cells[near[np.isin(parts.cell_part[near], sorted(main))]]
+
+
+def _opens(
+    crossing: Crossing,
+    cells: list[NDArray[np.object_]],
+    ground: Ground,
+    window: BaseGeometry,
+    radius: float,
+) -> bool:
+    """Whether a robot of this radius gets from the opening to the cells of both rooms."""
+    free = window.intersection(ground.outline).difference(
+        ground.obstacles.intersection(window).buffer(radius)
+    )
+    here = [piece for piece in polygon_parts(free) if piece.intersects(crossing.clear)]
+    return all(any(np.any(shapely.intersects(some, piece)) for piece in here) for some in cells if len(some))
 
 
 def _owner(segment: FloatArray, ground: Ground) -> str:
     middle = shapely.Point(segment.mean(axis=0))
     for item in ground.floor.elements:
-        if item.obstacle and solid_of(item, ground.origin).distance(middle) <= LINE_WALL:
+        if item.obstacle and solid_of(item, ground.origin, HAIRLINE).distance(middle) <= LINE_WALL:
             return item.id
     return "a closed opening" if len(ground.barriers) and _on_barrier(middle, ground) else "the floor's edge"
 
@@ -199,8 +232,9 @@ def room_spaces(
 ) -> tuple[RoomSpace, ...]:
     """The rooms as planned: inner rooms subtracted from outer ones, and floor outside every room."""
     shapes = [to_shape(room.polygons, ground.origin) for room in floor.rooms]
+    tree = shapely.STRtree([shape.representative_point() for shape in shapes])
     planned: list[tuple[int | None, str, BaseGeometry]] = [
-        (k, floor.rooms[k].label, _without_inner(shape, shapes, k)) for k, shape in enumerate(shapes)
+        (k, floor.rooms[k].label, _without_inner(shape, shapes, k, tree)) for k, shape in enumerate(shapes)
     ]
     planned.extend((None, name, shape) for name, shape in _unnamed(ground, drive_area, shapes))
     forbidden = ground.obstacles.buffer(settings.d_sec, quad_segs=16)
@@ -211,19 +245,18 @@ def room_spaces(
             room=index,
             name=name,
             area=to_polygons(shape, ground.origin),
-            stop_area=to_polygons(shape.intersection(allowed), ground.origin),
+            stop_area=to_polygons(shape.intersection(part_near(allowed, shape)), ground.origin),
         )
         for index, name, shape in planned
     )
 
 
-def _without_inner(shape: BaseGeometry, shapes: list[BaseGeometry], index: int) -> BaseGeometry:
+def _without_inner(
+    shape: BaseGeometry, shapes: list[BaseGeometry], index: int, tree: shapely.STRtree
+) -> BaseGeometry:
     """A room without the rooms that lie inside it (paper: a room in a room is subtracted)."""
-    inner = [
-        other
-        for k, other in enumerate(shapes)
-        if k != index and other.area < shape.area and shape.intersects(other.representative_point())
-    ]
+    held = np.sort(tree.query(shape, predicate="intersects"))
+    inner = [shapes[k] for k in held if k != index and shapes[k].area < shape.area]
     return shape.difference(shapely.union_all(inner)) if inner else shape
 
 

@@ -40,7 +40,7 @@ class Crossing:
 def crossings_of(floor: FloorPlan, obstacles: BaseGeometry, settings: Settings) -> tuple[Crossing, ...]:
     """Every opening with its clear width and the rooms on its sides."""
     origin = local_origin(floor)
-    rooms = [to_shape(room.polygons, origin) for room in floor.rooms]
+    rooms = shapely.STRtree([to_shape(room.polygons, origin) for room in floor.rooms])
     outline = to_shape(floor.outline, origin)
     return tuple(_crossing(item, origin, obstacles, rooms, outline, settings) for item in floor.openings)
 
@@ -49,25 +49,36 @@ def _crossing(
     opening: Opening,
     origin: FloatArray,
     obstacles: BaseGeometry,
-    rooms: list[BaseGeometry],
+    rooms: shapely.STRtree,
     outline: BaseGeometry,
     settings: Settings,
 ) -> Crossing:
     line = shapely.LineString(opening.line - origin)
-    pieces = [p for p in shapely.get_parts(line.difference(obstacles)) if p.length > SLACK]
+    near = part_near(obstacles, line)
+    pieces = [p for p in shapely.get_parts(line.difference(near)) if p.length > SLACK]
     clear = max(pieces, key=lambda piece: piece.length, default=shapely.LineString())
     sides = (None, None) if clear.is_empty else _sides(clear, rooms)
     return Crossing(opening, clear, sides, _closed(clear, sides, rooms, outline, opening, settings))
 
 
-def _sides(clear: BaseGeometry, rooms: list[BaseGeometry]) -> tuple[int | None, int | None]:
-    """The rooms found by probing at right angles from the middle of the clear piece."""
+def part_near(shape: BaseGeometry, line: BaseGeometry) -> BaseGeometry:
+    """What of a large shape lies within 1 m of a line's bounds, quick to work with."""
+    x0, y0, x1, y1 = line.bounds
+    return shapely.clip_by_rect(shape, x0 - 1.0, y0 - 1.0, x1 + 1.0, y1 + 1.0)
+
+
+def _sides(clear: BaseGeometry, rooms: shapely.STRtree) -> tuple[int | None, int | None]:
+    """The rooms found by probing at right angles from the middle of the clear piece.
+
+    Where rooms lie in rooms, the innermost counts.
+    """
     middle, across = middle_and_normal(clear)
     found = []
     for sign in (1.0, -1.0):
         points = [shapely.Point(middle + sign * step * across) for step in PROBES]
-        hits = [k for point in points for k, room in enumerate(rooms) if room.intersects(point)]
-        found.append(hits[0] if hits else None)
+        hits = [rooms.query(point, predicate="intersects") for point in points]
+        nearest = next((some for some in hits if len(some)), ())
+        found.append(min(map(int, nearest), key=lambda k: (rooms.geometries[k].area, k), default=None))
     return found[0], found[1]
 
 
@@ -81,7 +92,7 @@ def middle_and_normal(line: BaseGeometry) -> tuple[FloatArray, FloatArray]:
 def _closed(
     clear: BaseGeometry,
     sides: tuple[int | None, int | None],
-    rooms: list[BaseGeometry],
+    rooms: shapely.STRtree,
     outline: BaseGeometry,
     opening: Opening,
     settings: Settings,
@@ -98,10 +109,10 @@ def _closed(
 def _is_exterior(
     clear: BaseGeometry,
     sides: tuple[int | None, int | None],
-    rooms: list[BaseGeometry],
+    rooms: shapely.STRtree,
     outline: BaseGeometry,
 ) -> bool:
-    if rooms:
+    if len(rooms):
         return None in sides
     middle, across = middle_and_normal(clear)
     probes = [shapely.Point(middle + sign * PROBES[-1] * across) for sign in (1.0, -1.0)]
@@ -120,5 +131,5 @@ def barrier(crossing: Crossing, origin: FloatArray, obstacles: BaseGeometry) -> 
     ends = []
     for end, way in ((a, -along), (b, along)):
         reach = shapely.LineString([end, end + END_GAP * way])
-        ends.append(end + END_GAP * way if reach.intersects(obstacles) else end)
+        ends.append(end + END_GAP * way if reach.intersects(part_near(obstacles, reach)) else end)
     return np.stack(ends)

@@ -20,8 +20,10 @@ from mission.geometry import FloatArray, Polygon, bounds, frozen
 
 GRID = 1e-5
 """Metres per grid step."""
-SLACK = 1e-7
-"""Clearances may fall short by this much: float noise, far below any drawing's precision."""
+SLACK = 1e-6
+"""Clearances may fall short by this much, in metres: float noise, far below any drawing's precision."""
+HAIRLINE = 4e-7
+"""Thickness in metres that an obstacle drawn as a single line gets, so that it has an inside."""
 LARGEST = 5000.0
 """Greatest extent of a floor in metres for which all integer arithmetic stays exact."""
 

@@ -25,11 +25,12 @@ LINE_WALL = 1e-3
 def occluders_of(floor: FloorPlan, closed: FloatArray) -> BaseGeometry:
     """Everything the laser does not pass, unioned on the grid, in the local frame.
 
-    `closed` are openings it does not pass either, as segments (k, 2, 2) in the local frame.
+    A wall drawn as a single line is LINE_WALL thick, so that it has two faces. `closed` are openings the
+    laser does not pass either, as segments (k, 2, 2) in the local frame.
     """
     origin = local_origin(floor)
-    solids = [solid_of(item, origin) for item in floor.elements if item.occludes]
-    solids += [thin_solid(segment) for segment in closed]
+    solids = [solid_of(item, origin, LINE_WALL) for item in floor.elements if item.occludes]
+    solids += [thin_solid(segment, LINE_WALL) for segment in closed]
     return without_idle_vertices(without_cracks(snapped_union(solids)), floor)
 
 
@@ -48,16 +49,16 @@ def _rings(shape: BaseGeometry) -> tuple[int, int]:
     return len(parts), sum(len(part.interiors) for part in parts)
 
 
-def solid_of(element: Element, origin: FloatArray) -> BaseGeometry:
-    """An element's filled plan in the local frame; lines become solids of LINE_WALL thickness."""
+def solid_of(element: Element, origin: FloatArray, thickness: float) -> BaseGeometry:
+    """An element's filled plan in the local frame; lines become solids of this thickness (m)."""
     parts = [one_shape(solid, origin) for solid in element.solids]
-    parts += [thin_solid(line - origin) for line in element.lines]
+    parts += [thin_solid(line - origin, thickness) for line in element.lines]
     return shapely.union_all([shapely.make_valid(part) for part in parts])
 
 
-def thin_solid(line: FloatArray) -> BaseGeometry:
-    """A line (n, 2) as a solid of LINE_WALL thickness."""
-    return shapely.LineString(line).buffer(LINE_WALL / 2, cap_style="flat", join_style="mitre")
+def thin_solid(line: FloatArray, thickness: float) -> BaseGeometry:
+    """A line (n, 2) as a solid of this thickness (m)."""
+    return shapely.LineString(line).buffer(thickness / 2, cap_style="flat", join_style="mitre")
 
 
 def targets_of(floor: FloorPlan, occluders: BaseGeometry, *, d_dis: float) -> Targets:
@@ -68,12 +69,7 @@ def targets_of(floor: FloorPlan, occluders: BaseGeometry, *, d_dis: float) -> Ta
     """
     origin = local_origin(floor)
     faces, owners = _occluding_faces(floor, occluders)
-    free = [
-        (segment, index)
-        for index, item in enumerate(floor.elements)
-        if item.target and not item.occludes
-        for segment in _outline(item, origin)
-    ]
+    free = _free_segments(floor)
     segments = np.concatenate([faces, np.array([s for s, _ in free]).reshape(-1, 2, 2)])
     lengths = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
     return Targets(
@@ -113,8 +109,16 @@ def _edges(element: Element) -> Iterator[tuple[FloatArray, FloatArray]]:
         yield from pairwise(line)
 
 
-def _outline(element: Element, origin: FloatArray) -> list[FloatArray]:
-    return [np.stack([a, b]) - origin for a, b in _edges(element)]
+def _free_segments(floor: FloorPlan) -> list[tuple[FloatArray, int]]:
+    """Outline segments of targets that do not occlude, each with its element; what is drawn twice, once."""
+    origin = local_origin(floor)
+    found: dict[tuple[tuple[float, ...], ...], tuple[FloatArray, int]] = {}
+    for index, item in enumerate(floor.elements):
+        if item.target and not item.occludes:
+            for a, b in _edges(item):
+                ends = tuple(sorted([tuple(a.tolist()), tuple(b.tolist())]))
+                found.setdefault(ends, (np.stack([a, b]) - origin, index))
+    return [found[ends] for ends in sorted(found)]
 
 
 def _occluding_faces(floor: FloorPlan, occluders: BaseGeometry) -> tuple[FloatArray, list[int]]:
@@ -138,7 +142,7 @@ def owners_of(faces: FloatArray, floor: FloorPlan) -> list[int]:
     """The element whose boundary each face lies on; a target before another, then the first; else -1."""
     origin = local_origin(floor)
     indices = [k for k, item in enumerate(floor.elements) if item.occludes]
-    outlines = [shapely.boundary(snapped(solid_of(floor.elements[k], origin))) for k in indices]
+    outlines = [shapely.boundary(snapped(solid_of(floor.elements[k], origin, LINE_WALL))) for k in indices]
     tree = shapely.STRtree(outlines)
     middles = shapely.points(faces.mean(axis=1)) if len(faces) else []
     face, hit = tree.query(middles, predicate="dwithin", distance=3 * GRID)
