@@ -113,9 +113,9 @@ class Run:
         """Of the METRIC_s that are of runs."""
         return f"{metric}/{self.run_id}"
 
-    @property
-    def tolerance(self) -> str:
-        return f"{self.metric(METRIC_DEVIATION)}/tolerance"
+    def tolerance(self, metric: str) -> str:
+        """What is tolerated of a metric."""
+        return f"{self.metric(metric)}/tolerance"
 
     @property
     def log(self) -> str:

@@ -115,8 +115,11 @@ class RunDrawing:
             canvas.show(names.metric(metric), rr.SeriesLines(colors=palette.DRIVEN, names=name, widths=1.5))
         dots = rr.SeriesPoints(colors=palette.ARRIVED.colour, marker_sizes=4, names="deviation")
         canvas.show(names.metric(entities.METRIC_DEVIATION), dots)
-        limit = rr.SeriesLines(colors=palette.FAILED.colour, names="tolerance", widths=1)
-        canvas.show(names.tolerance, limit)
+        for metric, limits in _LIMITED.items():
+            count = len(limits)
+            colours, texts = [palette.FAILED.colour] * count, ["tolerance"] * count
+            lines = rr.SeriesLines(colors=colours, names=texts, widths=[1.0] * count)
+            canvas.show(names.tolerance(metric), lines)
 
     def _describe(self) -> None:
         """What the run is of, as a property."""
@@ -170,13 +173,15 @@ class RunDrawing:
         self._at(self.names.flat(name), mark, event.robot_ns)
 
     def _plot_deviation(self, event: Arrived) -> None:
-        """The deviation in millimetres, and what the mission tolerates there."""
+        """In millimetres, with what the mission tolerates at this stop, to both sides of the route too."""
         deviation = rr.Scalars(event.deviation_m * 1000)
         self._at(self.names.metric(entities.METRIC_DEVIATION), deviation, event.robot_ns)
         stop = self.stops.get(event.stop)
         if stop is not None:
-            tolerance = rr.Scalars(stop.tolerance_m * 1000)
-            self._at(self.names.tolerance, tolerance, event.robot_ns)
+            limit = stop.tolerance_m * 1000
+            for metric, limits in _LIMITED.items():
+                values = rr.Scalars([sign * limit for sign in limits])
+                self._at(self.names.tolerance(metric), values, event.robot_ns)
 
     def _report(self, event: AnyEvent) -> None:
         stop = getattr(event, "stop", None)
@@ -202,6 +207,10 @@ _PLOTTED = {
     entities.METRIC_CROSS_TRACK: "distance from the route",
     entities.METRIC_BATTERY: "battery",
 }
+
+
+_LIMITED = {entities.METRIC_DEVIATION: (1,), entities.METRIC_CROSS_TRACK: (-1, 1)}
+"""Metrics with a tolerance, and on which sides."""
 
 
 def _same(a: PoseReport, b: PoseReport) -> bool:
