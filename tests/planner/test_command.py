@@ -1,0 +1,435 @@
+"""`stopgo plan` as a person runs it: what it prints, what it writes, and how it refuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import ezdxf
+import pytest
+
+from mission.__main__ import main
+from mission.files.mission_json import read
+from mission.settings import Settings, read_settings
+from tests.planner.worlds import FLOORS, SHARED
+
+Draw = Callable[["Drawing"], None]
+FILES = {"mission.json", "plan.rrd", "plan.svg", "coverage.json"}
+
+
+class Drawing:
+    """A layered DXF in metres."""
+
+    def __init__(self) -> None:
+        self.document = ezdxf.new()
+        self.document.header["$INSUNITS"] = 6
+        self.space = self.document.modelspace()
+
+    def ring(self, layer: str, *points: tuple[float, float]) -> None:
+        self.space.add_lwpolyline(points, close=True, dxfattribs={"layer": layer})
+
+    def box(self, layer: str, x0: float, y0: float, x1: float, y1: float) -> None:
+        self.ring(layer, (x0, y0), (x1, y0), (x1, y1), (x0, y1))
+
+    def line(self, layer: str, a: tuple[float, float], b: tuple[float, float]) -> None:
+        self.space.add_line(a, b, dxfattribs={"layer": layer})
+
+
+def drawn(path: Path, *more: Draw, door: float = 0.9) -> Path:
+    """Two rooms of 4 × 4 m with a door between them, and whatever else is drawn."""
+    drawing = Drawing()
+    drawing.box("FLOOR", 0, 0, 8, 4)
+    for x0, y0, x1, y1 in ((-0.2, -0.2, 8.2, 0), (-0.2, 4, 8.2, 4.2), (-0.2, 0, 0, 4), (8, 0, 8.2, 4)):
+        drawing.box("WALLS", x0, y0, x1, y1)
+    low, high = 2 - door / 2, 2 + door / 2
+    drawing.box("WALLS", 3.9, 0, 4.1, low)
+    drawing.box("WALLS", 3.9, high, 4.1, 4)
+    drawing.line("DOORS", (4, low), (4, high))
+    drawing.box("ROOMS", 0, 0, 3.9, 4)
+    drawing.box("ROOMS", 4.1, 0, 8, 4)
+    for draw in more:
+        draw(drawing)
+    drawing.document.saveas(path)
+    return path
+
+
+@pytest.fixture
+def floor(tmp_path: Path) -> Path:
+    return drawn(tmp_path / "floor.dxf")
+
+
+Run = tuple[int, str, str]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Run]:
+    def run(*arguments: object) -> Run:
+        capsys.readouterr()
+        code = main([str(item) for item in arguments])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run
+
+
+def one_line(error: str) -> str:
+    lines = error.splitlines()
+    assert len(lines) == 1, error
+    assert "Traceback" not in error
+    assert lines[0].startswith("stopgo: ")
+    return lines[0]
+
+
+def left_in(folder: Path) -> set[str]:
+    return {path.name for path in folder.rglob("*") if path.is_file()} if folder.exists() else set()
+
+
+# ---- done ----
+
+
+def test_a_plan_writes_its_four_files(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
+    code, out, error = run("plan", floor, "-o", tmp_path / "out")
+    assert (code, error) == (0, "")
+    assert left_in(tmp_path / "out") == FILES
+    assert read(tmp_path / "out" / "mission.json").name == "floor"
+    assert "stops" in out
+
+
+KEYS = {
+    "floor": {"name", "area_m2", "rooms", "openings", "findings"},
+    "targets": {"total", "raw", "by_kind"},
+    "candidates": {"generated", "reachable", "strategy"},
+    "visibility": {"visible", "method"},
+    "selection": {"stops", "coverage", "bound", "method"},
+    "route": {"length_m", "bound_m", "method", "tour"},
+    "schedule": {"drive_s", "turn_s", "settle_s", "scan_s", "total_s"},
+    "times_s": {"read", "navigable", "candidates", "visibility", "selection", "route", "total"},
+    "files": {"mission", "recording", "picture", "coverage"},
+}
+
+
+def test_json_is_one_object_with_the_keys_that_programs_rely_on(
+    run: Callable[..., Run], floor: Path, tmp_path: Path
+) -> None:
+    code, out, error = run("plan", floor, "-o", tmp_path / "out", "--json")
+    assert (code, error) == (0, "")
+    told = json.loads(out)
+    for key, keys in KEYS.items():
+        assert keys <= set(told[key]), key
+    assert told["unreached"] == []
+    assert told["floor"]["area_m2"] == 32.0
+    assert told["floor"]["rooms"] == 2
+    assert all(Path(path).exists() for path in told["files"].values())
+    assert told["selection"]["stops"] == len(read(Path(told["files"]["mission"])).stops)
+    assert json.loads(json.dumps(told, allow_nan=False)) == told
+
+
+def test_the_printed_configuration_reads_back_the_same(run: Callable[..., Run], tmp_path: Path) -> None:
+    code, out, _ = run(
+        "plan",
+        "--print-config",
+        "--range",
+        7.5,
+        "--start",
+        "1,2,90",
+        "--targets",
+        "walls,columns",
+        "--coverage",
+        0.8,
+    )
+    assert code == 0
+    (tmp_path / "plan.toml").write_text(out)
+    expected = Settings(range=7.5, start=(1, 2, 90), targets=("walls", "columns"), coverage=0.8)
+    assert read_settings(tmp_path / "plan.toml", {}) == expected
+    assert run("plan", "--print-config", "-p", tmp_path / "plan.toml")[1] == out
+
+
+def test_options_override_the_file(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text("[plan]\ncoverage = 0.5\ngrid = 0.8\n")
+    code, *_ = run("plan", floor, "-p", tmp_path / "plan.toml", "--grid", 2, "-o", tmp_path / "out")
+    assert code == 0
+    parameters = read(tmp_path / "out" / "mission.json").origin.parameters
+    assert (parameters.coverage, parameters.grid) == (0.5, 2.0)
+
+
+def test_planning_again_gives_the_same_mission(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
+    run("plan", floor, "-o", tmp_path / "one")
+    before = (tmp_path / "one" / "mission.json").read_bytes()
+    run("plan", floor, "-o", tmp_path / "one")
+    run("plan", floor, "-o", tmp_path / "two")
+    assert (tmp_path / "one" / "mission.json").read_bytes() == before
+    assert (tmp_path / "two" / "mission.json").read_bytes() == before
+
+
+def test_a_narrow_door_is_told_of_and_strict_says_no(run: Callable[..., Run], tmp_path: Path) -> None:
+    narrow = drawn(tmp_path / "narrow.dxf", door=0.6)
+    code, out, _ = run("plan", narrow, "-o", tmp_path / "out", "--json")
+    told = json.loads(out)
+    assert code == 0
+    assert len(told["unreached"]) == 1
+    assert "0.600" in json.dumps(told["floor"]["findings"])
+    assert run("plan", narrow, "-o", tmp_path / "out", "--strict")[0] == 1
+    assert left_in(tmp_path / "out") == FILES
+
+
+def test_all_parts_are_planned_into_files_of_their_own(run: Callable[..., Run], tmp_path: Path) -> None:
+    narrow = drawn(tmp_path / "narrow.dxf", door=0.6)
+    code, out, _ = run("plan", narrow, "-o", tmp_path / "out", "--all-parts", "--json")
+    assert code == 0
+    second = {"mission-2.json", "plan-2.rrd", "plan-2.svg", "coverage-2.json"}
+    assert left_in(tmp_path / "out") == FILES | second
+    assert len(json.loads(out)["parts"]) == 1
+    sides = [
+        {stop.x < 4 for stop in read(tmp_path / "out" / name).stops}
+        for name in ("mission.json", "mission-2.json")
+    ]
+    assert sorted(map(sorted, sides)) == [[False], [True]]
+
+
+@pytest.mark.parametrize("name", ["layered/fzk-haus-eg.dxf"])
+def test_a_real_floor_is_planned_by_the_command(run: Callable[..., Run], name: str, tmp_path: Path) -> None:
+    assert name in FLOORS
+    if not (SHARED / name).exists():
+        pytest.skip(f"{SHARED / name} is not there")
+    code, out, _ = run("plan", SHARED / name, "-o", tmp_path, "--json")
+    assert code == 0
+    assert json.loads(out)["selection"]["coverage"] >= 0.9
+
+
+# ---- odd drawings ----
+
+ODD: dict[str, Draw] = {
+    "a room that crosses itself": lambda d: d.ring("ROOMS", (1, 1), (3, 3), (3, 1), (1, 3)),
+    "a room with a spike": lambda d: d.ring("ROOMS", (5, 1), (6, 1), (6, 3), (6, 2), (5, 2)),
+    "a floor that crosses itself": lambda d: d.ring("FLOOR", (20, 0), (22, 2), (22, 0), (20, 2)),
+    "a wall that crosses itself": lambda d: d.ring("WALLS", (2, 1), (3, 2), (3, 1), (2, 2)),
+    "a door of no length": lambda d: d.line("DOORS", (2, 2), (2, 2)),
+    "a wall of no length": lambda d: d.line("WALLS", (2, 2), (2, 2)),
+    "a ring of two points": lambda d: d.ring("WALLS", (1, 1), (2, 1)),
+    "a beam drawn twice": lambda d: [d.box("BEAMS", 1, 1, 3, 1.2) for _ in range(2)] and None,
+    "a room outside the floor": lambda d: d.box("ROOMS", 100, 100, 110, 110),
+    "a door outside everything": lambda d: d.line("DOORS", (50, 50), (51, 50)),
+    "a door on a solid wall": lambda d: d.line("DOORS", (4, 3), (4, 3.9)),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_an_odd_drawing_is_planned(run: Callable[..., Run], name: str, tmp_path: Path) -> None:
+    code, out, error = run("plan", drawn(tmp_path / "odd.dxf", ODD[name]), "-o", tmp_path / "out", "--json")
+    assert (code, error) == (0, "")
+    told = json.loads(out)
+    assert told["selection"]["stops"] >= 1
+    if "door" not in name and "two points" not in name:
+        assert told["floor"]["findings"], "an odd drawing is told of"
+
+
+# ---- refused ----
+
+
+def refused(run: Callable[..., Run], code: int, out: Path, *arguments: object) -> str:
+    """The one line of a refusal; nothing may be left in `out`."""
+    found, printed, error = run("plan", *arguments, "-o", out)
+    assert (found, printed) == (code, ""), error
+    assert left_in(out) == set()
+    return one_line(error)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "word"),
+    [
+        ("missing.dxf", None, "no such file"),
+        ("empty.dxf", b"", "empty"),
+        ("blank.dxf", b" \n\n", "empty"),
+        ("picture.dxf", b"\x89PNG\r\n\x1a\n" + bytes(100), "not a DXF"),
+        ("text.dxf", b"hello world", "not a DXF"),
+        ("floor.pdf", b"%PDF-1.4", "unknown kind"),
+        ("drawing.dwg", b"AC1032", "unknown kind"),
+    ],
+)
+def test_a_file_that_is_no_floor_is_2(
+    run: Callable[..., Run], name: str, content: bytes | None, word: str, tmp_path: Path
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    line = refused(run, 2, tmp_path / "out", tmp_path / name)
+    assert name in line
+    assert word in line
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
+def test_a_file_cut_off_before_its_entities_end_is_2(
+    run: Callable[..., Run], share: float, floor: Path, tmp_path: Path
+) -> None:
+    data = floor.read_bytes()
+    end = data.find(b"ENDSEC", data.find(b"ENTITIES"))
+    (tmp_path / "cut.dxf").write_bytes(data[: int(share * end)])
+    assert "cut.dxf" in refused(run, 2, tmp_path / "out", tmp_path / "cut.dxf")
+
+
+def test_a_folder_as_the_floor_is_2(run: Callable[..., Run], tmp_path: Path) -> None:
+    (tmp_path / "floor.dxf").mkdir()
+    assert "directory" in refused(run, 2, tmp_path / "out", tmp_path / "floor.dxf")
+
+
+def test_a_drawing_without_a_floor_is_2(run: Callable[..., Run], tmp_path: Path) -> None:
+    drawing = Drawing()
+    drawing.box("WALLS", 0, 0, 1, 1)
+    drawing.document.saveas(tmp_path / "walls.dxf")
+    line = refused(run, 2, tmp_path / "out", tmp_path / "walls.dxf")
+    assert "FLOOR" in line
+    assert "WALLS" in line
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("--d-sec", "nan"),
+        ("--d-sec", "-0.1"),
+        ("--range", "0"),
+        ("--range", "inf"),
+        ("--range", "-5"),
+        ("--coverage", "0"),
+        ("--coverage", "1.5"),
+        ("--coverage", "90"),
+        ("--d-dis", "0"),
+        ("--d-dis", "1e-9"),
+        ("--grid", "0.001"),
+        ("--grid", "1e300"),
+        ("--edge", "-1"),
+        ("--door-access", "0"),
+        ("--robot-radius", "-0.35"),
+        ("--robot-radius", "0"),
+        ("--speed", "0"),
+        ("--settle", "-1"),
+        ("--scan-time", "nan"),
+        ("--tolerance", "0"),
+        ("--seed", "-1"),
+        ("--seed", "many"),
+        ("--doors", "ajar"),
+        ("--tour", "round"),
+        ("--targets", "walls,ghosts"),
+        ("--targets", ""),
+        ("--start", "1"),
+        ("--start", "1,2"),
+        ("--start", "a,b,c"),
+        ("--start", "nan,1,0"),
+        ("--end", "1,2,3"),
+        ("--origin", "91,0,0,0"),
+        ("--candidates", "stars"),
+        ("--candidates", "no.such.module:thing"),
+        ("--visibility", "xray"),
+        ("--selector", "luck"),
+        ("--router", "walk"),
+        ("--colour", "red"),
+    ],
+)
+def test_a_value_no_plan_can_be_made_with_is_2(
+    run: Callable[..., Run], option: str, value: str, floor: Path, tmp_path: Path
+) -> None:
+    line = refused(run, 2, tmp_path / "out", floor, f"{option}={value}")
+    named = option.strip("-").replace("-", "_")
+    assert named in line.replace("-", "_") or value in line
+
+
+@pytest.mark.parametrize(
+    ("toml", "words"),
+    [
+        ("[plan]\ncolour = 1\n", ("colour",)),
+        ("[paint]\nrange = 1\n", ("paint",)),
+        ("[plan]\nrange = 5\n", ("range", "scanner")),
+        ("range = 5\n", ("range",)),
+        ("[plan]\ncoverage = 'most'\n", ("coverage",)),
+        ("[plan]\ncoverage = nan\n", ("coverage",)),
+        ("[plan]\nstart = [1, 2]\n", ("start",)),
+        ("[plan\n", ("TOML",)),
+        ("[plan]\nd_sec = 1\nd_sec = 2\n", ("TOML",)),
+    ],
+)
+def test_a_bad_plan_toml_is_2(
+    run: Callable[..., Run], toml: str, words: tuple[str, ...], floor: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "plan.toml").write_text(toml)
+    line = refused(run, 2, tmp_path / "out", floor, "-p", tmp_path / "plan.toml")
+    assert all(word in line for word in words)
+
+
+def test_a_plan_toml_that_is_not_there_is_2(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
+    assert "none.toml" in refused(run, 2, tmp_path / "out", floor, "-p", tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("start", ["4,3.5,0", "0.1,2,0", "-5,2,0", "1e5,1e5,0"])
+def test_a_start_where_the_robot_does_not_fit_is_2(
+    run: Callable[..., Run], start: str, floor: Path, tmp_path: Path
+) -> None:
+    assert "start" in refused(run, 2, tmp_path / "out", floor, f"--start={start}")
+
+
+def test_a_closed_tour_with_an_end_is_2(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
+    refused(run, 2, tmp_path / "out", floor, "--tour", "closed", "--end", "1,1")
+
+
+def test_a_file_in_place_of_the_folder_is_2(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    code, _, error = run("plan", floor, "-o", tmp_path / "out")
+    assert code == 2
+    assert "out" in one_line(error)
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_a_folder_in_place_of_a_file_is_2(
+    run: Callable[..., Run], name: str, floor: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "out" / name).mkdir(parents=True)
+    code, _, error = run("plan", floor, "-o", tmp_path / "out")
+    assert code == 2
+    assert name in one_line(error)
+    assert not (tmp_path / "out" / "mission.json").is_file()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root writes anywhere")
+def test_a_folder_that_cannot_be_written_is_2(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir(mode=0o500)
+    refused(run, 2, tmp_path / "out", floor)
+
+
+def test_a_folder_under_a_file_is_2(run: Callable[..., Run], floor: Path) -> None:
+    code, _, error = run("plan", floor, "-o", floor / "out")
+    assert code == 2
+    one_line(error)
+
+
+def test_no_floor_at_all_is_2(run: Callable[..., Run]) -> None:
+    code, _, error = run("plan")
+    assert code == 2
+    assert "floor" in one_line(error)
+
+
+# ---- interrupted ----
+
+INTERRUPTED = """
+import os, signal, sys
+import planner.assemble
+from mission.__main__ import main
+
+def interrupt(*_, **__):
+    os.kill(os.getpid(), signal.SIGINT)
+
+planner.assemble.assemble = interrupt
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_ctrl_c_leaves_nothing_half_written(floor: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, "plan", str(floor), "-o", str(tmp_path / "out")],
+        capture_output=True, text=True, check=False, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 130
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.splitlines()) <= 1
+    assert left_in(tmp_path / "out") == set()
