@@ -1,0 +1,42 @@
+"""Shortest ways between points over a graph of straight pieces, by Dijkstra's algorithm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from mission.geometry import FloatArray, IntArray, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """Shortest ways between the points asked for."""
+
+    xy: FloatArray
+    """Node positions in the drawing's coordinates; the points come first."""
+    lengths: FloatArray
+    """(points, points) in metres; infinite where there is no way."""
+    before: IntArray
+    """(points, nodes): the node before each node on the way from each point, negative at its start."""
+
+    def way(self, start: int, end: int) -> FloatArray:
+        """The polyline (n, 2) from one point to another, both included."""
+        nodes = [end]
+        while nodes[-1] != start:
+            nodes.append(int(self.before[start, nodes[-1]]))
+        line = self.xy[nodes[::-1]]
+        keep = np.append(True, np.any(np.diff(line, axis=0) != 0, axis=1))
+        return frozen(line[keep])
+
+
+def shortest_ways(xy: FloatArray, edges: IntArray, points: int) -> Ways:
+    """Ways between the first `points` of the nodes `xy` (n, 2) over straight `edges` (m, 2)."""
+    pair = np.unique(np.sort(edges[edges[:, 0] != edges[:, 1]], axis=1), axis=0)
+    length = np.hypot(*(xy[pair[:, 0]] - xy[pair[:, 1]]).T)
+    # a length of exactly 0 would mean "no edge" to the sparse solver
+    graph = csr_array((np.maximum(length, 1e-12), (pair[:, 0], pair[:, 1])), shape=(len(xy),) * 2)
+    lengths, before = dijkstra(graph, directed=False, indices=np.arange(points), return_predecessors=True)
+    return Ways(xy=frozen(xy), lengths=frozen(lengths[:, :points]), before=frozen(before, np.int64))
