@@ -73,18 +73,28 @@ def check_chain(mission: Mission, settings: Settings) -> None:
 
 
 def shape_of(polygon: Polygon) -> shapely.Geometry:
-    return shapely.make_valid(shapely.Polygon(polygon.exterior, polygon.holes))
+    """A polygon as drawn; what of it has no area (spikes, slivers of no width) is left out."""
+    if len(polygon.exterior) < 3:
+        return shapely.Polygon()
+    made = shapely.make_valid(shapely.Polygon(polygon.exterior, polygon.holes))
+    return shapely.union_all([part for part in shapely.get_parts(made) if part.area > 0])
 
 
 def obstacles_of(floor: FloorPlan) -> list[shapely.Geometry]:
     """Every obstacle as drawn, filled shapes and lines."""
     solids = [shape_of(solid) for item in floor.elements if item.obstacle for solid in item.solids]
-    lines = [shapely.LineString(line) for item in floor.elements if item.obstacle for line in item.lines]
-    return solids + lines
+    lines = [
+        shapely.LineString(line)
+        for item in floor.elements
+        if item.obstacle
+        for line in item.lines
+        if len(line) > 1
+    ]
+    return [shape for shape in solids + lines if not shape.is_empty]
 
 
 def floor_edges(floor: FloorPlan) -> shapely.Geometry:
-    return shapely.union_all([shapely.boundary(shape_of(polygon)) for polygon in floor.outline])
+    return shapely.boundary(shapely.union_all([shape_of(polygon) for polygon in floor.outline]))
 
 
 def check_legs(mission: Mission, floor: FloorPlan, space: NavigableSpace, settings: Settings) -> None:
