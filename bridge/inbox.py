@@ -29,9 +29,7 @@ from bridge.protocol import (
     count_of,
     decode,
 )
-from mission.document import Mission
-from mission.errors import InputError
-from mission.files.mission_json import parse
+from mission.document import Mission, digest_of
 
 ON_LEG_M = 0.01
 """How far the end of an approach may lie from its stop."""
@@ -148,12 +146,16 @@ class Inbox:
         return self._read(document, manifest)
 
     def _read(self, document: bytes, manifest: Manifest) -> Mission | Rejected:
+        # Not mission_json.parse: a tenth of its time, and what it refuses besides (keys given twice) the
+        # digest shows, which is of what was read.
         try:
-            mission = parse(document, "the document")
-        except InputError as error:
-            return _no("malformed", str(error))
+            mission = msgspec.json.decode(document, type=Mission)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            return _no("malformed", f"the document: {error}")
         except RecursionError:
             return _no("malformed", "the document is nested too deeply")
+        if digest_of(mission) != mission.digest:
+            return _no("digest", "the document does not have the digest it claims")
         if (mission.id, mission.revision, mission.digest) != (
             manifest.mission_id, manifest.revision, manifest.digest,
         ):  # fmt: skip

@@ -14,9 +14,9 @@ from pathlib import Path
 from bridge import keys as key_files
 from bridge.access import access_control
 from bridge.agent import Agent, on_link, trusting
-from bridge.clock import WallClock
+from bridge.clock import Clock, WallClock
 from bridge.controller import Controller
-from bridge.journal import open_journal
+from bridge.journal import Journal, open_journal
 from bridge.link import Link
 from bridge.protocol import Keys
 from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner
@@ -64,9 +64,7 @@ def robot_on(
 ) -> Iterator[Agent]:
     """A simulated robot on `link`; with keys of its own it obeys only what stations have signed."""
     with open_journal(options.state, options.name) as journal:
-        # A sped-up clock may have run ahead of the wall's: after a reboot it goes on from there.
-        wall = WallClock()
-        clock = WallClock(speed_up=options.speed_up, origin_ns=max(wall.now_ns(), journal.newest_ns + 1))
+        clock, wall = clocks(journal, speed_up=options.speed_up)
         base = SimulatedBase(clock=clock, keep=options.state / "world.json", faults=options.faults)
         scanner = SimulatedScanner(clock=clock, record=options.state / "scans.log", faults=options.faults)
         journal.edge = crashing(options.faults)
@@ -83,6 +81,17 @@ def robot_on(
         )  # fmt: skip
         with on_link(agent):
             yield agent
+
+
+def clocks(journal: Journal, *, speed_up: float, now_ns: int | None = None) -> tuple[Clock, Clock]:
+    """The run's clock and the one that orders count on.
+
+    A sped-up clock runs ahead of the wall's, and a wall clock may have been set back: after a reboot the
+    run's goes on behind the newest event, so that events never go back in time.
+    """
+    wall = WallClock(origin_ns=now_ns)
+    origin_ns = max(wall.now_ns(), journal.newest_ns + 1)
+    return WallClock(speed_up=speed_up, origin_ns=origin_ns), wall
 
 
 def robots_keys(folder: Path, name: str) -> key_files.Keys:

@@ -52,6 +52,8 @@ from mission.files.mission_json import parse
 
 TRY_S = 1.0
 """How long one try waits for its answer."""
+COMMIT_BYTES_PER_S = 1e6
+"""How fast, at least, a robot reads and stores a document."""
 PAUSE_S = 0.05
 """Between tries: a query just after a reconnect may come back empty at once."""
 GATHER_S = 0.3
@@ -140,7 +142,7 @@ class Station:
         held: HeldKeys | None = None,
     ) -> None:
         self.link = link
-        self._held = held
+        self.held = held
         self.keys = keys
         self.commander = commander
         self.timeout_s = timeout_s
@@ -246,8 +248,8 @@ class Station:
 
     def _may_order(self, what: str) -> None:
         """Viewers are told here; the robot would not even answer them."""
-        if self._held is not None and self._held.holder.role != "station":
-            holder = self._held.holder
+        if self.held is not None and self.held.holder.role != "station":
+            holder = self.held.holder
             raise AnswerIsNo(f"{what}: {holder.name} is a {holder.role}, and only stations give orders")
 
     def give(self, order: Command) -> Answer:
@@ -303,20 +305,30 @@ class Station:
 
     def _step(self, manifest: Manifest, step: str, payload: bytes, kind: type[Any], **parameters: str) -> Any:
         key = self.keys.mission(manifest.mission_id, step)
-        reply = self._insist(key, payload, TRIES_S, bulk=step.startswith("chunk"), **parameters)
+        # The robot reads and stores a large document before it answers the commit.
+        try_s = TRY_S + manifest.size / COMMIT_BYTES_PER_S if step == "commit" else TRY_S
+        bulk = step.startswith("chunk")
+        reply = self._insist(key, payload, max(TRIES_S, 3 * try_s), try_s=try_s, bulk=bulk, **parameters)
         return self._answered(reply, kind, f"push ({step})")
 
     def _insist(
-        self, key: str, payload: bytes, within_s: float, *, bulk: bool = False, **parameters: str
+        self,
+        key: str,
+        payload: bytes,
+        within_s: float,
+        *,
+        try_s: float = TRY_S,
+        bulk: bool = False,
+        **parameters: str,
     ) -> bytes | None:
         """Ask the same thing until it is answered or the time is up."""
         deadline = time.monotonic() + within_s
-        signature = b"" if self._held is None or bulk else self._held.sign(key, payload)
+        signature = b"" if self.held is None or bulk else self.held.sign(key, payload)
         while (left := deadline - time.monotonic()) > 0:
             reply = self.link.ask(
                 key,
                 payload,
-                timeout_s=min(TRY_S, left),
+                timeout_s=min(try_s, left),
                 parameters=parameters,
                 bulk=bulk,
                 signature=signature,

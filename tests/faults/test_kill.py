@@ -181,7 +181,7 @@ def check(folder: Path, paused: int) -> None:
 
 
 def test_kills_of_the_robot_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
-    outcomes = [trial(seed, tmp_path / str(seed)) for seed in range(size(short=6, full=300))]
+    outcomes = [trial(seed, tmp_path / str(seed)) for seed in range(size(short=5, full=300))]
     kills, orders = sum(item.kills for item in outcomes), sum(item.orders for item in outcomes)
     unknown = sum(item.unknown for item in outcomes)
     print(f"{len(outcomes)} trials: {kills} kills, {orders} orders, each given twice; {unknown} unknown")

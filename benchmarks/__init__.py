@@ -1,0 +1,1 @@
+"""Figures of the planner and the bridge, each run by one command; tables go into benchmarks/README.md."""

@@ -1,0 +1,124 @@
+"""Measures the link: orders a second, large missions on a slow line, and what a robot costs at rest.
+
+Run: python -m benchmarks.bridge [--keys]; one line per figure, medians and p99.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import statistics
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+
+from bridge.keys import init_site, issue, now_utc
+from bridge.spawn import end_robot, free_port, start_robot
+from bridge.station import Station, connect
+from tests.bridge.proxy import Proxy
+from tests.bridge.world import corridor
+
+ORDERS = 1000
+STOPS_OF_10_MB = 37_000
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--keys", action="store_true", help="measure mTLS with signed orders")
+    with_keys = options.parse_args().keys
+    with tempfile.TemporaryDirectory() as folder:
+        measure(Path(folder), with_keys=with_keys)
+
+
+def measure(folder: Path, *, with_keys: bool) -> None:
+    extra, keys, protocol = [], None, "tcp"
+    if with_keys:
+        init_site(folder / "keys", now=now_utc())
+        issue(folder / "keys", "robot", "r1", now=now_utc())
+        issue(folder / "keys", "station", "alice", now=now_utc())
+        extra, keys, protocol = ["--keys", str(folder / "keys" / "r1")], folder / "keys" / "alice", "tls"
+    port = free_port()
+    robot = start_robot("r1", folder / "state", listen=f"{protocol}/127.0.0.1:{port}", extra=extra)
+    try:
+        print(f"link: {protocol}")
+        with connect(f"{protocol}/127.0.0.1:{port}", robot="r1", keys=keys) as station:
+            station.push(corridor())
+            tell("info", [timed(station.info) for _ in range(ORDERS)])
+            tell("order, refused and journalled", [order_time(station) for _ in range(ORDERS)])
+        at_rest(robot.pid)
+        with Proxy(port, bits_per_s=8e6) as proxy:
+            endpoint = f"{protocol}/127.0.0.1:{proxy.port}"
+            with connect(endpoint, robot="r1", keys=keys, timeout_s=20) as station:
+                slow_push(station)
+    finally:
+        end_robot(robot)
+
+
+def order_time(station: Station) -> float:
+    """Seconds from sending an order to its stored answer; `retry` in READY is refused, and stored."""
+    order = station.order("retry")
+    payload = msgspec.json.encode(order)
+    signature = b""
+    if station.held is not None:
+        signature = station.held.sign(station.keys.command("retry"), payload)
+    ask = station.link.ask
+    return timed(lambda: ask(station.keys.command("retry"), payload, timeout_s=1, signature=signature))
+
+
+def slow_push(station: Station) -> None:
+    """A document of some 10 MB at 8 Mbit/s, with questions asked meanwhile."""
+    mission = corridor(stops=STOPS_OF_10_MB, revision=2)
+    size = len(msgspec.json.encode(mission))
+    latencies: list[float] = []
+    pushed = threading.Event()
+
+    def ask_now_and_then() -> None:
+        while not pushed.wait(0.2):
+            latencies.append(timed(station.info))
+
+    asking = threading.Thread(target=ask_now_and_then)
+    asking.start()
+    began = time.monotonic()
+    station.push(mission)
+    seconds = time.monotonic() - began
+    pushed.set()
+    asking.join()
+    print(f"push of {size / 1e6:.1f} MB at 8 Mbit/s: {seconds:.1f} s; the line alone {size * 8 / 8e6:.1f} s")
+    tell("info meanwhile", latencies)
+
+
+def at_rest(pid: int, seconds: float = 10.0) -> None:
+    before, began = cpu_s(pid), time.monotonic()
+    time.sleep(seconds)
+    share = (cpu_s(pid) - before) / (time.monotonic() - began)
+    memory = int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * resource.getpagesize() / 1e6
+    print(f"robot at rest: {share:.2%} of a core, {memory:.0f} MB")
+
+
+def cpu_s(pid: int) -> float:
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def timed(act: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    act()
+    return time.perf_counter() - began
+
+
+def tell(what: str, seconds: list[float]) -> None:
+    ordered = sorted(seconds)
+    p99 = ordered[min(len(ordered) - 1, int(len(ordered) * 0.99))]
+    print(
+        f"{what}: n {len(ordered)}, median {statistics.median(ordered) * 1e3:.2f} ms, p99 {p99 * 1e3:.2f} ms,"
+        f" greatest {ordered[-1] * 1e3:.1f} ms"
+    )
+
+
+if __name__ == "__main__":
+    main()
