@@ -110,6 +110,8 @@ class NavigableSpace:
     gaps: FloatArray
     """Straight crossings (k, 2, 2) of openings exactly as wide as the robot, between drive areas."""
     targets: Targets
+    ground: tuple[Polygon, ...] = ()
+    """The floor layer and the floor under inner openings."""
     findings: tuple[Finding, ...] = ()
 
 

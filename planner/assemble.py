@@ -58,7 +58,7 @@ def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
             start=Start(
                 x=_rounded(route.start[0]),
                 y=_rounded(route.start[1]),
-                heading=_rounded(route.start[2]),
+                heading=_turned(route.start[2]),
                 reason=route.start_reason,
             ),
             stops=_stops(route, settings),
@@ -100,7 +100,7 @@ def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
     seen = np.zeros(visibility.targets.total, dtype=bool)
     width = max(2, len(str(len(rows))))
     stops = []
-    heading = _rounded(route.start[2])
+    heading = _turned(route.start[2])
     for number, (row, approach) in enumerate(zip(rows, route.approaches, strict=True), start=1):
         units = visibility.seen_by(int(row))
         new = int(np.count_nonzero(~seen[units]))
@@ -146,6 +146,11 @@ def _stop(
 
 def _line(points: FloatArray) -> tuple[Point, ...]:
     return tuple((_rounded(x), _rounded(y)) for x, y in points.tolist())
+
+
+def _turned(heading: float) -> float:
+    """A heading in radians between -π and π."""
+    return _rounded(math.remainder(heading, math.tau))
 
 
 def _rounded(value: float) -> float:

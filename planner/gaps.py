@@ -132,10 +132,13 @@ class Site:
     """Walls, ground and drive area, prepared for trying many ways."""
 
     def __init__(self, walls: Walls, drive_area: BaseGeometry, ground: BaseGeometry) -> None:
-        self.walls, self.drive_area, self.ground = walls, drive_area, ground
+        self.walls, self.drive_area = walls, drive_area
+        self.ground = ground.buffer(SLACK, join_style="mitre")
+        self.slop = 2 * (GROWTH - 1) * float(walls.clearance.max(initial=0.0)) + 8 * GRID
+        """The drive area may begin this far (m) beside a place that keeps every clearance."""
         self.tree = shapely.STRtree(walls.shapes())
         shapely.prepare(drive_area)
-        shapely.prepare(ground)
+        shapely.prepare(self.ground)
 
     def allows(self, a: FloatArray, b: FloatArray) -> bool:
         """Whether the robot may drive straight from a to b."""
@@ -161,10 +164,9 @@ class Site:
         return [gap.middle]
 
     def _asides(self, gap: Gap) -> Iterator[FloatArray]:
-        slop = 2 * (GROWTH - 1) * float(self.walls.clearance.max()) + 8 * GRID
         yield np.zeros(2)
-        yield -slop * gap.across
-        yield slop * gap.across
+        yield -self.slop * gap.across
+        yield self.slop * gap.across
 
     def corridors(self, ends: list[FloatArray]) -> list[tuple[FloatArray, FloatArray]]:
         """Ways between the two ends of corridors exactly as wide as the robot."""

@@ -64,6 +64,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         drive_area=to_polygons(drive_area, origin),
         gaps=frozen(gaps + origin),
         targets=targets,
+        ground=to_polygons(ground.outline, origin),
         findings=(*floor.findings, *findings),
     )
 

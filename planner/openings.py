@@ -54,6 +54,8 @@ def _crossing(
     settings: Settings,
 ) -> Crossing:
     line = shapely.LineString(opening.line - origin)
+    if line.length <= SLACK:
+        return Crossing(opening, shapely.LineString(), (None, None), "its line has no length")
     near = part_near(obstacles, line)
     pieces = [p for p in shapely.get_parts(line.difference(near)) if p.length > SLACK]
     clear = max(pieces, key=lambda piece: piece.length, default=shapely.LineString())
@@ -63,6 +65,8 @@ def _crossing(
 
 def part_near(shape: BaseGeometry, line: BaseGeometry) -> BaseGeometry:
     """What of a large shape lies within 1 m of a line's bounds, quick to work with."""
+    if line.is_empty:
+        return line
     x0, y0, x1, y1 = line.bounds
     return shapely.clip_by_rect(shape, x0 - 1.0, y0 - 1.0, x1 + 1.0, y1 + 1.0)
 
@@ -127,7 +131,7 @@ def threshold(crossing: Crossing) -> BaseGeometry:
 def barrier(crossing: Crossing, origin: FloatArray, obstacles: BaseGeometry) -> FloatArray:
     """The opening's line (2, 2), drawn out to the jambs when it ends just short of them."""
     a, b = crossing.opening.line - origin
-    along = (b - a) / np.hypot(*(b - a))
+    along = (b - a) / max(float(np.hypot(*(b - a))), SLACK)
     ends = []
     for end, way in ((a, -along), (b, along)):
         reach = shapely.LineString([end, end + END_GAP * way])

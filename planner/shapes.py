@@ -49,8 +49,12 @@ def to_shape(polygons: Iterable[Polygon], origin: FloatArray) -> BaseGeometry:
 
 
 def one_shape(polygon: Polygon, origin: FloatArray) -> BaseGeometry:
-    """One polygon in the local frame."""
-    return shapely.Polygon(polygon.exterior - origin, [hole - origin for hole in polygon.holes])
+    """One polygon in the local frame, mended where it crosses itself; empty where it has no area."""
+    if len(polygon.exterior) < 3:
+        return shapely.Polygon()
+    holes = [hole - origin for hole in polygon.holes if len(hole) >= 3]
+    mended = shapely.make_valid(shapely.Polygon(polygon.exterior - origin, holes))
+    return shapely.union_all(polygon_parts(mended))
 
 
 def to_polygons(shape: BaseGeometry, origin: FloatArray) -> tuple[Polygon, ...]:
@@ -102,6 +106,12 @@ def grown(shape: BaseGeometry, distance: float) -> BaseGeometry:
 QUARTER = 4
 GROWTH = float(1 / np.cos(np.pi / (4 * QUARTER)))
 """Radius of the polygon round a circle of radius 1 with 4 × QUARTER corners."""
+
+
+def boundary_lines(shape: BaseGeometry) -> NDArray[np.object_]:
+    """All boundary segments of a polygonal geometry as lines."""
+    segments = segments_of(shape)
+    return shapely.linestrings(segments) if len(segments) else np.empty(0, dtype=object)
 
 
 def segments_of(shape: BaseGeometry) -> FloatArray:

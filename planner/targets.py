@@ -52,7 +52,7 @@ def _rings(shape: BaseGeometry) -> tuple[int, int]:
 def solid_of(element: Element, origin: FloatArray, thickness: float) -> BaseGeometry:
     """An element's filled plan in the local frame; lines become solids of this thickness (m)."""
     parts = [one_shape(solid, origin) for solid in element.solids]
-    parts += [thin_solid(line - origin, thickness) for line in element.lines]
+    parts += [thin_solid(line - origin, thickness) for line in element.lines if polyline_length(line) > 0]
     return shapely.union_all([shapely.make_valid(part) for part in parts])
 
 
@@ -140,11 +140,13 @@ def face_segments(shape: BaseGeometry) -> FloatArray:
 
 def owners_of(faces: FloatArray, floor: FloorPlan) -> list[int]:
     """The element whose boundary each face lies on; a target before another, then the first; else -1."""
+    if not len(faces):
+        return []
     origin = local_origin(floor)
     indices = [k for k, item in enumerate(floor.elements) if item.occludes]
     outlines = [shapely.boundary(snapped(solid_of(floor.elements[k], origin, LINE_WALL))) for k in indices]
     tree = shapely.STRtree(outlines)
-    middles = shapely.points(faces.mean(axis=1)) if len(faces) else []
+    middles = shapely.points(faces.mean(axis=1))
     face, hit = tree.query(middles, predicate="dwithin", distance=3 * GRID)
     owners = [-1] * len(faces)
     for f, h in sorted(zip(face.tolist(), hit.tolist(), strict=True)):
@@ -193,4 +195,4 @@ def _thinned(
         != owner[_key(np.stack([points[k], points[(k + 1) % len(points)]]))]
         for k in range(len(points))
     ]
-    return points[keep]
+    return points[keep] if np.count_nonzero(keep) >= 3 else points

@@ -30,8 +30,8 @@ from planner.candidates.grid import grid
 from planner.candidates.place import Place
 from planner.candidates.proposals import Proposals, joined
 from planner.candidates.triangulation import triangulation
-from planner.connected import Parts, parts_of
-from planner.shapes import local_origin, to_shape
+from planner.reach import Reach, reach_of
+from planner.shapes import local_origin
 
 Strategy = Callable[[NavigableSpace], tuple[FloatArray, IntArray] | tuple[FloatArray, IntArray, IntArray]]
 STRATEGIES: dict[str, Strategy] = {"grid": grid, "triangulation": triangulation}
@@ -80,12 +80,13 @@ def _for_empty_rooms(place: Place, found: Proposals) -> Proposals:
 def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> Candidates:
     xy, reason = proposals.xy, proposals.reason
     origin = local_origin(space.floor)
-    parts = parts_of(to_shape(space.drive_area, origin), space.gaps - origin)
-    at = np.where(reason == KEPT, parts.part_at(xy - origin), -1)
+    reach = reach_of(space)
+    at = np.full(len(xy), -1, dtype=np.int64)
+    at[reason == KEPT] = reach.part_at(xy[reason == KEPT] - origin)
     reason = np.where((reason == KEPT) & (at < 0), UNREACHABLE, reason)
     if not np.any(at >= 0):
         raise AnswerIsNo(_no_candidate(space, reason))
-    chosen = _chosen_part(space, proposals, parts, at) if part is None else part
+    chosen = _chosen_part(space, proposals, reach, at) if part is None else part
     _check_used(space, proposals, at, chosen)
     reason = np.where((reason == KEPT) & (at != chosen), OTHER_PART, reason)
     return Candidates(
@@ -96,7 +97,7 @@ def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> C
         part=frozen(at, np.int64),
         strategy=space.settings.candidates,
         chosen_part=chosen,
-        part_area=parts.areas,
+        part_area=reach.parts.areas,
         doorway=frozen(proposals.doorway, np.bool_),
         must=frozen(proposals.must, np.bool_),
     )
@@ -110,19 +111,19 @@ def _check_used(space: NavigableSpace, proposals: Proposals, at: IntArray, chose
         )
 
 
-def _chosen_part(space: NavigableSpace, proposals: Proposals, parts: Parts, at: IntArray) -> int:
+def _chosen_part(space: NavigableSpace, proposals: Proposals, reach: Reach, at: IntArray) -> int:
     """The start's part, else the largest that has candidates in rooms: floor beyond them comes last."""
     held = set(at[at >= 0].tolist())
     if space.settings.start is not None:
-        return _part_of_start(space, parts, held)
+        return _part_of_start(space, reach, held)
     in_room = np.array([space.rooms[k].room is not None for k in proposals.room])
     return min(set(at[(at >= 0) & in_room].tolist()) or held)
 
 
-def _part_of_start(space: NavigableSpace, parts: Parts, held: set[int]) -> int:
+def _part_of_start(space: NavigableSpace, reach: Reach, held: set[int]) -> int:
     assert space.settings.start is not None
     x, y, _ = space.settings.start
-    found = int(parts.part_at(np.array([[x, y]]) - local_origin(space.floor))[0])
+    found = int(reach.part_at(np.array([[x, y]]) - local_origin(space.floor))[0])
     if found < 0:
         raise InputError(
             f"start = {x:g},{y:g}: the robot (radius {space.settings.radius:g} m) does not fit there; "

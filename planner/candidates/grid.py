@@ -22,6 +22,8 @@ def grid(space: NavigableSpace) -> tuple[FloatArray, IntArray]:
 
 def room_grid(room: BaseGeometry, *, spacing: float) -> FloatArray:
     """Corners (n, 2) of cells at most `spacing` wide that divide the room's rectangle evenly."""
+    if room.is_empty:
+        return np.empty((0, 2))
     axes = main_axes(room)
     low, high = _extent(room, axes)
     cells = np.maximum(1, np.ceil((high - low) / spacing - 1e-9)).astype(int)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from mission.geometry import BoolArray, FloatArray, IntArray
 from mission.planning import AT_EDGE, AVOIDED, IN_HOLE, KEPT, OUTSIDE, TOO_CLOSE, NavigableSpace
-from planner.shapes import SLACK, local_origin, segments_of, to_shape
+from planner.shapes import SLACK, boundary_lines, local_origin, to_shape
 
 
 class Place:
@@ -19,8 +20,8 @@ class Place:
         self.outline = to_shape(space.floor.outline, self.origin)
         self.rooms = [to_shape(room.area, self.origin) for room in space.rooms]
         self.obstacles = to_shape(space.obstacles, self.origin)
-        self._walls = shapely.linestrings(segments_of(self.obstacles))
-        self._edges = shapely.linestrings(segments_of(self.outline))
+        self._walls = boundary_lines(self.obstacles)
+        self._edges = boundary_lines(self.outline)
         self._wall_tree, self._edge_tree = shapely.STRtree(self._walls), shapely.STRtree(self._edges)
         for shape in (self.outline, self.obstacles, *self.rooms):
             shapely.prepare(shape)
@@ -69,7 +70,7 @@ class Place:
         return _nearest(self._edge_tree, self._edges, local)
 
 
-def _nearest(tree: shapely.STRtree, lines: FloatArray, local: FloatArray) -> FloatArray:
+def _nearest(tree: shapely.STRtree, lines: NDArray[np.object_], local: FloatArray) -> FloatArray:
     if not len(lines) or not len(local):
         return np.full(len(local), np.inf)
     points = shapely.points(local)

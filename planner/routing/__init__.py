@@ -16,18 +16,20 @@ import numpy as np
 from mission.errors import AnswerIsNo, InputError
 from mission.geometry import FloatArray, IntArray, frozen, polyline_length
 from mission.planning import NavigableSpace, Route, Selection
-from planner.connected import parts_of
+from planner.reach import reach_of
 from planner.routing.colony import ant_colony
+from planner.routing.grid_graph import grid_ways
 from planner.routing.proof import proved
-from planner.routing.roadmap import Ways, ways_between
+from planner.routing.roadmap import ways_between
 from planner.routing.tour import NANOMETRES, nanometres, shortest_tour
-from planner.shapes import local_origin, to_shape
+from planner.routing.ways import Ways
+from planner.shapes import local_origin
 
 Router = Callable[..., IntArray]
 ROUTERS: dict[str, Router] = {"default": shortest_tour, "aco": ant_colony}
 METHODS = {"default": "2-opt, Or-opt, iterated", "aco": "ant colony"}
 Graph = Callable[[NavigableSpace, FloatArray], Ways]
-GRAPHS: dict[str, Graph] = {"exact": ways_between}
+GRAPHS: dict[str, Graph] = {"exact": ways_between, "grid": grid_ways}
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,11 @@ class Ends:
 
 
 def route(selection: Selection) -> Route:
-    """The shortest tour found over the chosen stops, closed or open, with a proven bound."""
+    """The shortest tour found over the chosen stops, closed or open, with a proven bound.
+
+    The bound is that of the graph's ways: over the paper's grid, which has detours, exact ways may be
+    shorter, and the method says so.
+    """
     space = selection.visibility.candidates.space
     settings = space.settings
     for key, known in (("router", ROUTERS), ("graph", GRAPHS)):
@@ -52,6 +58,7 @@ def route(selection: Selection) -> Route:
     if not np.isfinite(ways.lengths).all():
         raise AnswerIsNo(f"{space.floor.name}: the route's end is not connected with its stops")
     sequence, bound, method = _ordered(ways.lengths, ends, settings.router, seed=settings.seed)
+    method += "" if settings.graph == "exact" else f", over the ways of --graph {settings.graph}"
     return _assembled(selection, points, ways, sequence, ends, bound, method)
 
 
@@ -80,8 +87,7 @@ def _check_end(selection: Selection) -> None:
     space, end = candidates.space, candidates.space.settings.end
     assert end is not None
     origin = local_origin(space.floor)
-    parts = parts_of(to_shape(space.drive_area, origin), space.gaps - origin)
-    found = int(parts.part_at(np.array([end]) - origin)[0])
+    found = int(reach_of(space).part_at(np.array([end]) - origin)[0])
     if found != candidates.chosen_part:
         why = "the robot does not fit there" if found < 0 else "it is in another part of the floor"
         raise InputError(f"end = {end[0]:g},{end[1]:g}: {why}; choose a place clear of walls and floor edges")

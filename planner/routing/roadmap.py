@@ -11,36 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 from shapely.geometry.base import BaseGeometry
 
-from mission.geometry import FloatArray, IntArray, frozen
+from mission.geometry import FloatArray, IntArray
 from mission.planning import NavigableSpace
 from planner.mesh import mesh_of
+from planner.reach import reach_of
+from planner.routing.ways import Ways, shortest_ways
 from planner.shapes import GRID, local_origin, polygon_parts, snapped, to_grid, to_shape
 from planner.sight import scene_of, sight
 
-
-@dataclass(frozen=True, eq=False)
-class Ways:
-    """Shortest ways between the points asked for."""
-
-    xy: FloatArray
-    """Node positions in the drawing's coordinates; the points come first."""
-    lengths: FloatArray
-    """(points, points) in metres; infinite where there is no way."""
-    before: IntArray
-    """(points, nodes): the node before each node on the way from each point, negative at its start."""
-
-    def way(self, start: int, end: int) -> FloatArray:
-        """The polyline (n, 2) from one point to another, both included."""
-        nodes = [end]
-        while nodes[-1] != start:
-            nodes.append(int(self.before[start, nodes[-1]]))
-        line = self.xy[nodes[::-1]]
-        keep = np.append(True, np.any(np.diff(line, axis=0) != 0, axis=1))
-        return frozen(line[keep])
+TOUCH = 1e-9
+"""Products of areas (m⁴) below this are float noise."""
 
 
 def ways_between(space: NavigableSpace, points: FloatArray) -> Ways:
@@ -48,28 +30,48 @@ def ways_between(space: NavigableSpace, points: FloatArray) -> Ways:
     origin = local_origin(space.floor)
     corners = outward_corners(space)
     ends, crossing = np.unique(space.gaps.reshape(-1, 2) - origin, axis=0, return_inverse=True)
-    nodes = np.concatenate([points - origin, corners, ends])
-    links = crossing.reshape(-1, 2) + len(points) + len(corners)
-    graph = _graph(space, nodes, np.concatenate([links, _on_crossings(points - origin, nodes, links)]))
-    lengths, before = dijkstra(
-        graph, directed=False, indices=np.arange(len(points)), return_predecessors=True
-    )
-    return Ways(
-        xy=frozen(nodes + origin),
-        lengths=frozen(lengths[:, : len(points)]),
-        before=frozen(before, np.int64),
-    )
+    anchors, anchored = anchors_of(space, points - origin)
+    nodes = np.concatenate([points - origin, corners.xy, ends, anchors])
+    links = crossing.reshape(-1, 2) + len(points) + len(corners.xy)
+    to_anchors = np.stack([anchored, np.arange(len(nodes) - len(anchors), len(nodes))], axis=1)
+    seen = _tangent(_in_sight(space, nodes), nodes, corners, first=len(points))
+    edges = [seen, links, on_crossings(points - origin, nodes, links), to_anchors]
+    return shortest_ways(nodes + origin, np.concatenate(edges), len(points))
 
 
-def outward_corners(space: NavigableSpace) -> FloatArray:
-    """Corners (n, 2) of the drive area, local, where its inner angle is more than straight."""
-    found = [np.empty((0, 2))]
+def anchors_of(space: NavigableSpace, points: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Anchors (k, 2) of the points that are not well inside the drive area, and which points those are."""
+    anchors = reach_of(space).anchors(points)
+    moved = np.flatnonzero(np.any(anchors != points, axis=1) & np.isfinite(anchors[:, 0]))
+    return anchors[moved], moved
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """Corners of the drive area, local, where its inner angle is more than straight."""
+
+    xy: FloatArray
+    """(n, 2)."""
+    sides: FloatArray
+    """The way to the corner before and to the one after (n, 2, 2); zero where rings touch."""
+
+
+def outward_corners(space: NavigableSpace) -> Corners:
+    """Every corner once, in a canonical order."""
+    found, sides = [np.empty((0, 2))], [np.empty((0, 2, 2))]
     for piece in polygon_parts(_drive_area(space)):
         for ring, sign in _oriented_rings(piece):
-            into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
-            turn = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
-            found.append(ring[sign * turn < 0])
-    return np.unique(np.concatenate(found), axis=0)
+            back, on = np.roll(ring, 1, axis=0) - ring, np.roll(ring, -1, axis=0) - ring
+            outward = sign * _cross(back, on) > 0
+            found.append(ring[outward])
+            sides.append(np.stack([back, on], axis=1)[outward])
+    xy, first, times = np.unique(np.concatenate(found), axis=0, return_index=True, return_counts=True)
+    return Corners(xy, np.where((times == 1)[:, None, None], np.concatenate(sides)[first], 0.0))
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    product: FloatArray = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return product
 
 
 def _oriented_rings(piece: shapely.Polygon) -> list[tuple[FloatArray, float]]:
@@ -83,7 +85,7 @@ def _drive_area(space: NavigableSpace) -> BaseGeometry:
     return snapped(to_shape(space.drive_area, local_origin(space.floor)))
 
 
-def _on_crossings(points: FloatArray, nodes: FloatArray, links: IntArray) -> IntArray:
+def on_crossings(points: FloatArray, nodes: FloatArray, links: IntArray) -> IntArray:
     """Links (k, 2) from points that lie on a gap crossing, such as stops in doorways, to its ends."""
     if not len(links):
         return np.empty((0, 2), dtype=np.int64)
@@ -93,19 +95,27 @@ def _on_crossings(points: FloatArray, nodes: FloatArray, links: IntArray) -> Int
     return np.stack([np.repeat(point, 2), links[way].ravel()], axis=1).astype(np.int64)
 
 
-def _graph(space: NavigableSpace, nodes: FloatArray, links: IntArray) -> csr_array:
-    """Straight ways between nodes that see each other, and the given links (k, 2)."""
+def _in_sight(space: NavigableSpace, nodes: FloatArray) -> IntArray:
+    """Pairs (m, 2) of nodes that see each other."""
     mesh = mesh_of(_drive_area(space))
     ones = np.ones(len(nodes), dtype=np.int64)
     scene = scene_of(mesh, nodes, nodes, ones, np.zeros(len(nodes), dtype=bool))
     runs = sight(scene, to_grid(nodes), reach=None)
     start = np.repeat(np.arange(len(nodes)), np.diff(runs.pointer))
-    start = np.concatenate([start, links[:, 0]])
-    end = np.concatenate([runs.segment, links[:, 1]])
-    useful = start != end
-    start, end = start[useful], end[useful]
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    pair = np.unique(np.stack([low, high], axis=1), axis=0)
-    length = np.hypot(*(nodes[pair[:, 0]] - nodes[pair[:, 1]]).T)
-    # a length of exactly 0 would mean "no edge" to the sparse solver
-    return csr_array((np.maximum(length, 1e-12), (pair[:, 0], pair[:, 1])), shape=(len(nodes),) * 2)
+    return np.stack([start, runs.segment], axis=1)
+
+
+def _tangent(edges: IntArray, nodes: FloatArray, corners: Corners, *, first: int) -> IntArray:
+    """The edges that a shortest way may use: straight on from a corner, they pass by it.
+
+    Where both sides of a corner do not lie on one side of the edge, the way would cut the corner shorter.
+    Nodes from `first` on are the corners. What is too close to tell is kept.
+    """
+    sides = np.zeros((len(nodes), 2, 2))
+    sides[first : first + len(corners.xy)] = corners.sides
+    along = (nodes[edges[:, 1]] - nodes[edges[:, 0]])[:, None]
+    useful = np.ones(len(edges), dtype=bool)
+    for end in range(2):
+        turn = _cross(along, sides[edges[:, end]])
+        useful &= turn[:, 0] * turn[:, 1] >= -TOUCH
+    return edges[useful]

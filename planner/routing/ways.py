@@ -34,7 +34,9 @@ class Ways:
 
 def shortest_ways(xy: FloatArray, edges: IntArray, points: int) -> Ways:
     """Ways between the first `points` of the nodes `xy` (n, 2) over straight `edges` (m, 2)."""
-    pair = np.unique(np.sort(edges[edges[:, 0] != edges[:, 1]], axis=1), axis=0)
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    key = np.unique(low[low < high] * len(xy) + high[low < high])
+    pair = np.stack([key // len(xy), key % len(xy)], axis=1)
     length = np.hypot(*(xy[pair[:, 0]] - xy[pair[:, 1]]).T)
     # a length of exactly 0 would mean "no edge" to the sparse solver
     graph = csr_array((np.maximum(length, 1e-12), (pair[:, 0], pair[:, 1])), shape=(len(xy),) * 2)

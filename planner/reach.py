@@ -1,0 +1,93 @@
+"""What the robot can reach: which part of the floor a point belongs to, and where it enters the drive area.
+
+The drive area is drawn a little too small, so a point that keeps every clearance exactly may lie just
+outside it. Such a point has an anchor, a point of the drive area to which the way is checked exactly.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import shapely
+
+from mission.geometry import BoolArray, FloatArray, IntArray
+from mission.planning import NavigableSpace
+from planner.connected import Parts, parts_of
+from planner.gaps import Site, Walls
+from planner.shapes import GRID, boundary_lines, local_origin, segments_of, to_shape
+
+INSIDE = 3 * GRID
+"""Points nearer than this (m) to the drive area's edge are anchored, since the mesh is snapped."""
+SIDES = 8
+
+
+class Reach:
+    """A navigable space, prepared for asking where the robot gets; points are local (n, 2)."""
+
+    def __init__(self, space: NavigableSpace) -> None:
+        origin = local_origin(space.floor)
+        drive_area = to_shape(space.drive_area, origin)
+        self.parts: Parts = parts_of(drive_area, space.gaps - origin)
+        self.site = Site(walls_of(space), drive_area, to_shape(space.ground, origin))
+        self._rim = boundary_lines(drive_area)
+        self._rim_tree = shapely.STRtree(self._rim)
+
+    def part_at(self, xy: FloatArray) -> IntArray:
+        """Part of each point, -1 where the robot does not get to."""
+        anchors = self.anchors(xy)
+        found = np.full(len(xy), -1, dtype=np.int64)
+        somewhere = np.isfinite(anchors[:, 0])
+        found[somewhere] = self.parts.part_at(anchors[somewhere])
+        return found
+
+    def anchors(self, xy: FloatArray) -> FloatArray:
+        """The drive area's point for each point: itself where it is well inside; NaN where there is none."""
+        found = np.array(xy, dtype=np.float64)
+        for k in np.flatnonzero(~self._well_inside(xy)):
+            if not self._on_crossing(found[k]):
+                found[k] = self._anchor(xy[k])
+        return found
+
+    def _well_inside(self, xy: FloatArray) -> BoolArray:
+        inside: BoolArray = self.parts.part_at(xy) >= 0
+        if len(self._rim) and len(xy):
+            points = shapely.points(xy)
+            inside &= shapely.distance(points, self._rim[self._rim_tree.nearest(points)]) > INSIDE
+        return inside
+
+    def _on_crossing(self, point: FloatArray) -> bool:
+        gaps = self.parts.gaps
+        return bool(
+            len(gaps) and shapely.dwithin(shapely.linestrings(gaps), shapely.Point(point), GRID).any()
+        )
+
+    def _anchor(self, point: FloatArray) -> FloatArray:
+        """A point of the drive area beside this one, to which the robot may drive straight."""
+        nowhere = np.full(2, np.nan)
+        if not len(self._rim):
+            return nowhere
+        rim = self._rim[self._rim_tree.nearest(shapely.Point(point))]
+        foot = shapely.get_coordinates(rim.interpolate(rim.project(shapely.Point(point))))[0]
+        if np.hypot(*(foot - point)) > self.site.slop:
+            return nowhere
+        for angle in np.arange(SIDES) * (2 * np.pi / SIDES):
+            end = foot + 2 * INSIDE * np.array([np.cos(angle), np.sin(angle)])
+            if self._well_inside(end[None])[0] and self.site.allows(point, end):
+                return end
+        return nowhere
+
+
+@lru_cache(maxsize=4)
+def reach_of(space: NavigableSpace) -> Reach:
+    """The space, prepared once."""
+    return Reach(space)
+
+
+def walls_of(space: NavigableSpace) -> Walls:
+    """Everything a robot's centre keeps a distance from: obstacles, closed openings, floor edges."""
+    origin = local_origin(space.floor)
+    solid = np.concatenate([segments_of(to_shape(space.obstacles, origin)), space.barriers - origin])
+    edges = segments_of(to_shape(space.ground, origin))
+    clearance = np.repeat([space.settings.radius, space.settings.edge], [len(solid), len(edges)])
+    return Walls(np.concatenate([solid, edges]), clearance)
