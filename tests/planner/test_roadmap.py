@@ -1,0 +1,111 @@
+"""The exact roadmap against a graph over every corner, and what its reduction may not change."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import networkx as nx
+import numpy as np
+import pytest
+import shapely
+
+from mission.floor import FloorPlan
+from mission.planning import NavigableSpace
+from mission.settings import Settings
+from planner.navigable import navigable
+from planner.routing import roadmap
+from planner.routing.roadmap import outward_corners, ways_between
+from planner.shapes import local_origin, snapped, to_shape
+from tests.planner.worlds import SHARED, box, column, hall, two_rooms, wall
+
+SETTINGS = Settings(robot_radius=0.3, edge=0.3)
+
+
+def random_floor(seed: int) -> FloorPlan:
+    """A hall of 9 × 7 m with up to seven things in it, some of them touching."""
+    random = np.random.default_rng(seed)
+    things = []
+    for k, (x, y, w, h) in enumerate(random.uniform((1, 1, 0.2, 0.2), (7, 5.5, 1.5, 1.2), (5, 4)).round(1)):
+        things.append(wall(f"w{k}", box(x, y, x + w, y + h)))
+    things += [column(f"c{k}", *random.uniform((1, 1), (8, 6)).round(1)) for k in range(2)]
+    return hall(9, 7, *things)
+
+
+def free_points(space: NavigableSpace, count: int, seed: int) -> np.ndarray:
+    random = np.random.default_rng(seed)
+    area = to_shape(space.drive_area, np.zeros(2)).buffer(-0.01)
+    largest = max(shapely.get_parts(area), key=shapely.area)
+    points = random.uniform((0, 0), (9, 7), (400, 2))
+    return points[shapely.contains_xy(largest, *points.T)][:count]
+
+
+def shortest(space: NavigableSpace, points: np.ndarray) -> np.ndarray:
+    """Lengths between points over all pairs of points and corners that the drive area covers."""
+    area = snapped(to_shape(space.drive_area, local_origin(space.floor)))
+    wide = area.buffer(2e-6)  # edges along its own edge are in it, despite float noise
+    shapely.prepare(wide)
+    local = points - local_origin(space.floor)
+    nodes = np.concatenate([local, np.unique(shapely.get_coordinates(area), axis=0)])
+    i, j = np.triu_indices(len(nodes), 1)
+    lines = shapely.linestrings(np.stack([nodes[i], nodes[j]], axis=1))
+    seen = shapely.covers(wide, lines)
+    graph = nx.Graph()
+    graph.add_nodes_from(range(len(nodes)))
+    edges = zip(i[seen], j[seen], shapely.length(lines[seen]), strict=True)
+    graph.add_weighted_edges_from((int(a), int(b), float(w)) for a, b, w in edges)
+    from_each = [nx.single_source_dijkstra_path_length(graph, k) for k in range(len(points))]
+    return np.array([[found.get(k, np.inf) for k in range(len(points))] for found in from_each])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_ways_are_as_short_as_over_every_corner(seed: int) -> None:
+    space = replace(navigable(random_floor(seed), SETTINGS), gaps=np.empty((0, 2, 2)))
+    points = free_points(space, 6, seed)
+    found = ways_between(space, points)
+    assert np.allclose(found.lengths, shortest(space, points), atol=1e-4)  # slits below 2 µm apart
+    for a in range(len(points)):
+        for b in range(len(points)):
+            line = found.way(a, b)
+            assert np.allclose(line[[0, -1]], points[[a, b]])
+            assert np.isclose(np.hypot(*np.diff(line, axis=0).T).sum(), found.lengths[a, b])
+
+
+@pytest.mark.parametrize("seed", range(8, 14))
+def test_edges_that_cut_corners_are_not_missed(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    space = navigable(random_floor(seed), SETTINGS)
+    points = free_points(space, 8, seed)
+    reduced = ways_between(space, points)
+    monkeypatch.setattr(roadmap, "_tangent", lambda edges, *_, **__: edges)
+    full = ways_between(space, points)
+    assert np.array_equal(reduced.lengths, full.lengths)
+
+
+def test_a_way_bends_at_outward_corners_only() -> None:
+    space = navigable(random_floor(3), SETTINGS)
+    points = free_points(space, 6, 1)
+    ways = ways_between(space, points)
+    corners = {tuple(xy) for xy in (outward_corners(space).xy + local_origin(space.floor)).round(6)}
+    bends = np.concatenate([ways.way(a, b)[1:-1] for a in range(6) for b in range(6)])
+    assert len(bends)
+    assert {tuple(xy) for xy in bends.round(6)} <= corners
+
+
+def test_an_empty_hall_has_no_corner_to_bend_at() -> None:
+    assert len(outward_corners(navigable(hall(6, 4), SETTINGS)).xy) == 0
+
+
+def test_points_in_rooms_that_are_not_connected_have_no_way() -> None:
+    lengths = ways_between(navigable(two_rooms(0.5), SETTINGS), np.array([(1.0, 1.0), (7.0, 1.0)])).lengths
+    assert np.isinf(lengths[0, 1])
+
+
+@pytest.mark.skipif(not SHARED.exists(), reason="the shared floors are not here")
+def test_the_reduction_keeps_every_length_on_a_real_floor(monkeypatch: pytest.MonkeyPatch) -> None:
+    from planner.floors import read_floor
+
+    space = navigable(read_floor(SHARED / "layered" / "fzk-haus-eg.dxf", d_dis=0.05), Settings())
+    area = to_shape(space.drive_area, np.zeros(2))
+    points = np.array([part.representative_point().coords[0] for part in shapely.get_parts(area)])
+    reduced = ways_between(space, points)
+    monkeypatch.setattr(roadmap, "_tangent", lambda edges, *_, **__: edges)
+    assert np.array_equal(reduced.lengths, ways_between(space, points).lengths)
