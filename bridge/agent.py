@@ -39,6 +39,7 @@ from bridge.protocol import (
 )
 from bridge.robots import Base, Scanner
 from mission import __version__
+from mission.document import Transform
 from mission.events import PoseReport
 
 if TYPE_CHECKING:
@@ -86,6 +87,7 @@ class Agent:
         command_clock: Clock,
         speed_up: float = 1.0,
         trust: Trust | None = None,
+        to_map: Transform | None = None,
     ) -> None:
         self._keys = keys
         self._link = link
@@ -98,6 +100,7 @@ class Agent:
         self._pose_pause_s = max(POSE_EVERY_S / speed_up, LEAST_POSE_PAUSE_S)
         self._inbox = Inbox(journal, controller, scanner.profiles)
         self._trust = trust
+        self._to_map = to_map
         self._closing = threading.Event()
         self._news = threading.Event()
         self._threads: list[threading.Thread] = []
@@ -183,6 +186,7 @@ class Agent:
             chunk_bytes=CHUNK_BYTES,
             document_bytes=MAX_DOCUMENT_BYTES,
             profiles=self._profiles,
+            to_map=self._to_map,
         )
         return encode(info)
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from bridge.protocol import Answer, Verb
     from bridge.station import Station
     from bridge.watch import Recording
+    from mission.document import Mission, Transform
     from mission.events import Pose, StateReport
 
 RobotName = Annotated[str, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
@@ -71,6 +72,10 @@ def robot(
         str | None,
         typer.Option("--at", metavar="X,Y,HEADING", help="Where it stands (m, degrees); else at the start."),
     ] = None,
+    map_: Annotated[
+        str | None,
+        typer.Option("--map", metavar="X,Y,HEADING", help="Site to map: turn by HEADING, then shift."),
+    ] = None,
     fault: Annotated[
         list[str] | None,
         typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="Let something go wrong, as slip@2=0.2."),
@@ -87,7 +92,9 @@ def robot(
 
     options = RobotOptions(
         name=name, listen=listen, connect=connect, state=state, site=site, speed_up=speed_up,
-        at=None if at is None else read_pose(at), insecure=insecure,
+        at=None if at is None else read_pose("--at", at),
+        to_map=None if map_ is None else read_transform("--map", map_),
+        insecure=insecure,
         keys=keys, faults=Faults(tuple(read_fault(text) for text in fault or ())),
     )  # fmt: skip
     where = f"listens on {listen}" if connect is None else f"connects to {connect}"
@@ -118,13 +125,27 @@ def push(
         reached(Way(robot, connect, site, who, timeout, insecure, keys)) as station,
         Bar("pushing") as bar,
     ):
-        accepted = station.push(document, progress=bar.show)
+        told = turning(station.info().to_map, document)
+        accepted = station.push(document, progress=bar.show, take_over=take_over)
+    if told:
+        say(told)
     if json_:
         print_json({"robot": robot, "mission_id": accepted.mission_id, "revision": accepted.revision,
                     "digest": accepted.digest, "already": accepted.already})  # fmt: skip
     else:
         how = "already held" if accepted.already else "accepted"
         typer.echo(f"{robot} {how} {document.name} ({document.id[:12]} revision {document.revision})")
+
+
+def turning(own: Transform | None, mission: Mission) -> str:
+    """How the robot turns the mission onto its map, in words; empty if it does not."""
+    import math
+
+    to_map, whose = (own, "robot --map") if own else (mission.frame.to_map, "the mission's frame")
+    if to_map is None:
+        return ""
+    turned = f"{math.degrees(to_map.heading):.2f}°, then shifted by ({to_map.x:.3f}, {to_map.y:.3f}) m"
+    return f"on the robot's map, places are turned by {turned} ({whose})"
 
 
 def start(
@@ -375,7 +396,15 @@ def state_line(report: StateReport) -> str:
     )
 
 
-def read_pose(text: str) -> Pose:
+def read_transform(option: str, text: str) -> Transform:
+    """A transform from X,Y,HEADING in metres and degrees."""
+    from mission.document import Transform
+
+    pose = read_pose(option, text)
+    return Transform(x=pose.x, y=pose.y, heading=pose.heading)
+
+
+def read_pose(option: str, text: str) -> Pose:
     """A pose from X,Y,HEADING in metres and degrees."""
     import math
 
@@ -384,9 +413,9 @@ def read_pose(text: str) -> Pose:
     try:
         x, y, heading = (float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(f"--at {text}: write it X,Y,HEADING in metres and degrees, as 1.5,2,90") from None
+        raise InputError(f"{option} {text}: write X,Y,HEADING in metres and degrees, as 1.5,2,90") from None
     if not all(map(math.isfinite, (x, y, heading))):
-        raise InputError(f"--at {text}: must be finite numbers")
+        raise InputError(f"{option} {text}: must be finite numbers")
     return Pose(x=x, y=y, heading=math.radians(heading))
 
 

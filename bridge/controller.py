@@ -90,7 +90,7 @@ class Controller:
             return
         self._run = kept
         self._mission = self._stored(kept.mission_id, kept.revision)
-        if kept.state == "READY" and self._mission is not None:
+        if self._mission is not None:
             self._mission_taken(self._mission)
         change = runs.rebooted(kept)
         if change.events:

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 
 import msgspec
 
+from mission.document import Transform
 from mission.errors import InputError
 from mission.events import AnyEvent, State, StateReport
 
@@ -132,6 +133,8 @@ class Info(Message, frozen=True):
     document_bytes: int
     profiles: tuple[str, ...] | None
     """Scan profiles the scanner knows; `None` if it takes any."""
+    to_map: Transform | None
+    """Site to map, if the robot was told; else each mission's `frame.to_map` counts."""
 
 
 class Manifest(Message, frozen=True):

@@ -16,10 +16,12 @@ from bridge.access import access_control
 from bridge.agent import Agent, on_link, trusting
 from bridge.clock import Clock, WallClock
 from bridge.controller import Controller
+from bridge.frames import OnMap, turned
 from bridge.journal import Journal, open_journal
 from bridge.link import Link
 from bridge.protocol import Keys
 from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner
+from mission.document import Mission, Start, Transform
 from mission.errors import InputError
 from mission.events import Pose
 
@@ -36,7 +38,9 @@ class RobotOptions:
     site: str | None = None
     speed_up: float = 1.0
     at: Pose | None = None
-    """Where the simulated robot stands; else where it last stood, or its first mission's start."""
+    """Where the simulated robot stands on its map; else where it last stood, or its first mission's start."""
+    to_map: Transform | None = None
+    """Site to map, if the robot knows it; else as each mission says."""
     insecure: bool = False
     keys: Path | None = None
     """Folder with the robot's keys; required beyond this machine."""
@@ -65,22 +69,33 @@ def robot_on(
     """A simulated robot on `link`; with keys of its own it obeys only what stations have signed."""
     with open_journal(options.state, options.name) as journal:
         clock, wall = clocks(journal, speed_up=options.speed_up)
-        base = SimulatedBase(clock=clock, keep=options.state / "world.json", faults=options.faults)
+        simulated = SimulatedBase(clock=clock, keep=options.state / "world.json", faults=options.faults)
+        base = OnMap(simulated, options.to_map)
         scanner = SimulatedScanner(clock=clock, record=options.state / "scans.log", faults=options.faults)
         journal.edge = crashing(options.faults)
         if options.at is not None:
-            base.stand_at(options.at)
+            simulated.stand_at(options.at)
+
+        def mission_taken(mission: Mission) -> None:
+            base.take(mission)
+            simulated.stand_at_start(turned(pose_of(mission.start), base.to_map))
+
         controller = Controller(
             robot=options.name, journal=journal, base=base, scanner=scanner, clock=clock, command_clock=wall,
-            mission_taken=lambda mission: base.stand_at_start(mission.start),
+            mission_taken=mission_taken,
         )  # fmt: skip
         agent = Agent(
             keys=keys, link=link, journal=journal, controller=controller, base=base, scanner=scanner,
             clock=clock, command_clock=wall, speed_up=options.speed_up,
+            to_map=options.to_map,
             trust=None if held is None else trusting(held.authority, key_files.now_utc),
         )  # fmt: skip
         with on_link(agent):
             yield agent
+
+
+def pose_of(start: Start) -> Pose:
+    return Pose(x=start.x, y=start.y, heading=start.heading)
 
 
 def clocks(journal: Journal, *, speed_up: float, now_ns: int | None = None) -> tuple[Clock, Clock]:

@@ -17,7 +17,7 @@ import msgspec
 from bridge.clock import Clock
 from bridge.motion import Brake, Motion, along
 from bridge.robots import Outcome, ScanFailed, ScanResult
-from mission.document import Point, RobotSpec, Scan, Start
+from mission.document import Point, RobotSpec, Scan
 from mission.errors import InputError
 from mission.events import Pose
 
@@ -159,10 +159,10 @@ class SimulatedBase:
         """Fill the battery."""
         self._world = msgspec.structs.replace(self._world, battery=1.0)
 
-    def stand_at_start(self, start: Start) -> None:
+    def stand_at_start(self, start: Pose) -> None:
         """Put the robot at a mission's start, if nobody ever said where it stands."""
         if not self._world.placed:
-            self._stand(Pose(x=start.x, y=start.y, heading=start.heading))
+            self._stand(start)
 
     def _missed(self, path: Sequence[Point], heading: float | None) -> tuple[Sequence[Point], float | None]:
         """Path and heading as they will be driven, a little beside what was asked."""

@@ -14,6 +14,7 @@ from bridge.follow import Report, Silence
 from bridge.journal import memory_journal
 from bridge.link import Switchboard
 from bridge.protocol import Keys
+from bridge.robot import pose_of
 from bridge.simulator import SimulatedBase, SimulatedScanner
 from bridge.station import Station
 from bridge.watch import Lines, Table, clock, remaining_s, table_lines
@@ -93,7 +94,7 @@ def test_events_missed_while_the_link_was_cut_are_told_once_and_in_order() -> No
     base, scanner = SimulatedBase(clock=wall), SimulatedScanner(clock=wall)
     controller = Controller(
         robot="r1", journal=journal, base=base, scanner=scanner, clock=wall, command_clock=WallClock(),
-        mission_taken=lambda mission: base.stand_at_start(mission.start),
+        mission_taken=lambda mission: base.stand_at_start(pose_of(mission.start)),
     )  # fmt: skip
     agent = Agent(
         keys=Keys("r1"), link=board.link(), journal=journal, controller=controller, base=base,

@@ -157,3 +157,19 @@ def test_watch_records_the_run(tmp_path: Path) -> None:
         )
     assert watched.returncode == 0, watched.stderr
     assert (tmp_path / "field.rrd").stat().st_size > 1000
+
+
+def test_another_commander_needs_to_take_over(tmp_path: Path) -> None:
+    document = tmp_path / "mission.json"
+    document.write_bytes(msgspec.json.encode(corridor()))
+    with robot_process("r1", tmp_path / "state") as endpoint:
+        reach = ("--robot", "r1", "--connect", endpoint)
+        assert stopgo("push", str(document), *reach, "--as", "alice").returncode == 0
+        denied = stopgo("push", str(document), *reach, "--as", "bob")
+        assert (denied.returncode, "alice commands it" in denied.stderr) == (1, True)
+        assert stopgo("push", str(document), *reach, "--as", "bob", "--take-over").returncode == 0
+        assert stopgo("start", *reach, "--as", "alice").returncode == 1
+        assert stopgo("start", *reach, "--as", "alice", "--take-over").returncode == 0
+        assert stopgo("pause", *reach, "--as", "bob").returncode == 0
+        assert stopgo("resume", *reach, "--as", "bob").returncode == 1
+        assert stopgo("resume", *reach, "--as", "alice").returncode == 0

@@ -17,6 +17,7 @@ from bridge.inbox import Inbox
 from bridge.journal import Journal, memory_journal
 from bridge.link import MemoryLink, Switchboard
 from bridge.protocol import Answer, Command, Commit, Keys, Manifest, Verb
+from bridge.robot import pose_of
 from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
 from bridge.station import Station
 from mission.document import (
@@ -89,7 +90,7 @@ class Field:
         """Start the robot's program (again): all it knows is in the journal, the world stays as it is."""
         self.controller = Controller(
             robot="r1", journal=self.journal, base=self.base, scanner=self.scanner, clock=self.clock,
-            mission_taken=lambda mission: self.base.stand_at_start(mission.start),
+            mission_taken=lambda mission: self.base.stand_at_start(pose_of(mission.start)),
         )  # fmt: skip
         self.inbox = Inbox(self.journal, self.controller, self.scanner.profiles)
 

@@ -16,7 +16,7 @@ import pytest
 
 from bridge.clock import SimulatedClock
 from bridge.journal import Journal, open_journal
-from bridge.robot import clocks
+from bridge.robot import clocks, pose_of
 from bridge.simulator import Fault, Faults
 from mission.events import Aborted, Finished, Scanned, Skipped, Started
 from tests.bridge.world import Field, corridor
@@ -52,7 +52,7 @@ def test_hours_of_missions_with_faults_lose_nothing_and_nothing_grows(tmp_path: 
 
 def one_run(field: Field, chance: random.Random) -> None:
     """A run to its end, with a pause, a reboot, or somebody who decides whatever the robot asks."""
-    field.base.stand_at_start(corridor().start)
+    field.base.stand_at_start(pose_of(corridor().start))
     started = field.order("start", again=True, from_here=False)
     if started.outcome == "refused":
         field.base.stand_at(field.base.pose().__class__(x=0.0, y=0.0, heading=0.0))
