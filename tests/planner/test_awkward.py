@@ -18,6 +18,7 @@ from mission.settings import Settings
 from tests.planner.checks import check_plan
 from tests.planner.worlds import (
     box,
+    changed,
     column,
     corners,
     door,
@@ -220,12 +221,6 @@ def test_a_floor_without_area_is_refused() -> None:
 
 def test_a_floor_full_of_wall_has_no_candidate() -> None:
     refused(hall(5, 5, wall("all", box(0, 0, 5, 5))))
-
-
-def changed(options: Settings) -> list[str]:
-    """The settings that are not the default."""
-    values = {key: getattr(options, key) for key in options.__struct_fields__}
-    return [f"{key}={value}" for key, value in values.items() if value != getattr(Settings(), key)]
 
 
 @pytest.mark.parametrize(

@@ -164,3 +164,9 @@ def planned(floor: FloorPlan, settings: Settings | None = None) -> tuple[Mission
         nouns[type(noun)] = noun
 
     return plan(floor, settings or Settings(), observe=observe), nouns
+
+
+def changed(settings: Settings) -> list[str]:
+    """The settings that are not the default."""
+    values = {key: getattr(settings, key) for key in settings.__struct_fields__}
+    return [f"{key}={value}" for key, value in values.items() if value != getattr(Settings(), key)]
