@@ -69,8 +69,9 @@ class Relaxation:
 
     def bound(self, low: IntArray, high: IntArray) -> int:
         """What no tour within these limits is shorter than, from the prices of the last solution."""
-        prices = np.array(self._solver.getSolution().row_dual)
-        price = np.rint(prices * NANOMETRES).astype(np.int64)
+        prices = np.nan_to_num(np.array(self._solver.getSolution().row_dual))
+        dearest = 2 * self._limit  # whatever the solver says, sums stay within 64 bits
+        price = np.rint(np.clip(prices, -dearest, dearest) * NANOMETRES).astype(np.int64)
         price[self.points :] = np.maximum(price[self.points :], 0)
         reduced = self._cost - price @ np.array(self._times)
         return int(price @ np.array(self._least) + np.where(reduced < 0, reduced * high, reduced * low).sum())
