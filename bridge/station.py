@@ -265,6 +265,7 @@ class Station:
         info = self.info()
         state, cautious = info.state, verb not in FREE_VERBS
         meant: dict[str, Any] = {
+            "commander": self.commander,
             "valid_for_s": self.timeout_s,
             "run_id": None if verb == "start" else state.run_id,
             "mission_id": state.mission_id,
@@ -274,10 +275,7 @@ class Station:
             "stop": state.stop if verb in ("skip", "retry") else None,
         }
         given = {key: value for key, value in details.items() if value is not None}
-        return Command(
-            cmd_id=uuid.uuid4().hex, verb=verb, commander=self.commander, issued_ns=info.clock_ns,
-            **(meant | given),
-        )  # fmt: skip
+        return Command(cmd_id=uuid.uuid4().hex, verb=verb, issued_ns=info.clock_ns, **(meant | given))
 
     def log(self, *, since: int = 0, run_id: str | None = None) -> tuple[AnyEvent, ...]:
         """All events of the journal above number `since`, of one run if given."""

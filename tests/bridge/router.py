@@ -1,12 +1,14 @@
-"""A zenoh router as a process: `python -m tests.bridge.router tcp/127.0.0.1:7447`, until SIGTERM."""
+"""A zenoh router as a process: `python -m tests.bridge.router tcp/127.0.0.1:7447 [KEYS]`, until SIGTERM."""
 
 from __future__ import annotations
 
 import signal
 import sys
 import threading
+from pathlib import Path
 
-from bridge.zenoh_link import listening
+from bridge.keys import now_utc, read_keys
+from bridge.zenoh_link import Guard, listening
 
 
 def leave(signum: int, frame: object) -> None:
@@ -15,6 +17,7 @@ def leave(signum: int, frame: object) -> None:
 
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, leave)
-    with listening(sys.argv[1]):
+    keys = read_keys(Path(sys.argv[2]), now=now_utc()) if len(sys.argv) > 2 else None
+    with listening(sys.argv[1], Guard(keys)):
         print("ready", flush=True)
         threading.Event().wait()

@@ -19,8 +19,8 @@ ROOT = Path(__file__).parents[2]
 
 
 @contextmanager
-def router(endpoint: str) -> Iterator[subprocess.Popen[str]]:
-    command = [sys.executable, "-m", "tests.bridge.router", endpoint]
+def router(endpoint: str, *keys: str) -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, "-m", "tests.bridge.router", endpoint, *keys]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT)
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"

@@ -16,10 +16,11 @@ from bridge.keys import Holder, Signature, Untrusted, holders, init_site, issue,
 from bridge.link import Request
 from bridge.protocol import Command, Keys, Reply, encode
 from bridge.spawn import end_robot, free_port, start_robot
-from bridge.station import connect
+from bridge.station import Station, connect
 from bridge.zenoh_link import Guard, check_endpoint, connecting
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import PoseReport, Scanned
+from tests.bridge.test_fleet import router
 from tests.bridge.test_zenoh import stopgo
 from tests.bridge.world import corridor
 
@@ -211,3 +212,27 @@ def test_a_command_is_signed_for_one_robot_only(site: Path) -> None:
     signature = signed(site, "site/alice", Keys("r1").command("abort"), encode(command))
     with pytest.raises(Untrusted):
         holder_of(site, Keys("r2").command("abort"), encode(command), signature)
+
+
+def test_behind_a_router_signatures_tell_who_orders(site: Path, tmp_path: Path) -> None:
+    """The router's link is let in whole; a viewer's order comes through it, and is not trusted."""
+    endpoint = f"tls/127.0.0.1:{free_port()}"
+    issue(site / "site", "robot", "router", now=NOW)
+    extra = ("--connect", endpoint, "--keys", str(site / "site" / "r1"))
+    with router(endpoint, str(site / "site" / "router")):
+        robot = start_robot("r1", tmp_path, listen="tls/127.0.0.1:1", speed_up=100, extra=extra)
+        try:
+            with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
+                station.push(corridor())
+                order = station.order("start", commander="vera")
+                vera = read_keys(site / "site" / "vera", now=NOW)
+                key = Keys("r1").command("start")
+                with connecting(endpoint, Guard(vera)) as link:
+                    Station(link, Keys("r1"), commander="vera").reach(endpoint)
+                    reply = link.ask(key, encode(order), timeout_s=2, signature=vera.sign(key, encode(order)))
+                assert reply is not None
+                assert "vera is a viewer" in msgspec.json.decode(reply, type=Reply).messages[0]
+                assert station.command("start").outcome == "ok"
+                assert len([1 for report in station.reports() if isinstance(report, Scanned)]) == 3
+        finally:
+            end_robot(robot)

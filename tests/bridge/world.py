@@ -34,7 +34,6 @@ from mission.document import (
     Stop,
     sealed,
 )
-from mission.settings import Settings
 
 EXACT = Wear(noise_m=0.0, noise_rad=0.0)
 WALKING = RobotSpec(radius=0.35, speed=0.5, turn_rate=math.radians(45), acceleration=0.5)
@@ -52,7 +51,7 @@ def corridor(*, stops: int = 3, revision: int = 1, closed: bool = True, **stop_d
             start=Start(x=0.0, y=0.0, heading=0.0, reason="given"), stops=made,
             return_=(end, (0.0, 0.0)) if closed else None,
             policy=Policy(link_loss="continue", link_loss_after_s=30.0, battery_min=0.15),
-            origin=Origin(floor="corridor.dxf", floor_digest="0" * 64, parameters=Settings(), stopgo="0.1.0"),
+            origin=Origin(floor="corridor", floor_digest="0" * 64, parameters={"seed": 1}, stopgo="0.1.0"),
         )
     )  # fmt: skip
 
