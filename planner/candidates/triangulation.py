@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import shapely
-from scipy.spatial import Delaunay, QhullError, Voronoi, cKDTree
 from shapely.geometry.base import BaseGeometry
 
 from mission.geometry import FloatArray, IntArray
@@ -131,6 +130,8 @@ def triangulated(seeds: FloatArray, shape: BaseGeometry, *, l_min: float) -> tup
 
 def distinct(points: FloatArray) -> FloatArray:
     """The points (n, 2), rounded to STEP, in a canonical order; of those closer than SAME the first."""
+    from scipy.spatial import cKDTree
+
     points = np.unique(np.rint(points / STEP), axis=0) * STEP
     keep = np.ones(len(points), dtype=bool)
     if len(points) > 1:
@@ -141,18 +142,24 @@ def distinct(points: FloatArray) -> FloatArray:
 
 def voronoi_points(points: FloatArray) -> FloatArray:
     """Corners of the Voronoi cells of `points` (n, 2); none where all lie on a line."""
+    from scipy.spatial import Voronoi
+
     found = _by_qhull(Voronoi, points)
     return np.empty((0, 2)) if found is None else found.vertices
 
 
 def delaunay(points: FloatArray) -> IntArray:
     """Corners (t, 3) of the Delaunay triangles of `points` (n, 2); none where all lie on a line."""
+    from scipy.spatial import Delaunay
+
     found = _by_qhull(Delaunay, points)
     return np.empty((0, 3), dtype=np.int64) if found is None else found.simplices.astype(np.int64)
 
 
 def _by_qhull(diagram: Callable[[FloatArray], Any], points: FloatArray) -> Any:
     """The diagram of points that span an area, else None: Qhull refuses points on a line."""
+    from scipy.spatial import QhullError
+
     if len(points) < 3:
         return None
     try:
