@@ -103,6 +103,8 @@ class Agent:
         self._to_map = to_map
         self._closing = threading.Event()
         self._news = threading.Event()
+        self._failed = threading.Event()
+        self._error: Exception | None = None
         self._threads: list[threading.Thread] = []
         self._watchers: set[str] = set()
         self._heard_ns = command_clock.now_ns()
@@ -125,10 +127,27 @@ class Agent:
         self._tell_pose = link.publisher(keys.pose, kept=POSES_KEPT)
         self._controller.changed = self._news.set
         for work in (self._controller.serve, self._tell_news, self._tell_poses):
-            thread = threading.Thread(target=work, name=work.__name__, daemon=True)
+            thread = threading.Thread(target=self._watched, args=(work,), name=work.__name__, daemon=True)
             self._threads.append(thread)
             thread.start()
         link.announce(keys.alive)
+
+    def wait(self) -> None:
+        """Wait until the robot's work ends, which it does only by an error; that is raised here.
+
+        A robot whose controller has died must not look alive: its process ends, and the next boot finds
+        the run paused.
+        """
+        self._failed.wait()
+        if self._error is not None:
+            raise self._error
+
+    def _watched(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 (the end of a thread)
+            self._error = error
+            self._failed.set()
 
     def close(self) -> None:
         self._controller.close()
@@ -136,6 +155,7 @@ class Agent:
         self._news.set()
         for thread in self._threads:
             thread.join()
+        self._base.stop()
 
     def _watcher(self, key: str, alive: bool) -> None:
         self._contact()

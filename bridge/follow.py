@@ -6,6 +6,8 @@ import queue
 import time
 import uuid
 from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any
 
 import msgspec
 
@@ -114,13 +116,19 @@ def log_page(link: Link, keys: Keys, *, since: int, run_id: str | None, timeout_
 def _listen(link: Link, keys: Keys) -> queue.SimpleQueue[Heard]:
     """A queue that fills with what the robot tells; listening comes before asking, so no gap is left."""
     heard: queue.SimpleQueue[Heard] = queue.SimpleQueue()
-    link.hear(keys.event, lambda key, payload: heard.put(decode(payload, AnyEvent)))  # type: ignore[arg-type]
-    link.hear(keys.pose, lambda key, payload: heard.put(decode(payload, PoseReport)), late=POSES_LATE)
-    link.hear(keys.state, lambda key, payload: heard.put(decode(payload, StateReport)))
+    link.hear(keys.event, lambda key, payload: _put(heard, payload, AnyEvent))
+    link.hear(keys.pose, lambda key, payload: _put(heard, payload, PoseReport), late=POSES_LATE)
+    link.hear(keys.state, lambda key, payload: _put(heard, payload, StateReport))
     state = _asked_state(link, keys)
     if state is not None:
         heard.put(state)
     return heard
+
+
+def _put(heard: queue.SimpleQueue[Heard], payload: bytes, kind: Any) -> None:
+    """Take what can be read; anything else on these keys is not the robot's."""
+    with suppress(msgspec.DecodeError):
+        heard.put(msgspec.json.decode(payload, type=kind))
 
 
 def _asked_state(link: Link, keys: Keys) -> StateReport | None:

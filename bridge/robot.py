@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -57,9 +56,9 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     held = None if options.keys is None else robots_keys(options.keys, options.name)
     guard = Guard(held, options.insecure, None if held is None else access_control(keys))
     opened = joining(options.connect, guard) if options.connect else listening(options.listen, guard)
-    with opened as link, robot_on(link, keys, options, held):
+    with opened as link, robot_on(link, keys, options, held) as agent:
         ready()
-        threading.Event().wait()
+        agent.wait()
 
 
 @contextmanager

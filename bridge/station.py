@@ -344,7 +344,12 @@ class Station:
                 f"{robot} did not answer {what} in time: whether it was carried out is unknown;"
                 " see stopgo status"
             )
-        message: Message = msgspec.json.decode(reply, type=Reply)
+        try:
+            message: Message = msgspec.json.decode(reply, type=Reply)
+        except msgspec.DecodeError as error:
+            raise OutcomeUnknown(
+                f"{robot} answered {what} in words this stopgo does not know ({error}); update the older one"
+            ) from None
         if isinstance(message, Rejected):
             raise AnswerIsNo(f"{robot} rejected {what}: {message.reason}: {'; '.join(message.messages)}")
         if not isinstance(message, kind):

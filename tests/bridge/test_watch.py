@@ -6,6 +6,8 @@ import queue
 import threading
 import time
 
+import pytest
+
 from bridge import agent as agents
 from bridge.agent import Agent
 from bridge.clock import WallClock
@@ -18,6 +20,7 @@ from bridge.robot import pose_of
 from bridge.simulator import SimulatedBase, SimulatedScanner
 from bridge.station import Station
 from bridge.watch import Lines, Table, clock, remaining_s, table_lines
+from mission.errors import OutcomeUnknown
 from mission.events import PoseReport, Scanned, StateReport
 from mission.schedule import schedule
 from tests.bridge.world import Field, corridor
@@ -119,3 +122,42 @@ def test_events_missed_while_the_link_was_cut_are_told_once_and_in_order() -> No
     assert [event.number for event in events] == list(range(events[0].number, journal.newest + 1))
     assert heard[-1] is not None
     assert [report.state for report in heard if isinstance(report, StateReport)][-1] == "FINISHED"
+
+
+def test_a_forged_publication_is_left_out() -> None:
+    field = Field()
+    station = field.station()
+    station.push(corridor())
+    field.order("start")
+    field.work()
+    reports = station.reports()
+    first = next(reports)
+    field.board.link().publisher(field.keys.state)(b"{}")
+    field.board.link().publisher(field.keys.event)(b"\xff")
+    rest = [first, *reports]
+    assert [report.state for report in rest if isinstance(report, StateReport)][-1] == "FINISHED"
+
+
+def test_an_answer_in_unknown_words_is_unknown() -> None:
+    field = Field()
+    station = field.station()
+    field.board.serving[field.keys.info] = lambda request: b'{"is": "Info", "protocol": 9}'
+    with pytest.raises(OutcomeUnknown, match="words this stopgo does not know"):
+        station.status()
+
+
+def test_a_robot_whose_work_has_failed_does_not_look_alive() -> None:
+    field = Field()
+    field.station().push(corridor())
+    agent = Agent(
+        keys=Keys("r1"), link=Switchboard().link(), journal=field.journal, controller=field.controller,
+        base=field.base, scanner=field.scanner, clock=field.clock, command_clock=WallClock(),
+    )  # fmt: skip
+
+    def broken(*arguments: object, **options: object) -> None:
+        raise ZeroDivisionError
+
+    field.base.goto = broken  # type: ignore[method-assign, assignment]
+    with agents.on_link(agent), pytest.raises(ZeroDivisionError):
+        field.order("start")
+        agent.wait()
