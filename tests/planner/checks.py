@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Any
 
@@ -58,7 +59,8 @@ def check_chain(mission: Mission, settings: Settings) -> None:
         assert stop.approach[-1] == here
         if len(stop.approach) > 1:
             step = np.subtract(stop.approach[-1], stop.approach[-2])
-            assert np.isclose(np.arctan2(step[1], step[0]), stop.heading, atol=1e-5)
+            off = math.remainder(math.atan2(step[1], step[0]) - stop.heading, math.tau)
+            assert abs(off) <= 1e-4, f"{stop.id} does not look along its approach"
     closed = settings.tour == "closed" or (settings.tour is None and settings.start and settings.end is None)
     if mission.return_ is not None:
         assert mission.return_[0] == here

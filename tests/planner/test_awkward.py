@@ -215,6 +215,10 @@ def test_a_floor_of_ten_kilometres_is_refused() -> None:
     assert "units" in refused(hall(10_000, 10), kind=InputError)
 
 
+def test_a_floor_without_elements_has_no_target() -> None:
+    assert "no target" in refused(floor_of(box(0, 0, 5, 5)), kind=AnswerIsNo)
+
+
 def test_a_floor_without_area_is_refused() -> None:
     refused(floor_of(elements=(column("c", 1, 1),)))
 
@@ -316,7 +320,7 @@ def plan_or_refuse(floor: FloorPlan, chosen: Settings) -> Any:
         return None
 
 
-@settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=30, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(floors(), options())
 def test_a_random_floor_is_planned_well_or_refused(floor: FloorPlan, chosen: Settings) -> None:
     plan_or_refuse(floor, chosen)

@@ -240,3 +240,22 @@ def test_floor_behind_an_open_passage_is_planned_as_a_room_without_a_name() -> N
     )
     mission, _ = planned(floor, Settings(range=3.0, coverage=1.0))
     assert {stop.x < 4 for stop in mission.stops} == {True, False}
+
+
+def test_a_start_as_near_to_a_wall_as_the_robot_fits_is_taken() -> None:
+    mission, _ = planned(hall(6, 4), Settings(start=(0.35, 0.35, 0.0)))
+    assert (mission.start.x, mission.start.y) == (0.35, 0.35)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 7.0, 17.0, 45.0])
+def test_every_candidate_on_a_floor_edge_has_a_way(degrees: float) -> None:
+    floor = moved(floor_of(box(0, 0, 8, 4), elements=(column("c", 4, 2, 0.6),)), turned(degrees))
+    check_candidates(candidates(navigable(floor, Settings(edge=0.0))))
+
+
+@pytest.mark.parametrize("degrees", [0.0, 90.0])
+def test_candidates_as_near_as_the_robot_fits_are_reachable(degrees: float) -> None:
+    floor = moved(hall(2.8, 2.1), turned(degrees))
+    found = candidates(navigable(floor, Settings(d_sec=0.35, grid=0.35)))
+    assert len(found.kept) == 7 * 5
+    check_candidates(found)
