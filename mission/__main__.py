@@ -14,6 +14,8 @@ from mission.errors import MissingExtra, StopgoError
 FOLDERS = ("planner.cli", "bridge.cli", "recordings.cli", "mission.cli")
 """Each folder's commands; each module has `add_commands(app)` and imports slow libraries where used."""
 
+INTERRUPTED = 130
+
 EXTRAS = {
     "shapely": "plan", "scipy": "plan", "networkx": "plan", "ezdxf": "plan", "highspy": "plan",
     "numba": "plan", "pyproj": "plan", "ifcopenshell": "bim",
@@ -52,6 +54,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         command = typer.main.get_command(build_app())
         result = command.main(args=arguments, prog_name="stopgo", standalone_mode=False)
+        if result == INTERRUPTED:  # the command library has caught the Ctrl-C
+            raise KeyboardInterrupt
         return result if isinstance(result, int) else 0
     except StopgoError as error:
         return _say(str(error), error.exit_code)
@@ -60,7 +64,7 @@ def main(arguments: list[str] | None = None) -> int:
     except TyperException as error:
         return _say(f"{error.format_message()} (see --help)", 2)
     except (KeyboardInterrupt, typer.Abort):
-        return _say("stopped by Ctrl-C", 130)
+        return _say("stopped by Ctrl-C", INTERRUPTED)
     except BrokenPipeError:
         return 0
 

@@ -106,7 +106,8 @@ class Origin(Document, frozen=True):
 
     floor: str
     floor_digest: str
-    parameters: Settings
+    parameters: dict[str, Any]
+    """The plan's settings by name; only a record, so that a robot older than the plan reads it."""
     stopgo: str
 
 

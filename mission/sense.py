@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mission.document import Mission, Point, Start, Stop
-from mission.errors import InputError
-from mission.settings import check_settings
 
 JOIN = 1e-3
 """Metres within which the ends of two legs are the same place."""
@@ -37,7 +35,6 @@ def problems_of(mission: Mission) -> tuple[Problem, ...]:
         *_stops(mission.stops),
         *_legs(mission),
         *_policy(mission),
-        *_parameters(mission),
     )
 
 
@@ -133,13 +130,6 @@ def _policy(mission: Mission) -> Iterator[Problem]:
     yield from _not_negative("$.policy.link_loss_after_s", policy.link_loss_after_s)
     if not 0 <= policy.battery_min < 1:
         yield Problem("$.policy.battery_min", f"is {policy.battery_min}; it must be at least 0 and below 1")
-
-
-def _parameters(mission: Mission) -> Iterator[Problem]:
-    try:
-        check_settings(mission.origin.parameters)
-    except InputError as error:
-        yield Problem("$.origin.parameters", str(error))
 
 
 def _pose(path: str, place: Point, heading: float) -> Iterator[Problem]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import shapely
 
@@ -26,7 +27,7 @@ from mission.document import (
 )
 from mission.errors import StopgoError
 from mission.geometry import FloatArray
-from mission.planning import NavigableSpace, Route
+from mission.planning import Candidates, NavigableSpace, Route
 from mission.settings import Settings
 from planner.gaps import Walls, keeps_clear
 from planner.shapes import local_origin, segments_of, to_shape
@@ -54,7 +55,7 @@ def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
             frame=Frame(name="site"),
             georeference=_georeference(space),
             robot=_robot(settings),
-            scanner=ScannerSpec(profile=settings.profile, range=settings.range),
+            scanner=ScannerSpec(profile=settings.profile, range=settings.range, fov_deg=settings.fov),
             start=Start(
                 x=_rounded(route.start[0]),
                 y=_rounded(route.start[1]),
@@ -69,7 +70,10 @@ def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
                 battery_min=settings.battery_min,
             ),
             origin=Origin(
-                floor=floor.name, floor_digest=floor.digest, parameters=settings, stopgo=__version__
+                floor=floor.name,
+                floor_digest=floor.digest,
+                parameters=msgspec.json.decode(msgspec.json.encode(settings)),
+                stopgo=__version__,
             ),
         )
     )
@@ -105,11 +109,18 @@ def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
         units = visibility.seen_by(int(row))
         new = int(np.count_nonzero(~seen[units]))
         seen[units] = True
-        heading = _arrival_heading(approach, heading)
+        heading = _scan_heading(visibility.candidates, int(row), _arrival_heading(approach, heading))
         sees = Sees(units=len(units), new_units=new)
         name, doorway = f"s{number:0{width}d}", int(row) in doorways
         stops.append(_stop(name, approach, heading, sees, settings, doorway=doorway))
     return tuple(stops)
+
+
+def _scan_heading(candidates: Candidates, row: int, arrival: float) -> float:
+    """The heading the scan was planned with; a scanner that looks all round keeps that of the arrival."""
+    if not len(candidates.heading):
+        return arrival
+    return _turned(candidates.heading[candidates.kept[row]])
 
 
 def _arrival_heading(approach: FloatArray, before: float) -> float:
@@ -117,7 +128,7 @@ def _arrival_heading(approach: FloatArray, before: float) -> float:
     if len(approach) < 2:
         return before
     step = approach[-1] - approach[-2]
-    return _rounded(math.atan2(step[1], step[0]))
+    return _rounded(math.atan2(_rounded(step[1]), _rounded(step[0])))
 
 
 def _stop(

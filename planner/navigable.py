@@ -30,6 +30,7 @@ from planner.shapes import (
     snapped,
     to_polygons,
     to_shape,
+    union,
 )
 from planner.targets import LINE_WALL, occluders_of, solid_of, targets_of
 
@@ -38,7 +39,9 @@ LEAST_UNNAMED = 0.5
 NEAR_OPENING = 1.6
 """How far from an opening (m) the obstacle that blocks it is looked for."""
 REACHED_SHARE = 0.2
-"""An opening leads into a room if it reaches this share of where the robot may drive there."""
+"""An opening leads into a room if it reaches this share of where the robot may drive there …"""
+REACHED_AREA = 0.5
+"""… or at least this much of it (m²)."""
 
 
 def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
@@ -97,7 +100,7 @@ class Ground:
     def of(cls, floor: FloorPlan, settings: Settings) -> Ground:
         origin = local_origin(floor)
         solids = [solid_of(item, origin, HAIRLINE) for item in floor.elements if item.obstacle]
-        obstacles = shapely.union_all(solids)  # not snapped: clearances are decided on it
+        obstacles = union(solids)  # not snapped: clearances are decided on it
         crossings = crossings_of(floor, obstacles, settings)
         inner = [threshold(item) for item in crossings if not item.closed_because]
         slab = to_shape(floor.outline, origin)
@@ -172,8 +175,8 @@ def _not_reached(
 
 def _main_parts(free: dict[int, float]) -> set[int]:
     """Parts that make up a good share of where the robot may drive in a room."""
-    total = sum(free.values())
-    return {part for part, area in free.items() if area >= REACHED_SHARE * total and area > 0}
+    enough = min(REACHED_AREA, REACHED_SHARE * sum(free.values()))
+    return {part for part, area in free.items() if area >= enough and area > 0}
 
 
 def _narrowest(

@@ -72,7 +72,7 @@ class Reach:
         if np.hypot(*(foot - point)) > self.site.slop:
             return nowhere
         for angle in np.arange(SIDES) * (2 * np.pi / SIDES):
-            end = foot + 2 * INSIDE * np.array([np.cos(angle), np.sin(angle)])
+            end = foot + 4 * INSIDE * np.array([np.cos(angle), np.sin(angle)])
             if self._well_inside(end[None])[0] and self.site.allows(point, end):
                 return end
         return nowhere

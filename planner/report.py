@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from mission.document import Mission
-from mission.planning import IN_HOLE, OUTSIDE, Route, Unreached
+from mission.geometry import FloatArray
+from mission.planning import IN_HOLE, OUTSIDE, SLIVER, TOO_SMALL, Route, Unreached
 from mission.schedule import schedule
 from planner.unreached import unreached
 
@@ -33,7 +34,7 @@ class PlanReport:
         visibility = selection.visibility
         candidates = visibility.candidates
         space, targets = candidates.space, visibility.targets
-        generated = int(np.sum((candidates.reason != OUTSIDE) & (candidates.reason != IN_HOLE)))
+        never = [OUTSIDE, IN_HOLE, TOO_SMALL, SLIVER]
         times = schedule(self.mission)
         return {
             "floor": self._floor(),
@@ -49,8 +50,8 @@ class PlanReport:
                 "raw_by_kind": targets.raw,
             },
             "candidates": {
-                "generated": generated,
-                "reachable": len(candidates.kept),
+                "generated": _places(candidates.xy[~np.isin(candidates.reason, never)]),
+                "reachable": _places(candidates.xy[candidates.kept]),
                 "strategy": candidates.strategy,
             },
             "visibility": {"visible": int(visibility.visible.sum()), "method": visibility.method},
@@ -116,3 +117,8 @@ class PlanReport:
         lines += [f"  unreached   {u.room} ({u.area_m2:.1f} m²): {u.why}" for u in self.unreached]
         lines += [f"  finding     {finding['message']}" for finding in floor["findings"]]
         return "\n".join([*lines, *(f"  {key:<11} {path}" for key, path in self.files.items())])
+
+
+def _places(xy: FloatArray) -> int:
+    """Different positions: a scanner that does not look all round has several headings at each."""
+    return len(np.unique(xy, axis=0))

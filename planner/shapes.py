@@ -45,7 +45,13 @@ def local_origin(floor: FloorPlan) -> FloatArray:
 
 def to_shape(polygons: Iterable[Polygon], origin: FloatArray) -> BaseGeometry:
     """The union of `polygons` as one shapely geometry in the local frame."""
-    return shapely.union_all([one_shape(polygon, origin) for polygon in polygons])
+    return union([one_shape(polygon, origin) for polygon in polygons])
+
+
+def union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
+    """The union of shapes, the same to the last bit in whatever order they come."""
+    found = np.array(list(shapes), dtype=object)
+    return shapely.normalize(shapely.union_all(found[np.argsort(shapely.to_wkb(found), kind="stable")]))
 
 
 def one_shape(polygon: Polygon, origin: FloatArray) -> BaseGeometry:
@@ -82,7 +88,9 @@ def snapped(shape: BaseGeometry) -> BaseGeometry:
 
 def snapped_union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
     """The union of shapes with every vertex on the grid and every crossing a vertex."""
-    return shapely.set_precision(shapely.union_all([snapped(s) for s in shapes], grid_size=GRID), 0)
+    found = np.array([snapped(shape) for shape in shapes], dtype=object)
+    ordered = found[np.argsort(shapely.to_wkb(found), kind="stable")]
+    return shapely.normalize(shapely.set_precision(shapely.union_all(ordered, grid_size=GRID), 0))
 
 
 def to_grid(xy: FloatArray) -> NDArray[np.int64]:

@@ -18,6 +18,8 @@ from planner.sight_kernel import HELPERS, look_all
 
 COMPILE_ABOVE = 2_000_000
 """Viewpoints × mesh triangles above which loading the compiled kernel pays for itself."""
+UNLIMITED = 10
+"""Looking without a range costs about this many times as much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +148,8 @@ def sight(scene: Scene, viewpoints: NDArray[np.int64], *, reach: float | None) -
             *(scene.a[:, 0], scene.a[:, 1], scene.b[:, 0], scene.b[:, 1], scene.units),
         )
     ]
-    if len(viewpoints) * scene.mesh.triangles > COMPILE_ABOVE:
+    work = len(viewpoints) * scene.mesh.triangles * (UNLIMITED if reach is None else 1)
+    if work > COMPILE_ABOVE:
         return _run(compiled(look_all, *HELPERS), arrays, steps, interpreted=False)
     return _run(look_all, [array.tolist() for array in arrays], steps, interpreted=True)
 

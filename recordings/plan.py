@@ -12,7 +12,6 @@ import rerun as rr
 
 from mission import __version__
 from mission.document import Mission
-from mission.errors import AnswerIsNo, StopgoError
 from mission.floor import FloorPlan
 from mission.geometry import bounds
 from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
@@ -62,7 +61,7 @@ class PlanRecording:
 
     Drawing waits for the end because the local origin is the mission's, which is known last and which
     field recordings of the mission know too. The file appears when it is complete and has been read
-    back; a plan that ends in "no" is recorded as far as it came, a plan that fails leaves no file.
+    back; a plan that ends otherwise leaves what was there before.
     """
 
     def __init__(self, path: Path, recording_id: str) -> None:
@@ -81,11 +80,11 @@ class PlanRecording:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if error is None or isinstance(error, AnswerIsNo):
-            write_plan(self.path, self.recording_id, self._nouns, ended_in=error)
+        if error is None:
+            write_plan(self.path, self.recording_id, self._nouns)
 
 
-def write_plan(path: Path, recording_id: str, nouns: Nouns, ended_in: StopgoError | None = None) -> None:
+def write_plan(path: Path, recording_id: str, nouns: Nouns) -> None:
     """Draw the nouns into `path`, which appears only when it is complete and readable."""
     unfinished = path.with_name(f"{path.name}.tmp")
     sheet = Sheet(recording_id=recording_id, name=_name(nouns), origin=_origin(nouns), extent=_extent(nouns))
@@ -96,8 +95,6 @@ def write_plan(path: Path, recording_id: str, nouns: Nouns, ended_in: StopgoErro
                     draw(canvas, nouns[kind])
             _draw_planned_drive(canvas, nouns)
             _tell(canvas, nouns)
-            if ended_in is not None:
-                canvas.say(str(ended_in), level="ERROR")
         check(unfinished)
         os.replace(unfinished, path)
     finally:

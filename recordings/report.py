@@ -9,7 +9,6 @@ import msgspec
 from mission.document import Mission
 from mission.floor import FloorPlan
 from mission.planning import Candidates, NavigableSpace, Route, Schedule, Selection, Visibility
-from mission.settings import Settings
 from recordings.canvas import Origin
 
 Nouns = dict[type, Any]
@@ -24,16 +23,16 @@ def plan_results(nouns: Nouns) -> dict[str, Any]:
     return results
 
 
-def parameters(nouns: Nouns) -> Settings | None:
-    """The settings the plan was made with, if any noun tells them."""
+def parameters(nouns: Nouns) -> dict[str, Any] | None:
+    """The settings the plan was made with, by name, if any noun tells them."""
     if NavigableSpace in nouns:
-        return nouns[NavigableSpace].settings
+        settings: dict[str, Any] = msgspec.to_builtins(nouns[NavigableSpace].settings)
+        return settings
     return nouns[Mission].origin.parameters if Mission in nouns else None
 
 
-def parameter_values(settings: Settings) -> dict[str, str]:
+def parameter_values(values: dict[str, Any]) -> dict[str, str]:
     """The settings as texts, so that a parameter has one type whatever its value."""
-    values = msgspec.to_builtins(settings)
     return {
         name: value if isinstance(value, str) else msgspec.json.encode(value).decode()
         for name, value in values.items()

@@ -47,7 +47,8 @@ def title_block(mission: Mission, facts: list[tuple[str, str]], box: Box) -> str
 
 def facts_of(route: Route, mission: Mission, *, date: str) -> list[tuple[str, str]]:
     """Lines of the title block; the sheet's own (scale, paper) are put in when it is chosen."""
-    selection, settings, robot = route.selection, mission.origin.parameters, mission.robot
+    selection, robot = route.selection, mission.robot
+    settings = selection.visibility.candidates.space.settings
     return [
         ("Mission", f"{mission.id[:12]}, revision {mission.revision}"),
         ("Digest", mission.digest[:12]),

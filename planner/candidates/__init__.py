@@ -28,7 +28,7 @@ from planner.candidates.fallback import best_point
 from planner.candidates.given import doorways, places_to_use
 from planner.candidates.grid import grid
 from planner.candidates.place import Place
-from planner.candidates.proposals import Proposals, joined
+from planner.candidates.proposals import Proposals, in_order, joined
 from planner.candidates.triangulation import triangulation
 from planner.reach import Reach, reach_of
 from planner.shapes import local_origin
@@ -45,7 +45,8 @@ def candidates(space: NavigableSpace, *, part: int | None = None) -> Candidates:
     """
     place = Place(space)
     found = _from_strategy(place)
-    proposals = joined([places_to_use(place), found, _for_empty_rooms(place, found), doorways(space)])
+    given = [places_to_use(place), found, _for_empty_rooms(place, found), doorways(space)]
+    proposals = in_order(joined(given), place.rooms)
     return _of_part(space, proposals, part)
 
 

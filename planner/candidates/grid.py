@@ -8,7 +8,10 @@ from shapely.geometry.base import BaseGeometry
 
 from mission.geometry import FloatArray, IntArray
 from mission.planning import NavigableSpace
-from planner.shapes import local_origin, segments_of, to_shape
+from planner.shapes import GRID, local_origin, segments_of, to_shape
+
+SAME_ANGLE = 1e-6
+"""Directions this close (radians) are one; the longest segment then gives it."""
 
 
 def grid(space: NavigableSpace) -> tuple[FloatArray, IntArray]:
@@ -26,7 +29,7 @@ def room_grid(room: BaseGeometry, *, spacing: float) -> FloatArray:
         return np.empty((0, 2))
     axes = main_axes(room)
     low, high = _extent(room, axes)
-    cells = np.maximum(1, np.ceil((high - low) / spacing - 1e-9)).astype(int)
+    cells = np.maximum(1, np.ceil((high - low - 4 * GRID) / spacing)).astype(int)
     u, v = (np.linspace(low[k], high[k], cells[k] + 1) for k in range(2))
     corners = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
     return corners @ axes
@@ -37,10 +40,12 @@ def main_axes(room: BaseGeometry) -> FloatArray:
     segments = segments_of(room)
     along = segments[:, 1] - segments[:, 0]
     length = np.hypot(*along.T)
-    angle = np.round(np.arctan2(along[:, 1], along[:, 0]) % (np.pi / 2), 9) % round(np.pi / 2, 9)
-    angles, index = np.unique(angle, return_inverse=True)
-    weight = np.bincount(index, weights=length)
-    best = float(angles[int(np.argmax(np.round(weight, 6)))])
+    angle = np.arctan2(along[:, 1], along[:, 0]) % (np.pi / 2)
+    group = np.round(angle / SAME_ANGLE) % round(np.pi / 2 / SAME_ANGLE)
+    groups, index = np.unique(group, return_inverse=True)
+    heaviest = int(np.argmax(np.round(np.bincount(index, weights=length, minlength=len(groups)), 6)))
+    members = np.flatnonzero(index == heaviest)
+    best = float(angle[members[int(np.argmax(np.round(length[members], 6)))]])
     cosine, sine = np.cos(best), np.sin(best)
     return np.array([[cosine, sine], [-sine, cosine]])
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from shapely.geometry.base import BaseGeometry
 
 from mission.geometry import BoolArray, FloatArray, IntArray
 from mission.planning import KEPT
@@ -53,3 +54,12 @@ def joined(proposals: Sequence[Proposals]) -> Proposals:
         doorway=np.concatenate([item.doorway for item in proposals]),
         must=np.concatenate([item.must for item in proposals]),
     )
+
+
+def in_order(proposals: Proposals, rooms: Sequence[BaseGeometry]) -> Proposals:
+    """The proposals from left to right, so that ties are broken alike however the rooms are ordered."""
+    x, y = np.round(proposals.xy, 6).T
+    middles = np.round([[room.centroid.x, room.centroid.y] for room in rooms], 6)
+    rank = np.argsort(np.lexsort(middles.T[::-1]), kind="stable")
+    order = np.lexsort((rank[proposals.room], proposals.doorway, y, x))
+    return Proposals(**{name: values[order] for name, values in vars(proposals).items()})

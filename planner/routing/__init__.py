@@ -103,9 +103,11 @@ def _stop_at_door(selection: Selection) -> tuple[int | None, str]:
     if not doors:
         return None, "the tour's best end"
     widest = max(doors, key=lambda item: (round(item.clear_width, 6), item.opening.id))
-    middle = widest.opening.line.mean(axis=0)
-    away = np.round(np.hypot(*(selection.xy - middle).T), 6)
-    return int(np.argmin(away)), f"the stop nearest the widest exterior door, {widest.opening.id}"
+    away = np.round(np.hypot(*(selection.xy - widest.opening.line.mean(axis=0)).T), 6)
+    rooms = candidates.room[candidates.kept[selection.chosen]]
+    behind = np.array([space.rooms[k].room in set(widest.rooms) - {None} for k in rooms])
+    order = np.lexsort((away, ~behind))  # a stop behind a wall may be nearer than one in the door's room
+    return int(order[0]), f"the stop nearest the widest exterior door, {widest.opening.id}"
 
 
 def _ordered(lengths: FloatArray, ends: Ends, router: str, *, seed: int) -> tuple[list[int], float, str]:
@@ -175,7 +177,7 @@ def _assembled(
     if sequence[0] < stops:
         approaches.insert(0, frozen(points[sequence[:1]]))
     back = places[0] if ends.closed else ends.last
-    return_leg = ways.way(places[-1], back) if back is not None and len(places) > 1 else None
+    return_leg = None if back is None or back == places[-1] else ways.way(places[-1], back)
     driven = sum(polyline_length(leg) for leg in (*approaches, *([] if return_leg is None else [return_leg])))
     space = selection.visibility.candidates.space
     return Route(

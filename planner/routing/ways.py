@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from mission.geometry import FloatArray, IntArray, frozen
+from planner.shapes import SLACK
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +30,12 @@ class Ways:
         while nodes[-1] != start:
             nodes.append(int(self.before[start, nodes[-1]]))
         line = self.xy[nodes[::-1]]
-        keep = np.append(True, np.any(np.diff(line, axis=0) != 0, axis=1))
-        return frozen(line[keep])
+        if len(line) < 2 or np.all(line == line[0]):
+            return frozen(line[:1])
+        # a point on a straight piece would make the robot halt there
+        straightened = shapely.simplify(shapely.LineString(line - line[0]), SLACK, preserve_topology=False)
+        inner = shapely.get_coordinates(straightened)[1:-1] + line[0]
+        return frozen(np.concatenate([line[:1], inner, line[-1:]]))
 
 
 def shortest_ways(xy: FloatArray, edges: IntArray, points: int) -> Ways:

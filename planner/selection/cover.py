@@ -69,14 +69,15 @@ class Cover:
         return Cover(_sorted(self.sees[:, np.flatnonzero(left)]), self.weight[left], needed)
 
     def offering(self, rows: IntArray) -> Cover:
-        """The same, where only `rows` can be chosen: the others see nothing."""
+        """The same, where only `rows` can be chosen: the others see nothing, nor is it needed."""
         if len(rows) == self.rows:
             return self
         offered = np.zeros(self.rows)
         offered[rows] = 1
         sees = _sorted((diags_array(offered) @ self.sees).tocsr().astype(np.int64))
         sees.eliminate_zeros()
-        return Cover(sees, self.weight, self.needed)
+        coverable = int(self.weight[np.asarray(sees.sum(axis=0)).ravel() > 0].sum())
+        return Cover(sees, self.weight, min(self.needed, coverable))
 
 
 def cover_of(visibility: Visibility, *, required: float) -> Cover:

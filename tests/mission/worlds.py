@@ -59,7 +59,7 @@ def mission_of(
         start=Start(x=begin[0], y=begin[1], heading=0.0, reason="given"),
         stops=stops, return_=back,
         policy=Policy(link_loss="continue", link_loss_after_s=30.0, battery_min=0.15),
-        origin=Origin(floor="room.dxf", floor_digest="0" * 64, parameters=Settings(), stopgo="0.1.0"),
+        origin=Origin(floor="room.dxf", floor_digest="0" * 64, parameters={"seed": 1}, stopgo="0.1.0"),
     ))  # fmt: skip
 
 

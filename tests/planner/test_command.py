@@ -153,7 +153,7 @@ def test_options_override_the_file(run: Callable[..., Run], floor: Path, tmp_pat
     code, *_ = run("plan", floor, "-p", tmp_path / "plan.toml", "--grid", 2, "-o", tmp_path / "out")
     assert code == 0
     parameters = read(tmp_path / "out" / "mission.json").origin.parameters
-    assert (parameters.coverage, parameters.grid) == (0.5, 2.0)
+    assert (parameters["coverage"], parameters["grid"]) == (0.5, 2.0)
 
 
 def test_planning_again_gives_the_same_mission(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
@@ -361,6 +361,22 @@ def test_a_plan_toml_that_is_not_there_is_2(run: Callable[..., Run], floor: Path
     assert "none.toml" in refused(run, 2, tmp_path / "out", floor, "-p", tmp_path / "none.toml")
 
 
+def test_no_candidate_left_is_1(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
+    line = refused(run, 1, tmp_path / "out", floor, "--d-sec", 3)
+    assert "no candidate" in line
+    assert "d_sec" in line
+
+
+def test_no_target_is_1(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
+    line = refused(run, 1, tmp_path / "out", floor, "--targets", "beams")
+    assert "no target" in line
+    assert "walls" in line
+
+
+def test_nothing_in_range_is_1(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
+    assert "--range" in refused(run, 1, tmp_path / "out", floor, "--range", 0.1)
+
+
 @pytest.mark.parametrize("start", ["4,3.5,0", "0.1,2,0", "-5,2,0", "1e5,1e5,0"])
 def test_a_start_where_the_robot_does_not_fit_is_2(
     run: Callable[..., Run], start: str, floor: Path, tmp_path: Path
@@ -407,6 +423,17 @@ def test_no_floor_at_all_is_2(run: Callable[..., Run]) -> None:
     code, _, error = run("plan")
     assert code == 2
     assert "floor" in one_line(error)
+
+
+def test_a_refusal_leaves_an_older_plan_as_it_was(
+    run: Callable[..., Run], floor: Path, tmp_path: Path
+) -> None:
+    run("plan", floor, "-o", tmp_path / "out")
+    before = {name: (tmp_path / "out" / name).read_bytes() for name in FILES}
+    code, _, error = run("plan", floor, "-o", tmp_path / "out", "--d-sec", 3)
+    assert code == 1
+    one_line(error)
+    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
 
 
 # ---- interrupted ----

@@ -190,7 +190,7 @@ def test_every_router_lies_between_its_bound_and_the_worst(kind: str, name: str)
     import msgspec
 
     settings = msgspec.structs.replace(TOURS[kind], router=name)
-    for seed, count in enumerate((2, 3, 4, 5, 6, 7)):
+    for seed, count in enumerate((1, 2, 3, 4, 5, 6, 7)):
         xy = free_points(count, seed)
         found = route(selection_at(floor_with_things(), xy, settings))
         check_route(found, xy, settings)

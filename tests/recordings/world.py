@@ -187,7 +187,7 @@ def mission_of(route: Route) -> Mission:
             return_=None,
             policy=Policy(link_loss="continue", link_loss_after_s=30.0, battery_min=0.15),
             origin=Origin(
-                floor="small.dxf", floor_digest=FLOOR_DIGEST, parameters=Settings(), stopgo="0.1.0"
+                floor="small.dxf", floor_digest=FLOOR_DIGEST, parameters={"seed": 1}, stopgo="0.1.0"
             ),
         )
     )

@@ -1,0 +1,54 @@
+"""Markdown tables and where they stand in benchmarks/README.md."""
+
+from __future__ import annotations
+
+import platform
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+README = Path(__file__).with_name("README.md")
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """A Markdown table; floats are rounded to three significant figures."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(_cell(cell) for cell in line) + " |" for line in lines)
+
+
+def _cell(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def versions(*names: str) -> str:
+    """`python 3.11, numpy 2.4.6, …`; what is not installed says so."""
+    told = [f"python {platform.python_version()}"]
+    for name in names:
+        try:
+            told.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            told.append(f"{name} not installed")
+    return ", ".join(told)
+
+
+def median_seconds(action: Callable[[], object], *, runs: int = 5) -> float:
+    """Median time of an action after one run that is not counted."""
+    action()
+    times = []
+    for _ in range(runs):
+        begin = time.perf_counter()
+        action()
+        times.append(time.perf_counter() - begin)
+    return statistics.median(times)
+
+
+def put(section: str, text: str) -> None:
+    """Replace what stands between the section's markers in the README."""
+    begin, end = f"<!-- {section}: begin -->", f"<!-- {section}: end -->"
+    whole = README.read_text(encoding="utf-8")
+    if begin not in whole:
+        whole += f"\n{begin}\n{end}\n"
+    before, _, rest = whole.partition(begin)
+    README.write_text(f"{before}{begin}\n{text}\n{end}{rest.partition(end)[2]}", encoding="utf-8")
