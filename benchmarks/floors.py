@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from mission.floor import KINDS, Element, FloorPlan, Opening, Room
@@ -41,7 +43,7 @@ def _band(low, band, width, random, elements, rooms, openings) -> None:
     _add_wall(elements, _box(left, low - WALL / 2, width, low + WALL / 2))
     for wall_y, room_low, room_high in ((below, low, below), (above, above, low + band)):
         doors = []
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in pairwise(edges):
             door = float(random.uniform(a + 0.6, b - 0.6 - DOOR))
             doors.append(door)
             openings.append(_door(f"door-{len(openings)}", door, wall_y))

@@ -10,7 +10,9 @@ from mission.geometry import IntArray
 from planner.selection.cover import Cover
 
 SWAPS = 400
-"""Swaps tried before a smaller selection is given up; a count, so that plans do not depend on speed."""
+"""Most swaps tried before a smaller selection is given up; a count, so that no plan depends on speed."""
+TRIALS = 24_000
+"""Stops looked at for all those swaps together, so that large floors get fewer swaps."""
 TENURE = 7
 """Swaps for which a row that left may not come back."""
 
@@ -18,6 +20,7 @@ TENURE = 7
 def improved(cover: Cover, chosen: IntArray, *, at_least: int, swaps: int = SWAPS) -> IntArray:
     """A selection with as few rows as drop-and-repair finds, never fewer than the bound `at_least`."""
     best = chosen
+    swaps = min(swaps, max(TENURE, TRIALS // max(1, len(chosen))))
     while len(best) > at_least:
         smaller = _repaired(cover, _without_least(cover, best), swaps)
         if smaller is None:
