@@ -48,10 +48,12 @@ class Decision:
 
 def decide(command: Command, situation: Situation) -> Decision | Refused:
     """What a command leads to; late, foreign, misdirected and impossible ones are refused."""
-    refused = _too_late(command, situation)
+    late = _too_late(command, situation)
+    if late:
+        return late
     lease = situation.lease if command.verb in FREE_VERBS else _claim(command, situation)
-    if refused or isinstance(lease, Refused):
-        return refused or lease  # type: ignore[return-value]
+    if isinstance(lease, Refused):
+        return lease
     change = _misdirected(command, situation) or _verb(command, situation)
     if isinstance(change, Refused):
         return change
