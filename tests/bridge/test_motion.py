@@ -7,7 +7,9 @@ from itertools import pairwise
 
 import pytest
 
+from bridge.clock import SimulatedClock
 from bridge.motion import Straight, along
+from bridge.simulator import SimulatedBase
 from mission.events import Pose
 
 ORIGIN = Pose(x=0.0, y=0.0, heading=0.0)
@@ -38,3 +40,12 @@ def test_a_straight_is_continuous_and_never_faster_than_allowed() -> None:
         assert 0 <= b.x - a.x <= 0.5 * 0.01 + 1e-9
         assert speed <= 0.5
     assert places[-1][0].x == pytest.approx(1.7)
+
+
+def test_a_robot_that_was_only_stopped_may_still_be_put_at_the_start() -> None:
+    base = SimulatedBase(clock=SimulatedClock())
+    base.stop()
+    base.stand_at_start(Pose(x=3.0, y=4.0, heading=0.0))
+    assert (base.pose().x, base.pose().y) == (3.0, 4.0)
+    base.stand_at_start(ORIGIN)
+    assert (base.pose().x, base.pose().y) == (3.0, 4.0)
