@@ -105,7 +105,7 @@ class Ground:
         inner = [threshold(item) for item in crossings if not item.closed_because]
         slab = to_shape(floor.outline, origin)
         holes = [shapely.Polygon(ring) for part in polygon_parts(slab) for ring in part.interiors]
-        outline = snapped(shapely.union_all([slab, *inner]).difference(shapely.union_all(holes)))
+        outline = union([slab, *inner]).difference(shapely.union_all(holes))
         if outline.area <= 0:
             raise InputError(f"{floor.name}: the floor has no area; check layer FLOOR")
         lines = [barrier(item, origin, obstacles) for item in crossings if item.closed_because]

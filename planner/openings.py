@@ -17,6 +17,8 @@ PROBES = (0.15, 0.25, 0.4, 0.6)
 """Distances in metres from an opening's line at which its rooms are looked for."""
 THRESHOLD = 0.3
 """Half the depth of the floor assumed under an opening."""
+ALONG = 2e-4
+"""A line this close (m) to an obstacle runs along it."""
 END_GAP = 0.1
 """An opening's line may end this short of its jamb."""
 
@@ -56,11 +58,37 @@ def _crossing(
     line = shapely.LineString(opening.line - origin)
     if line.length <= SLACK:
         return Crossing(opening, shapely.LineString(), (None, None), "its line has no length")
-    near = part_near(obstacles, line)
-    pieces = [p for p in shapely.get_parts(line.difference(near)) if p.length > SLACK]
-    clear = max(pieces, key=lambda piece: piece.length, default=shapely.LineString())
+    clear = widest_clear(line, part_near(obstacles, line))
     sides = (None, None) if clear.is_empty else _sides(clear, rooms)
     return Crossing(opening, clear, sides, _closed(clear, sides, rooms, outline, opening, settings))
+
+
+def widest_clear(line: BaseGeometry, obstacles: BaseGeometry) -> BaseGeometry:
+    """The longest piece of an opening's line between obstacles; empty if there is none.
+
+    A line drawn along a wall's face, or within ALONG of it, is in the wall there.
+    """
+    beside = _longest(line.difference(obstacles.buffer(ALONG)))
+    if beside.is_empty:
+        return beside
+    a, b = shapely.get_coordinates(beside)[[0, -1]]
+    step = ALONG * (b - a) / np.hypot(*(b - a))
+    reach = shapely.LineString([a - step, b + step]).difference(obstacles)
+    whole = shapely.get_coordinates(line)[[0, -1]]
+    ends = shapely.get_coordinates(_longest(reach))[[0, -1]]
+    return shapely.LineString([_within(end, whole) for end in ends])
+
+
+def _longest(lines: BaseGeometry) -> BaseGeometry:
+    pieces = [piece for piece in shapely.get_parts(lines) if piece.length > SLACK]
+    return max(pieces, key=lambda piece: piece.length, default=shapely.LineString())
+
+
+def _within(point: FloatArray, ends: FloatArray) -> FloatArray:
+    """The point, or the end of the line (2, 2) that it lies beyond."""
+    along = ends[1] - ends[0]
+    t = float(np.dot(point - ends[0], along) / np.dot(along, along))
+    return ends[0] if t < 0 else ends[1] if t > 1 else point
 
 
 def part_near(shape: BaseGeometry, line: BaseGeometry) -> BaseGeometry:

@@ -10,6 +10,7 @@ from mission.geometry import FloatArray
 from mission.planning import DROP_REASONS, KEPT, NavigableSpace, OpeningState
 from planner.candidates.place import Place
 from planner.candidates.proposals import Proposals
+from planner.openings import widest_clear
 from planner.shapes import local_origin, to_shape
 
 
@@ -28,8 +29,7 @@ def doorways(space: NavigableSpace) -> Proposals:
 def _middle(space: NavigableSpace, state: OpeningState, obstacles: shapely.Geometry) -> FloatArray:
     """The middle of the opening's clear piece, in the drawing's coordinates."""
     origin = local_origin(space.floor)
-    pieces = shapely.get_parts(shapely.LineString(state.opening.line - origin).difference(obstacles))
-    widest = max(pieces, key=lambda piece: piece.length)
+    widest = widest_clear(shapely.LineString(state.opening.line - origin), obstacles)
     return shapely.get_coordinates(widest)[[0, -1]].mean(axis=0) + origin
 
 
