@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test lint types clean
+.PHONY: demo test lint types faults benchmarks clean
 
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -23,6 +23,13 @@ types: $(STAMP)
 
 test: lint types
 	$(BIN)/python -m pytest
+
+# The long forms: every fault at full size, and every table of figures.
+faults: $(STAMP)
+	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults
+
+benchmarks: $(STAMP)
+	for name in paper visibility tours growth bridge fleet; do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 clean:
 	rm -rf $(VENV) recordings/demo .pytest_cache .mypy_cache .ruff_cache
