@@ -1,7 +1,7 @@
 """Visibility -> selection: as few candidates as see the required share of what is visible.
 
-A method is a function `(cover, bound, settings) -> (rows, bound)`: rows that cover what is needed, and a
-number of rows that none goes below, at least as good as the one it is given.
+A method is a function `(cover, settings) -> (rows, bound)`: rows that cover what is needed, and a number
+of rows that no selection goes below.
 """
 
 from __future__ import annotations
@@ -14,25 +14,27 @@ from mission.errors import AnswerIsNo, InputError
 from mission.geometry import FloatArray, IntArray, frozen
 from mission.planning import Selection, Visibility
 from mission.settings import Settings
-from planner.selection.bound import relaxation_bound
+from planner.selection.bound import lower_bound
 from planner.selection.cover import Cover, cover_of
 from planner.selection.exact import exact
 from planner.selection.greedy import greedy, in_greedy_order
 from planner.selection.improve import improved
 
-Method = Callable[[Cover, int, Settings], tuple[IntArray, int]]
+Method = Callable[[Cover, Settings], tuple[IntArray, int]]
 
 
-def _greedy(cover: Cover, bound: int, settings: Settings) -> tuple[IntArray, int]:
-    return greedy(cover), bound
+def _greedy(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
+    rows = greedy(cover)
+    return rows, lower_bound(cover, found=len(rows))
 
 
-def _default(cover: Cover, bound: int, settings: Settings) -> tuple[IntArray, int]:
-    return improved(cover, greedy(cover), at_least=bound), bound
+def _default(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
+    start, bound = _greedy(cover, settings)
+    return improved(cover, start, at_least=bound), bound
 
 
-def _exact(cover: Cover, bound: int, settings: Settings) -> tuple[IntArray, int]:
-    start = improved(cover, greedy(cover), at_least=bound)
+def _exact(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
+    start, bound = _default(cover, settings)
     if len(start) <= bound:
         return start, bound
     rows, proved = exact(cover, start, settings=settings)
@@ -62,12 +64,12 @@ def select(visibility: Visibility) -> Selection:
     if not settings.door_candidates:
         offered = np.setdiff1d(offered, candidates.doorway_rows)
     problem = whole.after(must).offering(offered)
-    rows, bound = METHODS[settings.selector](problem, relaxation_bound(problem), settings)
+    rows, bound = METHODS[settings.selector](problem, settings)
     chosen = np.concatenate([must, in_greedy_order(problem, rows)]).astype(np.int64)
     if not settings.door_scan:
         return _selection(visibility, whole, chosen, len(must) + bound)
     fixed = np.union1d(must, candidates.doorway_rows)
-    left = relaxation_bound(whole.after(fixed).offering(offered))
+    left = lower_bound(whole.after(fixed).offering(offered), found=len(rows))
     return _selection(visibility, whole, _with(chosen, fixed), len(fixed) + left)
 
 

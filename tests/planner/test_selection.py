@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 from mission.planning import Selection
 from mission.settings import Settings
 from planner.selection import METHODS
-from planner.selection.bound import counting_bound, relaxation_bound
+from planner.selection.bound import counting_bound, multiplier_bound, relaxation_bound
 from planner.selection.cover import Cover, cover_of, needed_units
 from planner.selection.greedy import greedy
 from tests.planner.worlds import box, column, element, hall, planned, two_rooms
@@ -48,19 +48,27 @@ def check_rows(cover: Cover, rows: np.ndarray) -> None:
 def test_every_selector_lies_between_its_bound_and_greedy(name: str) -> None:
     for seed in range(150):
         cover = small_cover(seed)
-        optimum, simple = fewest(cover), relaxation_bound(cover)
-        rows, bound = METHODS[name](cover, simple, Settings())
+        optimum = fewest(cover)
+        rows, bound = METHODS[name](cover, Settings())
         check_rows(cover, rows)
-        assert counting_bound(cover) <= simple <= bound <= optimum <= len(rows) <= len(greedy(cover)), seed
+        assert counting_bound(cover) <= bound <= optimum <= len(rows) <= len(greedy(cover)), seed
         if name == "exact":
             assert bound == optimum == len(rows), seed
         if name == "default":
             assert len(rows) <= optimum + 1, seed
 
 
+def test_no_bound_is_above_the_optimum() -> None:
+    for cover in map(small_cover, range(150)):
+        optimum = fewest(cover)
+        assert counting_bound(cover) <= optimum
+        assert relaxation_bound(cover) <= optimum
+        assert multiplier_bound(cover, found=len(greedy(cover))) <= optimum
+
+
 def test_the_default_selector_finds_nearly_every_optimum() -> None:
     missed = sum(
-        len(METHODS["default"](cover, relaxation_bound(cover), Settings())[0]) > fewest(cover)
+        len(METHODS["default"](cover, Settings())[0]) > fewest(cover)
         for cover in map(small_cover, range(1000, 1150))
     )
     assert missed <= 1
