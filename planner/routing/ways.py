@@ -12,6 +12,9 @@ from scipy.sparse.csgraph import dijkstra
 from mission.geometry import FloatArray, IntArray, frozen
 from planner.shapes import SLACK
 
+CHUNK = 256
+"""Points whose distances to all nodes are held at a time."""
+
 
 @dataclass(frozen=True, eq=False)
 class Ways:
@@ -21,14 +24,16 @@ class Ways:
     """Node positions in the drawing's coordinates; the points come first."""
     lengths: FloatArray
     """(points, points) in metres; infinite where there is no way."""
-    before: IntArray
-    """(points, nodes): the node before each node on the way from each point, negative at its start."""
+    graph: csr_array
+    """(nodes, nodes): lengths of the straight pieces."""
 
     def way(self, start: int, end: int) -> FloatArray:
         """The polyline (n, 2) from one point to another, both included."""
+        limit = float(self.lengths[start, end]) * (1 + 1e-9) + 1e-9
+        before = dijkstra(self.graph, False, start, return_predecessors=True, limit=limit)[1]
         nodes = [end]
         while nodes[-1] != start:
-            nodes.append(int(self.before[start, nodes[-1]]))
+            nodes.append(int(before[nodes[-1]]))
         line = self.xy[nodes[::-1]]
         if len(line) < 2 or np.all(line == line[0]):
             return frozen(line[:1])
@@ -46,5 +51,6 @@ def shortest_ways(xy: FloatArray, edges: IntArray, points: int) -> Ways:
     length = np.hypot(*(xy[pair[:, 0]] - xy[pair[:, 1]]).T)
     # a length of exactly 0 would mean "no edge" to the sparse solver
     graph = csr_array((np.maximum(length, 1e-12), (pair[:, 0], pair[:, 1])), shape=(len(xy),) * 2)
-    lengths, before = dijkstra(graph, directed=False, indices=np.arange(points), return_predecessors=True)
-    return Ways(xy=frozen(xy), lengths=frozen(lengths[:, :points]), before=frozen(before, np.int64))
+    chunks = [np.arange(points)[k : k + CHUNK] for k in range(0, points, CHUNK)]
+    lengths = [dijkstra(graph, directed=False, indices=chunk)[:, :points] for chunk in chunks]
+    return Ways(xy=frozen(xy), lengths=frozen(np.concatenate(lengths)), graph=graph)
