@@ -76,7 +76,8 @@ class Window:
 
     @property
     def size(self) -> tuple[float, float]:
-        return tuple((h - w) * self.scale for w, h in zip(self.low, self.high, strict=True))  # type: ignore[return-value]
+        width, height = (np.subtract(self.high, self.low) * self.scale).tolist()
+        return width, height
 
     def __call__(self, xy: Any) -> FloatArray:
         """Places (n, 2) on the picture, y down."""
@@ -138,7 +139,7 @@ def stroke(**style: object) -> str:
 
 def building(floor: FloorPlan, window: Window, *, faint: bool = False) -> Iterator[str]:
     """Floor, rooms and elements."""
-    even = {"fill_rule": "evenodd"}
+    even: dict[str, Any] = {"fill_rule": "evenodd"}
     yield path(window.region(floor.outline), fill="#f1f1ee", stroke="#555555", **even)
     yield path(
         window.region(p for room in floor.rooms for p in room.polygons), fill="#ffffff", stroke="#c8c8c8"
@@ -181,7 +182,7 @@ def draw_floor(drawn: Plan) -> str:
     """What is read from the drawing."""
     window = Window()
     names = []
-    halo = {"stroke": "#ffffff", "stroke_width": 4, "paint_order": "stroke"}
+    halo: dict[str, Any] = {"stroke": "#ffffff", "stroke_width": 4, "paint_order": "stroke"}
     for room in drawn.floor.rooms:
         ring = room.polygons[0].exterior
         x, y = window.at((ring.min(axis=0) + ring.max(axis=0)) / 2)
@@ -201,7 +202,7 @@ def draw_floor(drawn: Plan) -> str:
 def draw_navigable(drawn: Plan) -> str:
     """Where the robot's centre may drive, and where it may stop."""
     window, space = Window(), drawn.space
-    even = {"fill_rule": "evenodd"}
+    even: dict[str, Any] = {"fill_rule": "evenodd"}
     stand = (part for room in space.rooms for part in room.stop_area)
     layers = [
         *building(drawn.floor, window, faint=True),
@@ -231,7 +232,7 @@ def draw_candidates(drawn: Plan) -> str:
         SLIVER: ("#4e79a7", "sliver triangle"),
     }
     layers = [*building(drawn.floor, window, faint=True)]
-    legend = []
+    legend: list[Mark] = []
     inside = np.all((found.xy > window.low) & (found.xy < window.high), axis=1)
     for reason in (OUTSIDE, TOO_SMALL, SLIVER, IN_HOLE, AT_EDGE, TOO_CLOSE, KEPT):
         places = found.xy[(found.reason == reason) & inside]
@@ -245,7 +246,7 @@ def draw_candidates(drawn: Plan) -> str:
 
 def _dots(places: FloatArray, colour: str) -> str:
     """One path of dots: a line without length has a round end."""
-    data = (f"{line_data([place])}h0" for place in places)
+    data = (f"{line_data(place[None])}h0" for place in places)
     return path(data, stroke=colour, stroke_width=6.4, stroke_linecap="round")
 
 
@@ -281,7 +282,7 @@ def draw_visibility(drawn: Plan) -> str:
     ends = np.stack([a + runs.t0[:, None] * (b - a), a + runs.t1[:, None] * (b - a)], axis=1)[face]
     wedges = (ring_data(window([eye, *pair])) for pair in ends)
     reach = drawn.space.settings.range * window.scale
-    ring = {"fill": "none", "stroke": WAY, "stroke_dasharray": "4 5"}
+    ring: dict[str, Any] = {"fill": "none", "stroke": WAY, "stroke_dasharray": "4 5"}
     layers = [
         *building(drawn.floor, window, faint=True),
         path(wedges, fill=LIGHT),
@@ -305,7 +306,7 @@ def draw_raster(drawn: Plan) -> str:
     eye = seen.candidates.xy[seen.candidates.kept[row]]
     exact = _mask(drawn, seen.seen_by(row))
     raster = _mask(drawn, bresenham(drawn.candidates).seen_by(row))
-    ring = {"fill": "none", "stroke": WAY, "stroke_dasharray": "4 5"}
+    ring: dict[str, Any] = {"fill": "none", "stroke": WAY, "stroke_dasharray": "4 5"}
     looks = (
         (exact & raster, SEEN, "both see"),
         (exact & ~raster, MISSED, "only exact sees"),
@@ -379,8 +380,8 @@ def draw_mission(drawn: Plan) -> str:
     x, y = stop.x, stop.y
     window = Window((x - 4.6, y - 3.6), (x + 4.6, y + 3.6), 75.0)
     settings = drawn.space.settings
-    clear = {"fill": "none", "stroke": MISSED, "stroke_dasharray": "6 4", "stroke_width": 1.5}
-    body = {"fill": "#b9a6dd", "fill_opacity": 0.6, "stroke": INK}
+    clear: dict[str, Any] = {"fill": "none", "stroke": MISSED, "stroke_dasharray": "6 4", "stroke_width": 1.5}
+    body: dict[str, Any] = {"fill": "#b9a6dd", "fill_opacity": 0.6, "stroke": INK}
     way = [line_data(window(stop.approach))]
     corners = [circle(*window.at(point), 4.0, fill=WAY) for point in stop.approach]
     layers = [
@@ -449,7 +450,7 @@ def draw_headings(drawn: Plan) -> str:
 def draw_vertex(_: Plan) -> str:
     """The rule for sight lines through a vertex, as four sketches."""
     window = Window((0.0, 0.3), (15.6, 4.0), 52.0)
-    cases = (
+    cases: tuple[Any, ...] = (
         ("past a corner: seen", [[(1.4, 2), (2.2, 2), (2.2, 1.2), (1.4, 1.2)]], (0.4, 2), (3.5, 2), True),
         ("corners touch: not seen", [[(1, 2), (2, 2), (2, 1), (1, 1)], [(2, 2), (3, 2), (3, 3), (2, 3)]],
          (1.2, 2.8), (2.8, 1.2), False),
