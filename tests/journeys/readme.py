@@ -61,7 +61,7 @@ def run(command: str, folder: Path, endpoint: str = ENDPOINT) -> subprocess.Comp
 
 
 @contextmanager
-def robot(command: str, folder: Path, endpoint: str) -> Iterator[None]:
+def robot(command: str, folder: Path, endpoint: str) -> Iterator[subprocess.Popen[str]]:
     """The README's robot, from its first word until the block ends."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(
@@ -72,7 +72,7 @@ def robot(command: str, folder: Path, endpoint: str) -> Iterator[None]:
         for line in process.stderr:
             if line.startswith("ready"):
                 break
-        yield
+        yield process
     finally:
         process.terminate()
         process.communicate(timeout=20)

@@ -3,11 +3,32 @@
 from __future__ import annotations
 
 import json
+import re
 
 from bridge.spawn import free_port
 from mission.files import mission_json
 from recordings.read import check
 from tests.journeys.readme import blocks, commands, robot, run, with_output, workplace
+
+
+def test_a_robot_that_was_unplugged_finishes_its_run() -> None:
+    found, endpoint = blocks(), f"tcp/127.0.0.1:{free_port()}"
+    first, push, start, unplug, second, *rest = commands(found["unplug"])
+    assert unplug.startswith("kill -9")
+    with workplace() as folder:
+        assert run(commands(found["plan"])[0], folder).returncode == 0
+        with robot(first, folder, endpoint) as process:
+            assert run(push, folder, endpoint).returncode == 0
+            assert run(start, folder, endpoint).returncode == 0
+            assert int((folder / "robot-r2" / "lock").read_text()) == process.pid
+            process.kill()
+            process.wait()
+        with robot(second, folder, endpoint):
+            status, *others = [run(command, folder, endpoint) for command in rest]
+        assert "PAUSED" in status.stdout
+        assert [done.returncode for done in others] == [0, 0], [done.stderr for done in others]
+        scanned = re.findall(r"Scanned +(s\d+)", others[1].stderr)
+        assert len(scanned) == len(set(scanned))
 
 
 def test_the_tour_runs_from_plan_to_field_recording() -> None:
