@@ -110,6 +110,24 @@ class Homing(Event, frozen=True, kw_only=True):
     reason: str
 
 
+class RevisionWaits(Event, frozen=True, kw_only=True):
+    """A new revision of the mission has been taken, and will be followed from the next stop on."""
+
+    waiting: int
+
+
+class RevisionTaken(Event, frozen=True, kw_only=True):
+    """From here on the run follows a new revision, which `revision` names."""
+
+    before: int
+
+
+class RevisionDropped(Event, frozen=True, kw_only=True):
+    """The run is over before the revision that waited was followed; it must be pushed again."""
+
+    waiting: int
+
+
 class Finished(Event, frozen=True, kw_only=True):
     pass
 
@@ -131,6 +149,9 @@ AnyEvent = (
     | TakenOver
     | LinkLost
     | Homing
+    | RevisionWaits
+    | RevisionTaken
+    | RevisionDropped
     | Finished
     | Aborted
 )
@@ -155,6 +176,8 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     """0 to 1."""
     last_event: int
     """Number of the newest event in the journal, 0 if none."""
+    next_revision: int | None = None
+    """The revision that will be followed from the next stop on."""
 
 
 class PoseReport(msgspec.Struct, frozen=True, kw_only=True):

@@ -1,7 +1,7 @@
 """Every parameter of a plan, with its default; read from plan.toml, overridden by options.
 
 Names are those of the command's options with underscores. What a person types is metres, seconds and
-degrees, as here; see planning notes of each name for the paper's symbol.
+degrees, as here; docs/planning.md tells what each one does.
 """
 
 from __future__ import annotations

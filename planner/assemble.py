@@ -30,7 +30,8 @@ from mission.geometry import FloatArray
 from mission.planning import Candidates, NavigableSpace, Route
 from mission.settings import Settings
 from planner.gaps import Walls, keeps_clear
-from planner.shapes import local_origin, segments_of, to_shape
+from planner.reach import walls_of
+from planner.shapes import local_origin
 
 DECIMALS = 6
 """Missions hold micrometres: finer would be float noise."""
@@ -170,7 +171,7 @@ def _rounded(value: float) -> float:
 
 
 def check_legs(route: Route) -> None:
-    """Every leg as it will be sent keeps the robot's radius from every obstacle and closed opening.
+    """Every leg as it will be sent keeps its distance from obstacles, closed openings and floor edges.
 
     Raises
     ------
@@ -179,8 +180,8 @@ def check_legs(route: Route) -> None:
     """
     space = route.selection.visibility.candidates.space
     origin = local_origin(space.floor)
-    solid = np.concatenate([segments_of(to_shape(space.obstacles, origin)), space.barriers - origin])
-    walls = Walls(solid, np.full(len(solid), space.settings.radius - CLEAR_SLACK))
+    exact = walls_of(space)
+    walls = Walls(exact.segments, exact.clearance - CLEAR_SLACK)
     tree = shapely.STRtree(walls.shapes())
     legs = route.approaches if route.return_leg is None else (*route.approaches, route.return_leg)
     for leg in legs:
@@ -188,4 +189,6 @@ def check_legs(route: Route) -> None:
         shape = shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0])
         if not keeps_clear(shape, walls, tree):
             x, y = leg[-1]
-            raise StopgoError(f"{space.floor.name}: the leg to ({x:.3f}, {y:.3f}) does not clear an obstacle")
+            raise StopgoError(
+                f"{space.floor.name}: the leg to ({x:.3f}, {y:.3f}) comes too near an obstacle or an edge"
+            )
