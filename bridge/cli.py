@@ -16,6 +16,7 @@ from mission.errors import InputError
 
 if TYPE_CHECKING:
     from bridge.protocol import Answer, Verb
+    from bridge.revision import RevisionPolicy
     from bridge.station import Station
     from bridge.watch import Recording
     from mission.document import Mission, Transform
@@ -80,6 +81,9 @@ def robot(
         list[str] | None,
         typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="Let something go wrong, as slip@2=0.2."),
     ] = None,
+    revision: Annotated[
+        str, typer.Option(metavar="next-stop|refuse", help="What becomes of a revision pushed during a run.")
+    ] = "next-stop",
     insecure: Insecure = False,
     keys: KeyFolder = None,
 ) -> None:
@@ -94,11 +98,20 @@ def robot(
         name=name, listen=listen, connect=connect, state=state, site=site, speed_up=speed_up,
         at=None if at is None else read_pose("--at", at),
         to_map=None if map_ is None else read_transform("--map", map_),
-        insecure=insecure,
+        insecure=insecure, revisions=read_revisions(revision),
         keys=keys, faults=Faults(tuple(read_fault(text) for text in fault or ())),
     )  # fmt: skip
     where = f"listens on {listen}" if connect is None else f"connects to {connect}"
     run_robot(options, ready=lambda: say(f"ready {name} {where}"))
+
+
+def read_revisions(text: str) -> RevisionPolicy:
+    """What a robot does with a revision that is pushed during a run."""
+    from bridge.revision import POLICIES
+
+    if text not in POLICIES:
+        raise InputError(f"--revision {text}: one of {', '.join(POLICIES)}")
+    return POLICIES[text]
 
 
 def push(
@@ -131,10 +144,12 @@ def push(
         say(told)
     if json_:
         print_json({"robot": robot, "mission_id": accepted.mission_id, "revision": accepted.revision,
-                    "digest": accepted.digest, "already": accepted.already})  # fmt: skip
+                    "digest": accepted.digest, "already": accepted.already,
+                    "waits": accepted.waits})  # fmt: skip
     else:
         how = "already held" if accepted.already else "accepted"
-        typer.echo(f"{robot} {how} {document.name} ({document.id[:12]} revision {document.revision})")
+        when = "; followed from the next stop on" if accepted.waits else ""
+        typer.echo(f"{robot} {how} {document.name} ({document.id[:12]} revision {document.revision}){when}")
 
 
 def turning(own: Transform | None, mission: Mission) -> str:
@@ -390,6 +405,8 @@ def state_line(report: StateReport) -> str:
     )
     stop = f", {report.stop_state} at {report.stop}" if report.stop else ""
     skipped = f", {len(report.skipped)} skipped" if report.skipped else ""
+    if report.next_revision is not None:
+        mission += f" (revision {report.next_revision} from the next stop on)"
     return (
         f"{report.robot}: {report.state}{stop}; {mission}; {len(report.done)} done{skipped};"
         f" battery {report.battery:.0%}"

@@ -15,13 +15,14 @@ from collections.abc import Callable
 
 import msgspec
 
-from bridge import route
+from bridge import revision, route
 from bridge import run as runs
 from bridge.clock import Clock
 from bridge.commands import Decision, Refused, Situation, decide, handed_over
 from bridge.journal import Journal
 from bridge.lease import Denied, claimed
 from bridge.protocol import Answer, Command, Commit, Lease, Rejected, encode
+from bridge.revision import RevisionPolicy
 from bridge.robots import Base, Scanner
 from bridge.run import Change, Run
 from mission.document import Mission, Stop
@@ -52,6 +53,7 @@ class Controller:
         clock: Clock,
         command_clock: Clock | None = None,
         mission_taken: Callable[[Mission], None] = lambda mission: None,
+        revisions: RevisionPolicy = "next-stop",
     ) -> None:
         self.robot = robot
         self.boot_id = uuid.uuid4().hex[:12]
@@ -63,6 +65,7 @@ class Controller:
         self._clock = clock
         self._command_clock = command_clock or clock
         self._mission_taken = mission_taken
+        self._revisions = revisions
         self._lock = threading.RLock()
         self._interrupt = threading.Event()
         self._wake = threading.Event()
@@ -89,12 +92,15 @@ class Controller:
         if kept is None:
             return
         self._run = kept
-        self._mission = self._stored(kept.mission_id, kept.revision)
-        if self._mission is not None:
-            self._mission_taken(self._mission)
+        self._hold(self._stored(kept.mission_id, kept.revision))
         change = runs.rebooted(kept)
         if change.events:
             self._keep(change)
+
+    def _hold(self, mission: Mission | None) -> None:
+        self._mission = mission
+        if mission is not None:
+            self._mission_taken(mission)
 
     def _stored(self, mission_id: str | None, revision: int | None) -> Mission | None:
         held = None if mission_id is None else self._journal.mission(mission_id, revision or 0)
@@ -112,20 +118,22 @@ class Controller:
             decision = decide(command, self._situation())
             answer = self._answer(command, decision)
             try:
-                self._store_decision(order, decision, answer)
+                run = self._store_decision(order, decision, answer)
             except sqlite3.OperationalError as error:
                 return self._answer(command, self._halt_unstored(error))
             if isinstance(decision, Decision):
-                self._adopt(decision.change.run, ordered=True)
+                self._adopt(run, ordered=True)
             return answer
 
-    def _store_decision(self, order: str, decision: Decision | Refused, answer: Answer) -> None:
+    def _store_decision(self, order: str, decision: Decision | Refused, answer: Answer) -> Run:
+        run = self._run
         with self._journal.transaction():
             if isinstance(decision, Decision):
-                self._write(decision.change)
+                run = self._write(decision.change)
                 self._store_lease(decision.lease)
             self._journal.store_answer(order, answer)
             self._journal.forget_answers()
+        return run
 
     def _store_lease(self, lease: Lease | None) -> None:
         if lease is not None:
@@ -158,7 +166,7 @@ class Controller:
         return self._answer(command, Refused("id_reused", message))
 
     def take(self, commit: Commit, mission: Mission) -> Rejected | None:
-        """Store a whole mission and make it the one to be run; not while another one runs."""
+        """Store a whole mission and make it the one to be run, or to be followed from the next stop on."""
         with self._lock:
             before = self.lease
             lease = claimed(
@@ -167,31 +175,57 @@ class Controller:
             )  # fmt: skip
             if isinstance(lease, Denied):
                 return Rejected(reason=lease.reason, messages=(lease.message,))
-            current = (self._run.mission_id, self._run.revision) == (mission.id, mission.revision)
-            refused = self._out_of_time(commit, current)
+            known = self._follows(mission)
+            refused = self._out_of_time(commit, known) or (None if known else self._unfit(mission))
             if refused:
                 return Rejected(reason=refused.reason, messages=(refused.message,))
-            run = self._run if current else runs.installed(self._run, mission)
+            change = Change(self._run) if known else self._taking(mission)
             with self._journal.transaction():
                 self._journal.keep_transfer(commit.manifest)
                 self._journal.store_nonce(commit.nonce, mission.digest)
                 self._store_lease(lease)
-                self._write(Change(run, handed_over(before, lease)))
-            if not current:
-                self._mission = mission
-                self._mission_taken(mission)
-                self._adopt(run, ordered=True)
+                run = self._write(Change(change.run, (*handed_over(before, lease), *change.events)))
+            if not known and run.over:
+                self._hold(mission)
+            if not known:
+                self._adopt(run, ordered=run.over)
         return None
 
-    def _out_of_time(self, commit: Commit, current: bool) -> Refused | None:
-        """Why a commit comes too late, or at the wrong time."""
+    def waits(self, mission: Mission) -> bool:
+        """Whether the mission is to be followed from the next stop on."""
+        run = self._run
+        return (run.mission_id, run.next_revision) == (mission.id, mission.revision)
+
+    def _follows(self, mission: Mission) -> bool:
+        """Whether this is the mission to be run already, now or from the next stop on."""
+        run = self._run
+        return run.mission_id == mission.id and mission.revision in (run.revision, run.next_revision)
+
+    def _taking(self, mission: Mission) -> Change:
+        run = self._run
+        return Change(runs.installed(run, mission)) if run.over else revision.waits(run, mission)
+
+    def _out_of_time(self, commit: Commit, known: bool) -> Refused | None:
+        """Why a commit comes too late, or once more."""
         if self._command_clock.now_ns() > commit.not_after_ns:
             return Refused("expired", "the commit is older than it allows; push again")
-        if not current and self._journal.nonce(commit.nonce) is not None:
+        if not known and self._journal.nonce(commit.nonce) is not None:
             return Refused("replayed", "this commit was taken before, and another mission since; push again")
-        if not current and not self._run.over:
-            return Refused("running", f"the robot is {self._run.state} with mission {self._run.mission_id}")
         return None
+
+    def _unfit(self, mission: Mission) -> Refused | None:
+        """Why a mission cannot be taken during the present run."""
+        run, held = self._run, self._mission
+        if run.over or held is None:
+            return None
+        if mission.id != held.id:
+            return Refused("running", f"the robot is {run.state} with mission {held.id}")
+        if self._revisions == "refuse":
+            return Refused("running", f"the robot is {run.state} and takes no revision during a run")
+        if run.homing and run.then != "PAUSED":
+            return Refused("running", "the robot is on its way home for good")
+        differs = revision.what_differs(run, held, mission)
+        return Refused("way_differs", f"revision {mission.revision}: {differs}") if differs else None
 
     def hear_of_link(self, silent_s: float) -> None:
         """Told how long no station has been heard; the mission's policy may want something of it."""
@@ -203,8 +237,7 @@ class Controller:
             at_once = mission.policy.link_loss in ("hold", "home")
             if at_once and run.stop_state in ("WAITING", "NAVIGATING", "SETTLING"):
                 change = runs.link_lost(run, mission, silent_s)
-                self._write(change)
-                self._adopt(change.run, ordered=True)
+                self._adopt(self._write(change), ordered=True)
 
     def _link_is_lost(self, mission: Mission) -> bool:
         """Whether it is, and matters."""
@@ -330,10 +363,23 @@ class Controller:
             self._keep(move(self._run))
 
     def _keep(self, change: Change) -> None:
-        self._write(change)
-        self._adopt(change.run)
+        self._adopt(self._write(change))
 
-    def _write(self, change: Change) -> None:
+    def _write(self, change: Change) -> Run:
+        """Store the change, and the one to a revision that waited for it; the run that is then."""
+        change = revision.dropped(change)
+        run = change.run
+        with self._journal.transaction():
+            self._put(change)
+            if run.next_revision is None or run.at <= self._run.at:
+                return run
+            mission = self._stored(run.mission_id, run.next_revision)
+            assert mission is not None
+            revised = revision.taken(run, mission)
+            self._put(revised)
+        return revised.run
+
+    def _put(self, change: Change) -> None:
         now_ns = self._clock.now_ns()
         run = change.run
         with self._journal.transaction():
@@ -354,6 +400,9 @@ class Controller:
     def _adopt(self, run: Run, *, ordered: bool = False) -> None:
         """What is stored is now what is; an order interrupts the work, except a scan that may end."""
         self._run = run
+        held = self._mission
+        if (run.mission_id, run.revision) != (held and held.id, held and held.revision):
+            self._hold(self._stored(run.mission_id, run.revision))
         if ordered and run.stop_state != "SCANNING":
             self._interrupt.set()
         self._wake.set()
@@ -379,7 +428,7 @@ class Controller:
                 state=run.state, run_id=run.run_id, mission_id=run.mission_id, revision=run.revision,
                 stop=stop.id if stop else None, stop_state=run.stop_state if stop else None,
                 done=run.done, skipped=run.skipped, battery=self._base.battery(),
-                last_event=self._journal.newest,
+                last_event=self._journal.newest, next_revision=run.next_revision,
             )  # fmt: skip
 
 
@@ -403,6 +452,8 @@ def same_work(then: Run, now: Run) -> bool:
     """Whether what was begun in `then` still counts: nothing has changed, or the same scan goes on."""
     if now is then:
         return True
+    if now.next_revision != then.next_revision:  # a revision that waits changes nothing of the present work
+        return runs.changed(now, next_revision=then.next_revision) == then
     scanning = then.stop_state == now.stop_state == "SCANNING"
     return scanning and (then.run_id, then.at, then.attempt) == (now.run_id, now.at, now.attempt)
 

@@ -127,8 +127,9 @@ class Inbox:
             return mission
         refusal = self._controller.take(commit, mission)
         return refusal or Accepted(
-            mission_id=mission.id, revision=mission.revision, digest=mission.digest, already=already
-        )
+            mission_id=mission.id, revision=mission.revision, digest=mission.digest,
+            already=already, waits=self._controller.waits(mission),
+        )  # fmt: skip
 
     def _stored(self, manifest: Manifest) -> Mission | Rejected:
         stored = self._journal.mission(manifest.mission_id, manifest.revision)

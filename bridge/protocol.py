@@ -36,7 +36,7 @@ Reason = Literal[
     "malformed", "expired", "id_reused", "wrong_state", "wrong_run", "wrong_mission", "no_mission",
     "finished_before", "not_at_start", "off_route", "not_at_stop", "not_the_commander", "fenced",
     "running", "revision_taken", "older_revision", "too_large", "incomplete", "digest", "infeasible",
-    "storage", "untrusted", "replayed",
+    "storage", "untrusted", "replayed", "way_differs",
 ]  # fmt: skip
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
@@ -185,6 +185,8 @@ class Accepted(Message, frozen=True):
     digest: str
     already: bool
     """Whether the robot held exactly this before."""
+    waits: bool = False
+    """Whether it will be followed from the next stop of the present run on."""
 
 
 class Rejected(Message, frozen=True):

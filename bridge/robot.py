@@ -19,6 +19,7 @@ from bridge.frames import OnMap, turned
 from bridge.journal import Journal, open_journal
 from bridge.link import Link
 from bridge.protocol import Keys
+from bridge.revision import RevisionPolicy
 from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner
 from mission.document import Mission, Start, Transform
 from mission.errors import InputError
@@ -43,6 +44,8 @@ class RobotOptions:
     insecure: bool = False
     keys: Path | None = None
     """Folder with the robot's keys; required beyond this machine."""
+    revisions: RevisionPolicy = "next-stop"
+    """What becomes of a new revision that is pushed during a run."""
     faults: Faults = NO_FAULTS
     """What the simulated robot is to get wrong."""
 
@@ -81,7 +84,7 @@ def robot_on(
 
         controller = Controller(
             robot=options.name, journal=journal, base=base, scanner=scanner, clock=clock, command_clock=wall,
-            mission_taken=mission_taken,
+            mission_taken=mission_taken, revisions=options.revisions,
         )  # fmt: skip
         agent = Agent(
             keys=keys, link=link, journal=journal, controller=controller, base=base, scanner=scanner,

@@ -62,6 +62,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     """Whether what is paused or held is the way home."""
     then: After = "FINISHED"
     """What the run is once the robot is home."""
+    next_revision: int | None = None
+    """The revision that is followed once the stop that is worked on is behind."""
 
     @property
     def over(self) -> bool:
@@ -169,13 +171,18 @@ def what_is_wrong(scan: ScanResult) -> str:
 
 
 def next_stop(run: Run, mission: Mission) -> Change:
-    """On to the next stop, the way back, or the end."""
-    onward = changed(run, at=run.at + 1, stop_state="WAITING", attempt=0, approaches=0, scan=None)
-    if onward.at < len(mission.stops):
-        return Change(onward)
+    """On to the next stop; with a new revision waiting, that one says what is next (`bridge.revision`)."""
+    between = changed(run, at=run.at + 1, stop_state="WAITING", attempt=0, approaches=0, scan=None)
+    return Change(between) if between.next_revision is not None else onward(between, mission)
+
+
+def onward(run: Run, mission: Mission) -> Change:
+    """To the stop that is next, the way back, or the end."""
+    if run.at < len(mission.stops):
+        return Change(run)
     if mission.return_ is None:
-        return ended(onward, "FINISHED")
-    return sent_home(onward, mission, then="FINISHED", reason="all stops are behind")
+        return ended(run, "FINISHED")
+    return sent_home(run, mission, then="FINISHED", reason="all stops are behind")
 
 
 def sent_home(run: Run, mission: Mission, *, then: After, reason: str) -> Change:
@@ -240,8 +247,8 @@ def failed(run: Run, mission: Mission, reason: str) -> Change:
 def skipped(run: Run, mission: Mission, reason: str) -> Change:
     """The stop is left out; its approach is still followed, for it is part of the way."""
     stop = mission.stops[run.at]
-    onward = next_stop(changed(run, skipped=(*run.skipped, stop.id)), mission)
-    return Change(onward.run, (partial(Skipped, stop=stop.id, reason=reason), *onward.events))
+    behind = next_stop(changed(run, skipped=(*run.skipped, stop.id)), mission)
+    return Change(behind.run, (partial(Skipped, stop=stop.id, reason=reason), *behind.events))
 
 
 def _ask(run: Run, mission: Mission, reason: str) -> Change:

@@ -215,9 +215,10 @@ class Station:
     def _read_back(self, manifest: Manifest) -> None:
         state = self.status()
         kept = self._part(manifest.mission_id, manifest.revision, 0).manifest
-        if (state.mission_id, state.revision) != (manifest.mission_id, manifest.revision) or (
-            kept.digest != manifest.digest
-        ):
+        told = state.mission_id == manifest.mission_id and manifest.revision in (
+            state.revision, state.next_revision,
+        )  # fmt: skip
+        if not told or kept.digest != manifest.digest:
             raise OutcomeUnknown(
                 f"{self.keys.robot} accepted the mission, but tells of mission {state.mission_id}"
                 f" revision {state.revision}; has somebody else pushed meanwhile?"
@@ -269,7 +270,8 @@ class Station:
             "valid_for_s": self.timeout_s,
             "run_id": None if verb == "start" else state.run_id,
             "mission_id": state.mission_id,
-            "revision": state.revision,
+            # A pause is meant for the run, also if it has just gone on by a new revision.
+            "revision": state.revision if cautious else None,
             "expect_state": (state.state,) if cautious else None,
             "fence": info.lease.fence if info.lease and cautious else None,
             "stop": state.stop if verb in ("skip", "retry") else None,

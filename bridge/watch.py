@@ -12,7 +12,16 @@ from bridge.follow import Report, Silence
 from bridge.station import Station
 from mission.document import Mission
 from mission.errors import OutcomeUnknown
-from mission.events import AnyEvent, Arrived, PoseReport, Scanned, StateReport
+from mission.events import (
+    AnyEvent,
+    Arrived,
+    PoseReport,
+    RevisionDropped,
+    RevisionTaken,
+    RevisionWaits,
+    Scanned,
+    StateReport,
+)
 from mission.schedule import schedule
 
 REDRAW_S = 0.2
@@ -55,7 +64,7 @@ def watch_showing(station: Station, record: Recording | None, showing: Showing) 
     state: StateReport | None = None
     for report in station.reports():
         if isinstance(report, StateReport):
-            if report.run_id and (state is None or state.run_id != report.run_id):
+            if report.run_id and (state is None or _other_plan(state, report)):
                 _introduce(station, report, record, showing)
             state = report
         if record is not None:
@@ -64,6 +73,11 @@ def watch_showing(station: Station, record: Recording | None, showing: Showing) 
     if state is None:
         raise OutcomeUnknown(f"{station.keys.robot}: the run ended and no state was heard")
     return state
+
+
+def _other_plan(before: StateReport, now: StateReport) -> bool:
+    """Whether another run has begun, or the run goes on by a new revision."""
+    return (before.run_id, before.revision) != (now.run_id, now.revision)
 
 
 def _introduce(station: Station, state: StateReport, record: Recording | None, showing: Showing) -> None:
@@ -195,6 +209,10 @@ def event_line(event: AnyEvent) -> str:
     name = type(event).__name__
     about = getattr(event, "stop", None) or ""
     detail = getattr(event, "reason", "") or getattr(event, "commander", "")
+    if isinstance(event, RevisionWaits | RevisionDropped):
+        detail = f"revision {event.waiting}"
+    if isinstance(event, RevisionTaken):
+        detail = f"revision {event.revision} after {event.before}"
     if isinstance(event, Arrived):
         detail = f"{event.deviation_m * 1000:.0f} mm beside"
     if isinstance(event, Scanned):

@@ -17,6 +17,7 @@ from bridge.inbox import Inbox
 from bridge.journal import Journal, memory_journal
 from bridge.link import MemoryLink, Switchboard
 from bridge.protocol import Answer, Command, Commit, Keys, Manifest, Verb
+from bridge.revision import RevisionPolicy
 from bridge.robot import pose_of
 from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
 from bridge.station import Station
@@ -76,6 +77,7 @@ class Field:
     keep: Path | None = None
     record: Path | None = None
     faults: Faults = NO_FAULTS
+    revisions: RevisionPolicy = "next-stop"
     ids: Any = field(default_factory=count)
 
     def __post_init__(self) -> None:
@@ -90,6 +92,7 @@ class Field:
         self.controller = Controller(
             robot="r1", journal=self.journal, base=self.base, scanner=self.scanner, clock=self.clock,
             mission_taken=lambda mission: self.base.stand_at_start(pose_of(mission.start)),
+            revisions=self.revisions,
         )  # fmt: skip
         self.inbox = Inbox(self.journal, self.controller, self.scanner.profiles)
 
