@@ -339,6 +339,7 @@ def watch(
     rrd: Annotated[
         Path | None, typer.Option("--rrd", metavar="FIELD.rrd", help="Record the run for Rerun.")
     ] = None,
+    view: Annotated[bool, typer.Option("--view", help="Open the viewer on what is recorded.")] = False,
     json_: Json = False,
 ) -> None:
     """Follow the robot's run until it ends, gaps filled from its journal; never touches the robot.
@@ -350,8 +351,8 @@ def watch(
     from bridge.watch import Lines, Table, watch_showing
 
     with (
+        recording(rrd, view=view) as record,
         reached(Way(robot, connect, site, None, timeout, insecure, keys)) as station,
-        recording(rrd) as record,
     ):
         state = watch_showing(station, record, Table() if sys.stderr.isatty() else Lines(say))
     if json_:
@@ -359,13 +360,20 @@ def watch(
     raise typer.Exit(0 if state.state == "FINISHED" else 1)
 
 
-def recording(path: Path | None) -> AbstractContextManager[Recording | None]:
-    """The field recording at `path`; nothing of Rerun is loaded without one."""
+def recording(path: Path | None, *, view: bool) -> AbstractContextManager[Recording | None]:
+    """The field recording at `path`, looked at if wanted; nothing of Rerun is loaded without one."""
+    if path is None and view:
+        raise InputError("--view shows what is recorded: say where, with --rrd FIELD.rrd")
     if path is None:
         return nullcontext()
     from recordings.field import FieldRecording
 
-    return FieldRecording(path, None)
+    record = FieldRecording(path, None)
+    if not view:
+        return record
+    from recordings.viewer import Viewed
+
+    return Viewed(record)
 
 
 @dataclass(frozen=True)

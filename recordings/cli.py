@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 from typing import Annotated
 
 import typer
-
-from mission.errors import InputError
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -35,14 +32,6 @@ def review(
         lines = (f"{path}: {item.as_text()}" for path, item in zip(recordings, reviews, strict=True))
         typer.echo("\n".join(lines))
     if view:
+        from recordings.viewer import open_viewer
+
         open_viewer(recordings)
-
-
-def open_viewer(recordings: list[Path]) -> None:
-    """Show the recordings, and wait until the viewer is closed; it listens on this machine only."""
-    from recordings.compact import VIEWER
-
-    command = [str(VIEWER), "--bind", "127.0.0.1", "--port", "auto", *map(str, recordings)]
-    code = subprocess.run(command, check=False).returncode
-    if code != 0:
-        raise InputError(f"the Rerun viewer ended with code {code}; without a screen leave out --view")

@@ -1,0 +1,52 @@
+"""Watching with the viewer: it opens once, on the file that is being written, or the reason is told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from bridge.cli import recording
+from mission.errors import InputError
+from recordings import viewer
+from recordings.field import FieldRecording
+from recordings.viewer import Viewed, open_viewer
+from tests.bridge.world import corridor
+
+
+def test_the_viewer_opens_once_on_what_is_being_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":0")
+    opened: list[Path] = []
+
+    def start(recordings: Sequence[Path]) -> None:
+        assert recordings[0].stat().st_size > 0
+        opened.extend(recordings)
+
+    with Viewed(FieldRecording(tmp_path / "field.rrd"), start) as record:
+        record.mission(corridor())
+        record.mission(corridor(stops=4, revision=2))
+    assert opened == [tmp_path / "field.partial.rrd"]
+    assert (tmp_path / "field.rrd").exists()
+
+
+def test_without_a_screen_one_line_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(viewer.sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(InputError, match="no screen here"), recording(tmp_path / "f.rrd", view=True):
+        pass
+    with pytest.raises(InputError, match="no screen here"):
+        open_viewer([tmp_path / "f.rrd"])
+
+
+def test_to_view_is_to_record(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="with --rrd"):
+        recording(None, view=True)
+
+
+def test_the_viewer_listens_on_this_machine_only() -> None:
+    command = viewer._command([Path("f.rrd")])
+    assert command[1:3] == ["--bind", "127.0.0.1"]
