@@ -1,0 +1,76 @@
+"""Floor -> ground: what carries the robot, what stands in its way, and where its centre may drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from mission.errors import InputError
+from mission.floor import FloorPlan
+from mission.geometry import FloatArray
+from mission.settings import Settings
+from planner.gaps import Walls, crossings_through, tight_gaps
+from planner.openings import Crossing, barrier, crossings_of, threshold
+from planner.shapes import (
+    GRID,
+    HAIRLINE,
+    grown,
+    local_origin,
+    polygon_parts,
+    segments_of,
+    snapped,
+    to_shape,
+    union,
+)
+from planner.targets import solid_of
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The floor in the local frame: what carries the robot and what stands in its way."""
+
+    floor: FloorPlan
+    origin: FloatArray
+    outline: BaseGeometry
+    """The floor layer and the floor under inner openings."""
+    obstacles: BaseGeometry
+    crossings: tuple[Crossing, ...]
+    barriers: FloatArray
+    """Openings not driven through (k, 2, 2)."""
+
+    @classmethod
+    def of(cls, floor: FloorPlan, settings: Settings) -> Ground:
+        origin = local_origin(floor)
+        solids = [solid_of(item, origin, HAIRLINE) for item in floor.elements if item.obstacle]
+        obstacles = union(solids)  # not snapped: clearances are decided on it
+        crossings = crossings_of(floor, obstacles, settings)
+        inner = [threshold(item) for item in crossings if not item.closed_because]
+        slab = to_shape(floor.outline, origin)
+        holes = [shapely.Polygon(ring) for part in polygon_parts(slab) for ring in part.interiors]
+        outline = union([slab, *inner]).difference(shapely.union_all(holes))
+        if outline.area <= 0:
+            raise InputError(f"{floor.name}: the floor has no area; check layer FLOOR")
+        lines = [barrier(item, origin, obstacles) for item in crossings if item.closed_because]
+        return cls(floor, origin, outline, obstacles, crossings, np.array(lines).reshape(-1, 2, 2))
+
+    def walls(self, settings: Settings) -> Walls:
+        """Everything a robot's centre keeps a distance from: obstacles, barriers, and floor edges."""
+        solid = np.concatenate([segments_of(self.obstacles), self.barriers])
+        edges = segments_of(self.outline)
+        clearance = np.repeat([settings.radius, settings.edge], [len(solid), len(edges)])
+        return Walls(np.concatenate([solid, edges]), clearance)
+
+
+def drivable(ground: Ground, settings: Settings) -> tuple[BaseGeometry, FloatArray]:
+    """Where the robot's centre may drive, and the exact crossings of gaps just wide enough."""
+    blocked = grown(ground.obstacles, settings.radius)
+    barriers = shapely.union_all([grown(shapely.LineString(b), settings.radius) for b in ground.barriers])
+    edges = grown(shapely.multilinestrings(list(segments_of(ground.outline))), settings.edge)
+    inner = ground.outline.difference(edges) if settings.edge > 0 else ground.outline
+    area = snapped(inner.difference(shapely.union_all([blocked, barriers])))
+    area = shapely.MultiPolygon([part for part in polygon_parts(area) if part.area > GRID])
+    walls = ground.walls(settings)
+    return area, crossings_through(tight_gaps(walls), walls, area, ground.outline)

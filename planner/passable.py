@@ -1,0 +1,129 @@
+"""Which openings the robot gets through into both rooms, and what is in its way where it does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from mission.floor import Finding
+from mission.geometry import FloatArray
+from mission.planning import OpeningState
+from mission.settings import Settings
+from planner.connected import Parts, parts_of
+from planner.gaps import gaps_between
+from planner.ground import Ground
+from planner.openings import Crossing, middle_and_normal
+from planner.shapes import HAIRLINE, SLACK, polygon_parts, to_shape
+from planner.targets import LINE_WALL, solid_of
+
+NEAR_OPENING = 1.6
+"""How far from an opening (m) the obstacle that blocks it is looked for."""
+REACHED_SHARE = 0.2
+"""An opening leads into a room if it reaches this share of where the robot may drive there …"""
+REACHED_AREA = 0.5
+"""… or at least this much of it (m²)."""
+
+
+def opening_states(
+    ground: Ground, drive_area: BaseGeometry, gaps: FloatArray, settings: Settings
+) -> tuple[tuple[OpeningState, ...], tuple[Finding, ...]]:
+    """What each opening is to the robot, and a finding for each inner one it cannot pass."""
+    parts = parts_of(drive_area, gaps)
+
+    @cache
+    def free_in(room: int) -> dict[int, float]:
+        return parts.area_by_part(to_shape(ground.floor.rooms[room].polygons, ground.origin))
+
+    states, findings = [], []
+    for crossing in ground.crossings:
+        why = crossing.closed_because or _not_reached(crossing, parts, free_in, ground, settings)
+        states.append(OpeningState(crossing.opening, crossing.rooms, crossing.width, not why, why))
+        if why and not why.startswith("exterior"):
+            findings.append(_opening_finding(crossing, why, ground))
+    return tuple(states), tuple(findings)
+
+
+def _opening_finding(crossing: Crossing, why: str, ground: Ground) -> Finding:
+    x, y = crossing.opening.line.mean(axis=0)
+    names = " and ".join("outside" if k is None else ground.floor.rooms[k].label for k in crossing.rooms)
+    message = f"{crossing.opening.kind} {crossing.opening.id} between {names} is not passable: {why}"
+    code = "narrow_opening" if crossing.closed_because else "blocked_opening"
+    return Finding(code, message, crossing.opening.id, (float(x), float(y)))
+
+
+def _not_reached(
+    crossing: Crossing,
+    parts: Parts,
+    free_in: Callable[[int], dict[int, float]],
+    ground: Ground,
+    settings: Settings,
+) -> str:
+    """Why the robot does not get from the opening into both rooms; empty if it does."""
+    here = parts.touching(crossing.clear)
+    wanted = {side: _main_parts(free_in(side)) for side in crossing.rooms if side is not None}
+    if here and all(here & main or not main for main in wanted.values()):
+        return ""
+    return _narrowest(crossing, parts, wanted, ground, settings)
+
+
+def _main_parts(free: dict[int, float]) -> set[int]:
+    """Parts that make up a good share of where the robot may drive in a room."""
+    enough = min(REACHED_AREA, REACHED_SHARE * sum(free.values()))
+    return {part for part, area in free.items() if area >= enough and area > 0}
+
+
+def _narrowest(
+    crossing: Crossing, parts: Parts, wanted: dict[int, set[int]], ground: Ground, settings: Settings
+) -> str:
+    """The place near an opening that is widest among those a robot must pass, in words."""
+    window = shapely.Point(middle_and_normal(crossing.clear)[0]).buffer(NEAR_OPENING)
+    walls = ground.walls(settings).near(window)
+    gaps = gaps_between(walls, short=-2 * float(walls.clearance.max(initial=0.0)) + 0.05, long=-SLACK)
+    cells = [_cells_of(parts, main, ground, room, window) for room, main in wanted.items()]
+    for gap in sorted(gaps, key=lambda item: -item.width):
+        if _opens(crossing, cells, ground, window, gap.width / 2 - SLACK):
+            names = " and ".join(dict.fromkeys(_owner(walls.segments[k], ground) for k in gap.walls))
+            need = float(walls.clearance[list(gap.walls)].sum())
+            return f"{gap.width:.3f} m between {names} near it, the robot needs {need:.3f} m"
+    return f"no place for a robot of radius {settings.radius:.3f} m next to it"
+
+
+def _cells_of(
+    parts: Parts, main: set[int], ground: Ground, room: int, window: BaseGeometry
+) -> NDArray[np.object_]:
+    """Where the robot drives in a room near an opening, leaving out pockets it cannot get to."""
+    shape = to_shape(ground.floor.rooms[room].polygons, ground.origin).intersection(window)
+    near = parts.tree.query(shape, predicate="intersects")
+    return parts.cells[near[np.isin(parts.cell_part[near], sorted(main))]]
+
+
+def _opens(
+    crossing: Crossing,
+    cells: list[NDArray[np.object_]],
+    ground: Ground,
+    window: BaseGeometry,
+    radius: float,
+) -> bool:
+    """Whether a robot of this radius gets from the opening to the cells of both rooms."""
+    free = window.intersection(ground.outline).difference(
+        ground.obstacles.intersection(window).buffer(radius)
+    )
+    here = [piece for piece in polygon_parts(free) if piece.intersects(crossing.clear)]
+    return all(any(np.any(shapely.intersects(some, piece)) for piece in here) for some in cells if len(some))
+
+
+def _owner(segment: FloatArray, ground: Ground) -> str:
+    middle = shapely.Point(segment.mean(axis=0))
+    for item in ground.floor.elements:
+        if item.obstacle and solid_of(item, ground.origin, HAIRLINE).distance(middle) <= LINE_WALL:
+            return item.id
+    return "a closed opening" if len(ground.barriers) and _on_barrier(middle, ground) else "the floor's edge"
+
+
+def _on_barrier(point: BaseGeometry, ground: Ground) -> bool:
+    return bool(np.any(shapely.distance(shapely.linestrings(ground.barriers), point) <= LINE_WALL))

@@ -1,0 +1,68 @@
+"""The rooms as they are planned: rooms within rooms parted, and floor outside every room."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from mission.floor import FloorPlan
+from mission.planning import RoomSpace
+from mission.settings import Settings
+from planner.ground import Ground
+from planner.openings import part_near
+from planner.shapes import polygon_parts, to_polygons, to_shape
+
+LEAST_UNNAMED = 0.5
+"""Floor outside every room smaller than this (m²) is a threshold or a niche, not a room."""
+
+
+def room_spaces(
+    floor: FloorPlan, ground: Ground, drive_area: BaseGeometry, settings: Settings
+) -> tuple[RoomSpace, ...]:
+    """The rooms as planned: inner rooms subtracted from outer ones, and floor outside every room."""
+    shapes = [to_shape(room.polygons, ground.origin) for room in floor.rooms]
+    tree = shapely.STRtree([shape.representative_point() for shape in shapes])
+    planned: list[tuple[int | None, str, BaseGeometry]] = [
+        (k, floor.rooms[k].label, _without_inner(shape, shapes, k, tree)) for k, shape in enumerate(shapes)
+    ]
+    planned.extend((None, name, shape) for name, shape in _unnamed(ground, drive_area, shapes))
+    forbidden = ground.obstacles.buffer(settings.d_sec, quad_segs=16)
+    inner = ground.outline.buffer(-settings.edge) if settings.edge > 0 else ground.outline
+    allowed = inner.difference(forbidden)
+    return tuple(
+        RoomSpace(
+            room=index,
+            name=name,
+            area=to_polygons(shape, ground.origin),
+            stop_area=to_polygons(shape.intersection(part_near(allowed, shape)), ground.origin),
+        )
+        for index, name, shape in planned
+    )
+
+
+def _without_inner(
+    shape: BaseGeometry, shapes: list[BaseGeometry], index: int, tree: shapely.STRtree
+) -> BaseGeometry:
+    """A room without the rooms that lie inside it (paper: a room in a room is subtracted)."""
+    held = np.sort(tree.query(shape, predicate="intersects"))
+    inner = [shapes[k] for k in held if k != index and shapes[k].area < shape.area]
+    return shape.difference(shapely.union_all(inner)) if inner else shape
+
+
+def _unnamed(
+    ground: Ground, drive_area: BaseGeometry, rooms: list[BaseGeometry]
+) -> list[tuple[str, BaseGeometry]]:
+    """Floor outside every room: each part of the floor by itself where there are no rooms at all."""
+    if not rooms:
+        parts = sorted(polygon_parts(to_shape(ground.floor.outline, ground.origin)), key=lambda p: p.bounds)
+        names = ["floor"] if len(parts) == 1 else [f"floor {k + 1}" for k in range(len(parts))]
+        return list(zip(names, parts, strict=True))
+    outside = ground.outline.difference(shapely.union_all(rooms).buffer(THIN, join_style="mitre"))
+    parts = [p for p in polygon_parts(outside) if p.intersection(drive_area).area > LEAST_UNNAMED]
+    ordered = sorted(parts, key=lambda part: part.bounds)
+    return [(f"unnamed {k + 1}", part) for k, part in enumerate(ordered)]
+
+
+THIN = 0.3
+"""Floor this close to a room (m) belongs to a wall or a threshold."""
