@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from mission.geometry import frozen
+from mission.geometry import FloatArray, IntArray, frozen
 from mission.planning import Candidates, Visibility
 from planner.mesh import Mesh, mesh_of
 from planner.shapes import GRID, local_origin, snapped, to_grid, to_shape
 from planner.sight import scene_of, sight
+from planner.targets import LINE_WALL
 
+BESIDE = 2 * LINE_WALL
+"""Distance in metres from a closed door's line at which a scanner in its doorway looks."""
 MARGIN = 1.0
 """Open space around everything, in metres."""
 
@@ -19,20 +22,49 @@ def exact(candidates: Candidates) -> Visibility:
     """Units within range whose midpoint is in sight; `planner.sight_kernel` has the rule for corners."""
     space, targets = candidates.space, candidates.space.targets
     origin = local_origin(space.floor)
-    viewpoints = to_grid(candidates.xy[candidates.kept] - origin)
+    places, row = viewpoints_of(candidates)
     scene = scene_of(
         open_space(candidates), targets.a - origin, targets.b - origin, targets.units, targets.occluding
     )
-    runs = sight(scene, viewpoints, reach=space.settings.range)
+    runs = sight(scene, to_grid(places - origin), reach=space.settings.range)
     start = targets.first_unit[:-1][runs.segment]
     return Visibility(
         candidates=candidates,
-        pointer=frozen(runs.pointer, np.int64),
+        pointer=frozen(runs.pointer[np.searchsorted(row, np.arange(len(candidates.kept) + 1))], np.int64),
         segment=frozen(runs.segment, np.int64),
         first=frozen(start + runs.low, np.int64),
         last=frozen(start + runs.high, np.int64),
         method="exact",
     )
+
+
+def viewpoints_of(candidates: Candidates) -> tuple[FloatArray, IntArray]:
+    """Where each kept candidate looks from (n, 2), and its row (n,), ascending.
+
+    A scanner in a doorway keeps that door open: where doors are closed for the laser, it looks from
+    both sides of the door's line.
+    """
+    xy = candidates.xy[candidates.kept]
+    row = np.arange(len(xy))
+    if candidates.space.settings.doors == "open" or not len(candidates.doorway_rows):
+        return xy, row
+    twice = np.repeat(row, np.where(np.isin(row, candidates.doorway_rows), 2, 1))
+    places = xy[twice].copy()
+    for doorway in candidates.doorway_rows:
+        first = int(np.searchsorted(twice, doorway))
+        aside = BESIDE * _across_opening(candidates, xy[doorway])
+        places[first] += aside
+        places[first + 1] -= aside
+    return places, twice
+
+
+def _across_opening(candidates: Candidates, point: FloatArray) -> FloatArray:
+    """Unit vector at right angles to the opening that a doorway's point lies on."""
+    lines = [shapely.LineString(item.opening.line) for item in candidates.space.openings]
+    nearest = lines[int(np.argmin(shapely.distance(lines, shapely.Point(point))))]
+    a, b = shapely.get_coordinates(nearest)[[0, -1]]
+    along = b - a
+    return np.array([-along[1], along[0]]) / np.hypot(*along)
 
 
 def open_space(candidates: Candidates) -> Mesh:

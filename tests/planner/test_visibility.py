@@ -252,3 +252,15 @@ def test_rooms_apart_do_not_see_each_other() -> None:
     )
     seen = at(floor, np.array([(2.0, 2.0)]))
     assert set(seen.targets.element[seen.targets.unit_segment[seen.seen_by(0)]]) == {0}
+
+
+def test_a_scanner_in_a_closed_doorway_sees_both_rooms() -> None:
+    space = navigable(two_rooms(0.9), Settings(doors="closed", door_scan=True))
+    seen = visibility(candidates(space))
+    (doorway,) = seen.candidates.doorway_rows
+    x = seen.targets.unit_xy[seen.seen_by(int(doorway)), 0]
+    assert np.count_nonzero(x < 3.9) == pytest.approx(np.count_nonzero(x > 4.1), abs=4)
+    assert np.count_nonzero(x < 3.9) > 50
+    beside = next(row for row in range(seen.rows) if row != doorway)
+    sides = seen.targets.unit_xy[seen.seen_by(beside), 0] > 4.0
+    assert sides.all() or not sides.any()
