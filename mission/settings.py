@@ -7,9 +7,10 @@ degrees, as here; docs/planning.md tells what each one does.
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -146,11 +147,44 @@ def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
     try:
         settings = msgspec.convert(values, Settings)
     except msgspec.ValidationError as error:
-        key = str(error).rpartition("`$.")[2].strip("`") if "`$." in str(error) else ""
-        shown = f" {key} = {values[key]!r}" if key in values else ""
-        raise InputError(f"{path or 'options'}:{shown}: {error}") from None
+        raise InputError(_said(str(error), values, path)) from None
     check_settings(settings)
     return settings
+
+
+HOW = {
+    "start": "write X,Y,HEADING, such as 2.5,3.0,90",
+    "end": "write X,Y, such as 2.5,3.0",
+    "origin": "write LAT,LON,ALT,HEADING, such as 47.3769,8.5417,408,0",
+    "use": "write X,Y for each, such as 2.5,3.0",
+    "avoid": "write X,Y,RADIUS for each, such as 2.5,3.0,1",
+    "targets": f"write kinds, such as walls,columns; known: {', '.join(KINDS)}",
+}
+"""How to write the parameters that are more than one number or word."""
+
+
+def _said(error: str, values: dict[str, Any], path: Path | None) -> str:
+    """A refused value as one line: key, value, and what would be right."""
+    found = re.search(r"`\$\.(\w+)", error)
+    key = found.group(1) if found else ""
+    choices = [choice for choice in _choices(key) if choice is not None]
+    right = HOW.get(key) or (f"known: {', '.join(choices)}" if choices else error.partition(" - at ")[0])
+    where = f"{path}: " if path else ""
+    return f"{where}{key} = {_shown(values.get(key))}: {right}" if key else f"{where}{error}"
+
+
+def _choices(key: str) -> tuple[str, ...]:
+    """The words a parameter may be, where they are fixed."""
+    hint = get_type_hints(Settings).get(key)
+    parts = get_args(hint)
+    literals = [part for part in (hint, *parts) if get_origin(part) is Literal]
+    return tuple(word for part in literals for word in get_args(part))
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, tuple | list):
+        return ",".join(_shown(item) for item in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
@@ -162,13 +196,19 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: not a TOML file ({error})") from None
     values: dict[str, Any] = {}
     for table, content in document.items():
-        if table not in SECTIONS or not isinstance(content, dict):
-            raise InputError(f"{path}: unknown table [{table}]; known: {', '.join(SECTIONS)}")
+        if not isinstance(content, dict):
+            raise InputError(f"{path}: {table} = {content} stands in no table; known: {_tables()}")
+        if table not in SECTIONS:
+            raise InputError(f"{path}: unknown table [{table}]; known: {_tables()}")
         for key, value in content.items():
             if key not in SECTIONS[table]:
                 raise InputError(f"{path}: unknown key {key} in [{table}]; {_home_of(key, table)}")
             values[key] = value
     return values
+
+
+def _tables() -> str:
+    return ", ".join(f"[{table}]" for table in SECTIONS)
 
 
 def _home_of(key: str, table: str) -> str:

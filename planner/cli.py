@@ -35,12 +35,12 @@ def add_commands(app: typer.Typer) -> None:
     app.command(name="demo", epilog="Example: stopgo demo -o recordings/demo")(demo_command)
 
 
-def numbers(text: str) -> tuple[float, ...]:
-    """The numbers in `1,2.5,-3`."""
+def numbers(text: str, name: str) -> tuple[float, ...]:
+    """The numbers in `1,2.5,-3`, given for the option `name`."""
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(f"{text}: must be numbers separated by commas, such as 2.5,3.0") from None
+        raise InputError(f"{name} = {text}: must be numbers separated by commas, such as 2.5,3.0") from None
 
 
 def plan_command(
@@ -102,9 +102,9 @@ def plan_command(
     options = dict(locals())
     given = {key.rstrip("_"): value for key, value in options.items() if key not in NOT_SETTINGS}
     for key in ("start", "end", "origin"):
-        given[key] = None if given[key] is None else numbers(given[key])
+        given[key] = None if given[key] is None else numbers(given[key], key)
     for key in ("use", "avoid"):
-        given[key] = tuple(numbers(text) for text in given[key]) if given[key] else None
+        given[key] = tuple(numbers(text, key) for text in given[key]) if given[key] else None
     given["targets"] = None if targets is None else tuple(kind.strip() for kind in targets.split(","))
     settings = read_settings(parameters, given)
     if print_config:

@@ -15,6 +15,7 @@ from mission.errors import AnswerIsNo, InputError
 from mission.geometry import FloatArray, IntArray, frozen
 from mission.planning import (
     AT_EDGE,
+    AVOIDED,
     IN_HOLE,
     KEPT,
     OTHER_PART,
@@ -107,7 +108,7 @@ def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> C
 def _check_used(space: NavigableSpace, proposals: Proposals, at: IntArray, chosen: int) -> None:
     """Refuse stops asked for that the robot of this plan does not get to."""
     for x, y in proposals.xy[proposals.must & (at != chosen)]:
-        raise AnswerIsNo(
+        raise InputError(
             f"use = {x:g},{y:g}: the robot does not get there from the planned part of the floor"
         )
 
@@ -136,14 +137,23 @@ def _part_of_start(space: NavigableSpace, reach: Reach, held: set[int]) -> int:
 
 
 def _no_candidate(space: NavigableSpace, reason: IntArray) -> str:
-    counts = {
-        f"closer than d_sec {space.settings.d_sec:g} m": int(np.sum(reason == TOO_CLOSE)),
-        f"closer than {space.settings.edge:g} m to a floor edge": int(np.sum(reason == AT_EDGE)),
-        "outside or in holes": int(np.sum((reason == OUTSIDE) | (reason == IN_HOLE))),
-        "not reachable": int(np.sum(reason == UNREACHABLE)),
-    }
-    told = ", ".join(f"{n} {why}" for why, n in counts.items() if n)
-    return f"{space.floor.name}: no candidate is left ({told or 'none was made'}); lower --d-sec or --grid"
+    """Why no candidate is left, most frequent reason first, and what to change."""
+    settings = space.settings
+    keep = f"d_sec {settings.d_sec:g} m" if settings.d_sec >= settings.radius else "the robot's radius"
+    causes = [
+        (TOO_CLOSE, f"closer to an element than {keep}", "--d-sec" if "d_sec" in keep else "--robot-radius"),
+        (AT_EDGE, f"closer than {settings.edge:g} m to a floor edge", "--edge"),
+        (AVOIDED, "in circles to avoid", "--avoid"),
+        (UNREACHABLE, f"not reachable by a robot of radius {settings.radius:g} m", "--robot-radius"),
+        (OUTSIDE, "outside the rooms", "--grid"),
+        (IN_HOLE, "in holes", "--grid"),
+    ]
+    counted = sorted(
+        ((int(np.sum(reason == code)), why, option) for code, why, option in causes), key=lambda c: -c[0]
+    )
+    told = ", ".join(f"{n} {why}" for n, why, _ in counted if n) or "none was made"
+    options = list(dict.fromkeys(option for n, _, option in counted if n)) or ["--grid"]
+    return f"{space.floor.name}: no candidate is left ({told}); change {' or '.join(options[:2])}"
 
 
 __all__ = ["STRATEGIES", "Strategy", "candidates", "strategy"]

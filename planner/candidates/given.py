@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from mission.errors import AnswerIsNo
+from mission.errors import InputError
 from mission.geometry import FloatArray
 from mission.planning import DROP_REASONS, KEPT, NavigableSpace, OpeningState
 from planner.candidates.place import Place
@@ -38,7 +38,7 @@ def places_to_use(place: Place) -> Proposals:
 
     Raises
     ------
-    AnswerIsNo
+    InputError
         Where no stop may be, naming the place and the reason.
     """
     points = np.array(place.space.settings.use, dtype=np.float64).reshape(-1, 2)
@@ -46,5 +46,5 @@ def places_to_use(place: Place) -> Proposals:
     for point, room in zip(points, rooms, strict=True):
         reason = int(place.reasons(point[None], np.array([room]))[0])
         if reason != KEPT:
-            raise AnswerIsNo(f"use = {point[0]:g},{point[1]:g}: no stop may be there, {DROP_REASONS[reason]}")
+            raise InputError(f"use = {point[0]:g},{point[1]:g}: no stop may be there, {DROP_REASONS[reason]}")
     return Proposals.of(points, rooms, must=True)
