@@ -13,6 +13,8 @@ LARGEST = 150_000
 """Entries of the covering matrix above which the relaxation is not solved: it takes seconds then."""
 STEPS = 1000
 """Most steps of the multiplier bound; a count, so that no bound depends on speed."""
+WORK = 200_000_000
+"""Entries looked at in all those steps together, so that large floors get fewer of them."""
 PATIENCE = 20
 """Steps without a better bound after which steps are halved."""
 FIRST_STEP = 1.5
@@ -47,7 +49,7 @@ def multiplier_bound(cover: Cover, *, found: int) -> int:
     weight = cover.weight.astype(float)
     prices = weight / max(1.0, float(cover.gains(np.zeros(len(weight), dtype=np.int64)).max(initial=1)))
     best, step, waited, direction = 0.0, FIRST_STEP, 0, np.zeros(len(weight))
-    for _ in range(STEPS):
+    for _ in range(min(STEPS, max(50, WORK // max(1, cover.sees.nnz)))):
         value, slope = _multiplier_value(cover, weight, prices)
         waited = 0 if value > best + 1e-4 else waited + 1
         best = max(best, value)
