@@ -52,6 +52,8 @@ from mission.files.mission_json import parse
 
 TRY_S = 1.0
 """How long one try waits for its answer."""
+BULK_TRY_S = 6.0
+"""The same for pieces of a document: asked again too early, they would fill a slow line with copies."""
 COMMIT_BYTES_PER_S = 1e6
 """How fast, at least, a robot reads and stores a document."""
 PAUSE_S = 0.05
@@ -300,14 +302,18 @@ class Station:
 
     def _part(self, mission_id: str, revision: int, number: int) -> MissionPart:
         key = self.keys.mission(mission_id, f"part/{number}")
-        reply = self._insist(key, b"", self.timeout_s, revision=str(revision))
+        reply = self._insist(
+            key, b"", max(self.timeout_s, BULK_TRY_S), try_s=BULK_TRY_S, revision=str(revision)
+        )
         return self._answered(reply, MissionPart, "reading the mission back")
 
     def _step(self, manifest: Manifest, step: str, payload: bytes, kind: type[Any], **parameters: str) -> Any:
         key = self.keys.mission(manifest.mission_id, step)
         # The robot reads and stores a large document before it answers the commit.
-        try_s = TRY_S + manifest.size / COMMIT_BYTES_PER_S if step == "commit" else TRY_S
         bulk = step.startswith("chunk")
+        try_s = BULK_TRY_S if bulk else TRY_S
+        if step == "commit":
+            try_s += manifest.size / COMMIT_BYTES_PER_S
         reply = self._insist(key, payload, max(TRIES_S, 3 * try_s), try_s=try_s, bulk=bulk, **parameters)
         return self._answered(reply, kind, f"push ({step})")
 
