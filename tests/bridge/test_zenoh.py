@@ -15,6 +15,7 @@ from bridge.follow import Report
 from bridge.spawn import end_robot, free_port, robot_process, start_robot
 from bridge.station import connect
 from bridge.zenoh_link import Guard, check_endpoint
+from mission.document import sealed
 from mission.errors import InputError, RobotUnreachable
 from mission.events import Finished, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor
@@ -173,3 +174,15 @@ def test_another_commander_needs_to_take_over(tmp_path: Path) -> None:
         assert stopgo("pause", *reach, "--as", "bob").returncode == 0
         assert stopgo("resume", *reach, "--as", "bob").returncode == 1
         assert stopgo("resume", *reach, "--as", "alice").returncode == 0
+
+
+def test_the_first_pose_of_a_run_is_where_the_robot_was_put(tmp_path: Path) -> None:
+    """Its mission puts a robot that stands nowhere yet at its start; no pose of before is told of the run."""
+    start = msgspec.structs.replace(corridor().start, x=1.0)
+    first = msgspec.structs.replace(corridor().stops[0], approach=((1.0, 0.0), (2.0, 0.0)))
+    mission = sealed(msgspec.structs.replace(corridor(), start=start, stops=(first,), return_=None))
+    with robot_process("r1", tmp_path, speed_up=20) as endpoint, connect(endpoint, robot="r1") as station:
+        station.push(mission)
+        station.command("start")
+        poses = [report for report in station.reports() if isinstance(report, PoseReport)]
+    assert min(report.pose.x for report in poses) >= 1.0 - 0.01
