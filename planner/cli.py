@@ -291,6 +291,8 @@ def demo_command(
     from bridge.station import connect
     from recordings.compare import compare
 
+    if not 0 < speed_up < 1e6:
+        raise InputError(f"speed_up = {speed_up}: must be above 0 and below a million")
     with as_file(files("recordings") / "samples" / "office.dxf") as floor:
         report = plan_files(floor, out, read_settings(None, {}))[0]
     typer.echo(report.as_text())

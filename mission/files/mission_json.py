@@ -47,6 +47,7 @@ def parse(data: bytes, name: str) -> Mission:
     document = _parse_json(data, name)
     _check_schema(document, name)
     mission = _convert(document, name)
+    _check_id(mission, name)
     _check_digest(document, mission, name)
     return mission
 
@@ -140,6 +141,17 @@ def _leaves(value: object, path: str) -> Iterator[tuple[str, object]]:
 
 def _is_text(value: str) -> bool:
     return not any("\ud800" <= character <= "\udfff" for character in value)
+
+
+_ID = re.compile(r"[0-9A-Za-z_-]{1,64}")
+"""What an id may be: it stands in key expressions and file names."""
+
+
+def _check_id(mission: Mission, name: str) -> None:
+    if not _ID.fullmatch(mission.id):
+        raise InputError(
+            f"{name}: $.id is {_shown(mission.id)}: must be 1 to 64 letters, digits, hyphens or underscores"
+        )
 
 
 def _check_schema(document: dict[str, Any], name: str) -> None:

@@ -229,3 +229,13 @@ class TestNextRevision:
         (tmp_path / "mission.json").write_text("{}")
         with pytest.raises(InputError, match="move it away"):
             next_revision(tmp_path / "mission.json", square_tour())
+
+
+@pytest.mark.parametrize("bad", ["", "../../etc/passwd", "a*", "a/b", "x" * 65, "mission one"])
+def test_an_id_that_cannot_stand_in_a_key_is_refused(bad: str) -> None:
+    document = copy.deepcopy(DOCUMENT)
+    del document["digest"]
+    document["id"] = bad
+    document["digest"] = hashlib.sha256(canonical(document)).hexdigest()
+    with pytest.raises(InputError, match=r"\$\.id"):
+        parse(json.dumps(document).encode(), "m")
