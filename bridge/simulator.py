@@ -258,7 +258,13 @@ class SimulatedScanner:
 def read_world(keep: Path | None) -> World:
     if keep is None or not keep.exists():
         return World()
-    return msgspec.json.decode(keep.read_bytes(), type=World)
+    try:
+        return msgspec.json.decode(keep.read_bytes(), type=World)
+    except (OSError, msgspec.DecodeError) as error:
+        raise InputError(
+            f"{keep}: does not say where the simulated robot stands ({error}); "
+            "remove it to start at the mission's start"
+        ) from None
 
 
 def write_world(keep: Path, world: World) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
 from importlib import import_module
+from typing import NoReturn
 
 import typer
 from typer.exceptions import TyperException
@@ -51,6 +54,8 @@ def build_app() -> typer.Typer:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns its exit code: 0 done, 1 no, 2 bad input, 3 unknown, 130 Ctrl-C."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _terminated)
     try:
         command = typer.main.get_command(build_app())
         result = command.main(args=arguments, prog_name="stopgo", standalone_mode=False)
@@ -67,6 +72,11 @@ def main(arguments: list[str] | None = None) -> int:
         return _say("stopped by Ctrl-C", INTERRUPTED)
     except BrokenPipeError:
         return 0
+
+
+def _terminated(number: int, frame: object) -> NoReturn:
+    """Leave by way of every open `with`: links are closed and recordings finished."""
+    raise SystemExit(128 + number)
 
 
 def _missing(error: ModuleNotFoundError) -> tuple[str, int]:

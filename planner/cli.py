@@ -7,6 +7,7 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -135,6 +136,7 @@ def plan_files(floor: Path, out: Path, settings: Settings, *, all_parts: bool = 
     from planner import parts_to_plan
     from planner.floors import read_floor
     from planner.navigable import navigable
+    from planner.unreached import entered
 
     watch = Stopwatch()
     read = read_floor(floor, d_dis=settings.d_dis)
@@ -143,10 +145,12 @@ def plan_files(floor: Path, out: Path, settings: Settings, *, all_parts: bool = 
     if not all_parts:
         return [_plan_part(read, folder, settings, watch)]
     parts = parts_to_plan(navigable(read, settings))
-    return [
+    reports = [
         _plan_part(read, folder, settings, Stopwatch(watch), found=found, number=number)
         for number, found in enumerate(parts)
     ]
+    rooms = frozenset[int]().union(*(entered(found) for found in parts))
+    return [replace(report, elsewhere=rooms) for report in reports]
 
 
 def _folder(out: Path) -> Path:

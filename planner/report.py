@@ -23,10 +23,12 @@ class PlanReport:
     mission: Mission
     files: dict[str, Path]
     times_s: dict[str, float]
+    elsewhere: frozenset[int] = frozenset()
+    """Rooms that plans of other parts enter."""
 
     @property
     def unreached(self) -> tuple[Unreached, ...]:
-        return unreached(self.route.selection.visibility.candidates)
+        return unreached(self.route.selection.visibility.candidates, self.elsewhere)
 
     def as_json(self) -> dict[str, Any]:
         """The object that `--json` prints."""

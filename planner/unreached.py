@@ -10,16 +10,24 @@ LEAST_AREA = 0.01
 """Rooms smaller than this (m²) are not told of."""
 
 
-def unreached(candidates: Candidates) -> tuple[Unreached, ...]:
-    """Every room without a reachable candidate of this part, with its area."""
+def unreached(candidates: Candidates, elsewhere: frozenset[int]) -> tuple[Unreached, ...]:
+    """Every room without a reachable candidate of this part, with its area.
+
+    `elsewhere` are rooms (indices into `NavigableSpace.rooms`) that plans of other parts enter.
+    """
     space = candidates.space
     told = []
     for index, room in enumerate(space.rooms):
         reasons = candidates.reason[candidates.room == index]
         area = sum(polygon.area for polygon in room.area)
-        if area > LEAST_AREA and not np.any(reasons == KEPT):
+        if area > LEAST_AREA and index not in elsewhere and not np.any(reasons == KEPT):
             told.append(Unreached(room.name, _why(candidates, index, set(reasons.tolist())), area))
     return tuple(told)
+
+
+def entered(candidates: Candidates) -> frozenset[int]:
+    """Rooms with a reachable candidate of this part."""
+    return frozenset(candidates.room[candidates.kept].tolist())
 
 
 def _why(candidates: Candidates, index: int, reasons: set[int]) -> str:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
 from bridge.clock import SimulatedClock
 from bridge.motion import Straight, along
-from bridge.simulator import SimulatedBase
+from bridge.simulator import SimulatedBase, read_world
+from mission.errors import InputError
 from mission.events import Pose
 
 ORIGIN = Pose(x=0.0, y=0.0, heading=0.0)
@@ -49,3 +51,10 @@ def test_a_robot_that_was_only_stopped_may_still_be_put_at_the_start() -> None:
     assert (base.pose().x, base.pose().y) == (3.0, 4.0)
     base.stand_at_start(ORIGIN)
     assert (base.pose().x, base.pose().y) == (3.0, 4.0)
+
+
+def test_a_broken_note_of_where_the_robot_stands_is_refused_in_one_line(tmp_path: Path) -> None:
+    keep = tmp_path / "world.json"
+    keep.write_text("{")
+    with pytest.raises(InputError, match="remove it"):
+        read_world(keep)
