@@ -58,25 +58,34 @@ def main(arguments: list[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, _terminated)
     try:
         command = typer.main.get_command(build_app())
-        result = command.main(args=arguments, prog_name="stopgo", standalone_mode=False)
+        given = sys.argv[1:] if arguments is None else arguments
+        result = command.main(args=given or ["--help"], prog_name="stopgo", standalone_mode=False)
         if result == INTERRUPTED:  # the command library has caught the Ctrl-C
             raise KeyboardInterrupt
         return result if isinstance(result, int) else 0
-    except StopgoError as error:
-        return _say(str(error), error.exit_code)
-    except ModuleNotFoundError as error:
-        return _say(*_missing(error))
-    except TyperException as error:
-        return _say(f"{error.format_message()} (see --help)", 2)
-    except (KeyboardInterrupt, typer.Abort):
-        return _say("stopped by Ctrl-C", INTERRUPTED)
     except BrokenPipeError:
         return 0
+    except (StopgoError, ModuleNotFoundError, TyperException, OSError) as error:
+        return _say(*_told(error))
+    except (KeyboardInterrupt, typer.Abort):
+        return _say("stopped by Ctrl-C", INTERRUPTED)
 
 
 def _terminated(number: int, frame: object) -> NoReturn:
     """Leave by way of every open `with`: links are closed and recordings finished."""
     raise SystemExit(128 + number)
+
+
+def _told(error: Exception) -> tuple[str, int]:
+    """What a user is told of an error, and the exit code."""
+    if isinstance(error, StopgoError):
+        return str(error), error.exit_code
+    if isinstance(error, ModuleNotFoundError):
+        return _missing(error)
+    if isinstance(error, TyperException):
+        return f"{error.format_message()} (see --help)", StopgoError.exit_code
+    assert isinstance(error, OSError)  # such as a full disk under the output
+    return f"{error.filename or 'output'}: {error.strerror}", StopgoError.exit_code
 
 
 def _missing(error: ModuleNotFoundError) -> tuple[str, int]:

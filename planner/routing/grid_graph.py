@@ -29,7 +29,7 @@ from mission.planning import NavigableSpace
 from mission.settings import Settings
 from planner.candidates.grid import main_axes, room_grid
 from planner.openings import middle_and_normal
-from planner.routing.roadmap import anchors_of, on_crossings
+from planner.routing.roadmap import anchors_of, on_crossings, outward_corners
 from planner.routing.ways import Ways, shortest_ways
 from planner.shapes import GRID, local_origin, to_shape
 
@@ -85,8 +85,12 @@ def ways_on_grids(space: NavigableSpace, points: FloatArray, *, resolutions: Seq
     for k, m in _adjoining(areas):
         pairs = _across(grids[k].xy, grids[m].xy, areas[m], free)
         net.join(node[k][pairs[:, 0]], node[m][pairs[:, 1]])
+    # what the finest grid cannot join runs between gaps too narrow for any node: round their corners
+    corner = net.add(outward_corners(space).xy if len(resolutions) == 1 else np.empty((0, 2)))
+    joints = np.concatenate([gap, exits, corner, entry])
+    net.join(*joints[_in_sight(net.xy[joints], free)].T)
     every = np.concatenate(node)
-    for joint in (entry, gap):
+    for joint in (entry, gap, corner):
         pairs, _ = nearest_seen(net.xy[joint], net.xy[every], free)
         net.join(joint[pairs[:, 0]], every[pairs[:, 1]])
     return shortest_ways(net.xy + origin, net.edges, len(points))
@@ -244,6 +248,13 @@ def _across(here: FloatArray, there: FloatArray, room: BaseGeometry, free: BaseG
     pairs, away = nearest_seen(here[near], there, free)
     pairs = pairs[away <= ACROSS]
     return np.column_stack([near[pairs[:, 0]], pairs[:, 1]])
+
+
+def _in_sight(xy: FloatArray, free: BaseGeometry) -> IntArray:
+    """Pairs (m, 2) of points that a short straight way joins: pockets between gaps may hold no node."""
+    pairs = KDTree(xy).query_pairs(ACROSS, output_type="ndarray") if len(xy) else np.empty((0, 2), np.int64)
+    ways = shapely.linestrings(xy[pairs]) if len(pairs) else np.empty(0, dtype=object)
+    return pairs[shapely.covers(free, ways)].astype(np.int64)
 
 
 def nearest_seen(xy: FloatArray, nodes: FloatArray, free: BaseGeometry) -> tuple[IntArray, FloatArray]:

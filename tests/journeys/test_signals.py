@@ -24,14 +24,14 @@ def app():
     import typer
     made = typer.Typer()
     @made.command()
-    def wait() -> None:
+    def wait(when: str) -> None:
         with left_open():
             os.kill(os.getpid(), signal.SIGTERM)
             signal.pause()
     return made
 
 front.build_app = app
-sys.exit(front.main([]))
+sys.exit(front.main(["now"]))
 """
 
 
