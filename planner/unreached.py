@@ -10,7 +10,7 @@ LEAST_AREA = 0.01
 """Rooms smaller than this (m²) are not told of."""
 
 
-def unreached(candidates: Candidates, elsewhere: frozenset[int]) -> tuple[Unreached, ...]:
+def unreached(candidates: Candidates, elsewhere: frozenset[int] = frozenset()) -> tuple[Unreached, ...]:
     """Every room without a reachable candidate of this part, with its area.
 
     `elsewhere` are rooms (indices into `NavigableSpace.rooms`) that plans of other parts enter.
