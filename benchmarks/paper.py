@@ -393,8 +393,8 @@ def route_table(ours: list[Ours]) -> str:
 ROUTE_WHY = (
     "The paper does not say whether its route returns to where it began. On structural floors ours are "
     "shorter, with fewer stops; in rooms the way to each office and back decides, and the offices are "
-    "reconstructed. Its way, as we build it, is an ant colony on room grids: 7 to 24 % longer than exact "
-    "shortest paths over the same stops of case 1; in case 2 with rooms even the finest grid does not join all "
+    "reconstructed. Its way, as we build it, is an ant colony on room grids, longer than exact "
+    "shortest paths; in case 2 with rooms even the finest grid does not join all "
     "stops through the doors, so corners of the drive area are added to it. "
     "Route times of ours include the graph, the tour and its proof."
 )
