@@ -112,7 +112,8 @@ def crossings_through(
     Every way keeps every clearance and stays on the ground. A gap that is left on one side only is
     one end of a narrow corridor and is joined with other such ends that can be seen from it.
     """
-    if not gaps:
+    gaps = _still_open(gaps, walls)
+    if not gaps or drive_area.is_empty:
         return np.empty((0, 2, 2))
     site = Site(walls, drive_area, ground)
     ways: list[tuple[FloatArray, FloatArray]] = []
@@ -126,6 +127,22 @@ def crossings_through(
             ways += pairwise([*here[:0:-1], gap.middle, *there[1:]])
     ways += site.corridors(ends)
     return np.array(ways).reshape(-1, 2, 2)
+
+
+def _still_open(gaps: list[Gap], walls: Walls) -> list[Gap]:
+    """Gaps whose middle no third wall comes too near: no way leads through the others.
+
+    Asked of the nearest wall of each clearance, for all at once: with a clearance of many metres
+    hundreds of walls are near every gap, and trying its ways would measure them all.
+    """
+    middles = shapely.points(np.array([gap.middle for gap in gaps]).reshape(-1, 2))
+    lines = walls.shapes()
+    kept = np.ones(len(gaps), dtype=bool)
+    for clearance in np.unique(walls.clearance):
+        alike = lines[walls.clearance == clearance]
+        nearest = alike[shapely.STRtree(alike).nearest(middles)]
+        kept &= shapely.distance(middles, nearest) >= clearance - 2 * SLACK
+    return [gap for gap, keep in zip(gaps, kept, strict=True) if keep]
 
 
 class Site:

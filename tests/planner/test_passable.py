@@ -11,6 +11,7 @@ from mission.floor import FloorPlan
 from mission.geometry import Polygon
 from mission.planning import NavigableSpace, OpeningState
 from mission.settings import Settings
+from planner.gaps import Site
 from planner.navigable import navigable
 from planner.routing.roadmap import ways_between
 from tests.planner.worlds import (
@@ -357,3 +358,19 @@ def test_two_doors_in_series_are_both_passable() -> None:
     space = navigable(floor, Settings())
     assert [item.passable for item in space.openings] == [True, True]
     assert way(floor) == pytest.approx(6.0, abs=1e-4)
+
+
+def test_gaps_that_a_third_wall_closes_are_not_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Columns as far apart as the robot is wide; with an edge of 5 m the floor's edge is too near them.
+    floor = hall(20, 20, column("a", 3, 10), column("b", 4.1, 10))
+    tried: list[object] = []
+    monkeypatch.setattr(Site, "allows", lambda site, a, b: bool(tried.append(b)))
+    navigable(floor, Settings(edge=5.0))
+    assert not tried
+    navigable(floor, Settings())
+    assert tried
+
+
+def test_a_floor_without_drive_area_has_no_crossings() -> None:
+    space = navigable(hall(20, 20, column("a", 3, 10), column("b", 4.1, 10)), Settings(edge=50.0))
+    assert (space.drive_area, len(space.gaps)) == ((), 0)
