@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import Any
 
 import numpy as np
@@ -127,10 +127,24 @@ def must_be_writable(path: Path) -> None:
     """
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give the name of a file in it")
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is no file but a device or the like; give another name")
+    if path.parent.exists() and not path.parent.is_dir():
+        raise InputError(f"{path}: {path.parent} is a file, not a folder; give another place")
     if not path.parent.is_dir():
         raise InputError(f"{path}: there is no folder {path.parent}; make it first")
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{path}: the folder {path.parent} cannot be written to")
+    _try(path)
+
+
+def _try(path: Path) -> None:
+    """Make a file beside `path` and take it away: what is allowed does not tell what is possible."""
+    try:
+        with NamedTemporaryFile(dir=path.parent, prefix=f"{path.stem}.partial-", suffix=".rrd"):
+            pass
+    except OSError as error:
+        raise InputError(
+            f"{path}: no such file can be made in {path.parent} ({error.strerror}); give another place"
+        ) from None
 
 
 @contextmanager

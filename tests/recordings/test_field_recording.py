@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from mission.__main__ import main
 from mission.document import Mission
 from mission.errors import InputError
 from mission.events import PoseReport, StateReport
@@ -156,12 +157,32 @@ def test_ctrl_c_keeps_the_run_so_far(tmp_path: Path, mission: Mission) -> None:
 
 
 @pytest.mark.parametrize("recording", [PlanRecording, FieldRecording])
-@pytest.mark.parametrize(("name", "why"), [("none/field.rrd", "no folder"), (".", "is a folder")])
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("none/field.rrd", "no folder"),
+        (".", "is a folder"),
+        ("file/field.rrd", "is a file, not a folder"),
+        ("/dev/null", "is no file"),
+        ("/proc/field.rrd", "no such file can be made in /proc"),
+        (f"{'x' * 250}.rrd", "File name too long"),
+    ],
+)
 def test_a_place_without_room_is_refused_before_the_run(
     tmp_path: Path, recording: type, name: str, why: str
 ) -> None:
+    (tmp_path / "file").write_text("mine")
     with pytest.raises(InputError, match=why), recording(tmp_path / name, world.MISSION_ID):
         raise AssertionError("entered")
+    assert [item.name for item in tmp_path.iterdir()] == ["file"]
+
+
+def test_watching_into_an_unwritable_place_is_refused_before_the_robot_is_asked(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["watch", "--robot", "r1", "--timeout", "0.1", "--rrd", "/proc/field.rrd"]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("stopgo: /proc/field.rrd: no such file can be made in /proc")
 
 
 def test_a_run_cut_off_by_a_full_disk_is_left_under_its_partial_name(
