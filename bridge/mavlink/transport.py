@@ -1,0 +1,344 @@
+"""Bytes in and out of UDP sockets, TCP streams and serial lines, for `wire` and `tunnel`.
+
+A transport that was opened never fails afterwards: while its line is gone (refused, closed by the other end,
+unplugged) it is silent, says why in `gone`, and comes back by itself. What silence means is for those to
+decide who wait for an answer.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from bridge.mavlink.url import Kind, Url
+from mission.errors import InputError, RobotUnreachable
+
+Address = Any
+"""Whoever sent something: an IP address and port, or a serial line; hashable."""
+
+READ_BYTES = 65536
+BUFFER_BYTES = 4 * 1024 * 1024
+"""Wanted of the system for datagrams that wait: a burst of telemetry should not be lost here."""
+MAX_PEERS = 16
+"""A listening end remembers so many, the ones heard last."""
+CONNECT_S = 5.0
+RETRY_S = 0.5
+
+
+class Transport(Protocol):
+    datagrams: bool
+    """Whether each piece read holds whole frames."""
+    gone: str
+    """Why nothing passes at the moment; empty if all is well."""
+
+    def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
+        """What has come, each piece with who sent it; empty when the time is up."""
+
+    def write(self, data: bytes, to: Address | None = None) -> None:
+        """Send to one of those heard, or to all of them."""
+
+    def close(self) -> None: ...
+
+
+def open_transport(url: Url) -> Transport:
+    """The transport that `url` names.
+
+    Raises
+    ------
+    InputError
+        If an address or device cannot be opened here.
+    RobotUnreachable
+        If a TCP peer does not accept the connection; nothing was sent.
+    """
+    return OPENING[url.kind](url)
+
+
+class UdpOut:
+    """Sends to one address, hears only that one."""
+
+    datagrams = True
+
+    def __init__(self, url: Url) -> None:
+        self.gone = ""
+        self._peer = (url.host, url.number)
+        self._socket = _datagrams(url)
+        try:
+            self._socket.connect(self._peer)
+        except OSError as error:
+            self._socket.close()
+            raise InputError(f"{url}: cannot be reached ({error.strerror or error})") from None
+
+    def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
+        if not _ready(self._socket, timeout_s):
+            return []
+        try:
+            data = self._socket.recv(READ_BYTES)
+        except ConnectionRefusedError:
+            self.gone = "nothing listens there"
+            return []
+        self.gone = ""
+        return [(self._peer, data)]
+
+    def write(self, data: bytes, to: Address | None = None) -> None:
+        try:
+            self._socket.send(data)
+        except ConnectionRefusedError:
+            self.gone = "nothing listens there"
+        except OSError as error:
+            self.gone = error.strerror or str(error)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class UdpIn:
+    """Hears everyone on a port, and answers those it has heard."""
+
+    datagrams = True
+
+    def __init__(self, url: Url) -> None:
+        self.gone = ""
+        self._peers: dict[Address, None] = {}
+        self._socket = _datagrams(url)
+        _bind(self._socket, url)
+
+    def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
+        if not _ready(self._socket, timeout_s):
+            return []
+        try:
+            data, peer = self._socket.recvfrom(READ_BYTES)
+        except ConnectionError:  # an earlier datagram came back refused
+            return []
+        self._peers.pop(peer, None)
+        self._peers[peer] = None
+        if len(self._peers) > MAX_PEERS:
+            del self._peers[next(iter(self._peers))]
+        return [(peer, data)]
+
+    def write(self, data: bytes, to: Address | None = None) -> None:
+        for peer in list(self._peers) if to is None else [to]:
+            with contextlib.suppress(OSError):
+                self._socket.sendto(data, peer)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class TcpOut:
+    """A connection to one address, made again whenever it is lost."""
+
+    datagrams = False
+
+    def __init__(self, url: Url) -> None:
+        self.gone = ""
+        self._peer = (url.host, url.number)
+        self._tried = time.monotonic()
+        try:
+            self._socket: socket.socket | None = self._connected()
+        except OSError as error:
+            raise RobotUnreachable(
+                f"{url}: no connection ({error.strerror or error}); nothing was sent. Is it running?"
+            ) from None
+
+    def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
+        if self._socket is None:
+            self._reconnect(timeout_s)
+            return []
+        try:
+            data = self._socket.recv(READ_BYTES) if _ready(self._socket, timeout_s) else None
+        except OSError:
+            data = b""
+        if data == b"":
+            self._lose("the other end closed the connection")
+        return [(self._peer, data)] if data else []
+
+    def write(self, data: bytes, to: Address | None = None) -> None:
+        line = self._socket
+        if line is not None:
+            try:
+                line.sendall(data)
+            except OSError as error:
+                self._lose(error.strerror or str(error))
+
+    def close(self) -> None:
+        if self._socket is not None:
+            self._socket.close()
+
+    def _connected(self) -> socket.socket:
+        made = socket.create_connection(self._peer, CONNECT_S)
+        made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return made
+
+    def _lose(self, why: str) -> None:
+        line, self._socket, self.gone = self._socket, None, why
+        if line is not None:
+            line.close()
+
+    def _reconnect(self, timeout_s: float) -> None:
+        time.sleep(min(timeout_s, max(0.0, self._tried + RETRY_S - time.monotonic())))
+        if time.monotonic() < self._tried + RETRY_S:
+            return
+        self._tried = time.monotonic()
+        try:
+            self._socket = self._connected()
+            self.gone = ""
+        except OSError as error:
+            self.gone = error.strerror or str(error)
+
+
+class TcpIn:
+    """Accepts connections, as many as come."""
+
+    datagrams = False
+
+    def __init__(self, url: Url) -> None:
+        self.gone = ""
+        self._listening = socket.socket(_family(url), socket.SOCK_STREAM)
+        self._listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        _bind(self._listening, url)
+        self._listening.listen()
+        self._streams: dict[Address, socket.socket] = {}
+
+    def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
+        streams = dict(self._streams)
+        ready, _, _ = select.select([self._listening, *streams.values()], [], [], timeout_s)
+        if self._listening in ready:
+            self._accept()
+        came: list[tuple[Address, bytes]] = []
+        for peer, stream in streams.items():
+            if stream in ready:
+                came += self._read_one(peer, stream)
+        return came
+
+    def write(self, data: bytes, to: Address | None = None) -> None:
+        for peer, stream in list(self._streams.items()):
+            if to is None or peer == to:
+                try:
+                    stream.sendall(data)
+                except OSError:
+                    self._drop(peer)
+
+    def close(self) -> None:
+        for peer in list(self._streams):
+            self._drop(peer)
+        self._listening.close()
+
+    def _accept(self) -> None:
+        stream, peer = self._listening.accept()
+        stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        stream.settimeout(CONNECT_S)  # a peer that never reads must not stop the others for good
+        self._streams[peer] = stream
+        if len(self._streams) > MAX_PEERS:
+            self._drop(next(iter(self._streams)))
+
+    def _read_one(self, peer: Address, stream: socket.socket) -> list[tuple[Address, bytes]]:
+        try:
+            data = stream.recv(READ_BYTES)
+        except OSError:
+            data = b""
+        if not data:
+            self._drop(peer)
+        return [(peer, data)] if data else []
+
+    def _drop(self, peer: Address) -> None:
+        stream = self._streams.pop(peer, None)
+        if stream is not None:
+            stream.close()
+
+
+class Serial:
+    """A serial line, opened again whenever it is unplugged and plugged in."""
+
+    datagrams = False
+
+    def __init__(self, url: Url) -> None:
+        self.gone = ""
+        self._url = url
+        self._tried = time.monotonic()
+        self._line = self._opened()
+
+    def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
+        import serial
+
+        if self._line is None:
+            self._reopen(timeout_s)
+            return []
+        try:
+            self._line.timeout = timeout_s
+            data = self._line.read(1)
+            data += self._line.read(self._line.in_waiting) if data else b""
+        except (serial.SerialException, OSError) as error:
+            self._lose(error)
+            return []
+        return [("serial", data)] if data else []
+
+    def write(self, data: bytes, to: Address | None = None) -> None:
+        import serial
+
+        try:
+            if self._line is not None:
+                self._line.write(data)
+        except (serial.SerialException, OSError) as error:
+            self._lose(error)
+
+    def close(self) -> None:
+        if self._line is not None:
+            self._line.close()
+
+    def _opened(self) -> Any:
+        import serial
+
+        try:
+            return serial.Serial(self._url.host, self._url.number, exclusive=True, write_timeout=CONNECT_S)
+        except (serial.SerialException, OSError) as error:
+            why = getattr(error, "strerror", None) or str(error)
+            raise InputError(f"{self._url}: cannot be opened ({why}); is it plugged in, and free?") from None
+
+    def _lose(self, error: Exception) -> None:
+        self.gone = f"the serial line is gone ({error})"
+        if self._line is not None:
+            self._line.close()
+        self._line = None
+
+    def _reopen(self, timeout_s: float) -> None:
+        time.sleep(min(timeout_s, RETRY_S))
+        if time.monotonic() >= self._tried + RETRY_S:
+            self._tried = time.monotonic()
+            with contextlib.suppress(InputError):
+                self._line, self.gone = self._opened(), ""
+
+
+OPENING: dict[Kind, Callable[[Url], Transport]] = {
+    "udpin": UdpIn,
+    "udpout": UdpOut,
+    "tcp": TcpOut,
+    "tcpin": TcpIn,
+    "serial": Serial,
+}
+
+
+def _family(url: Url) -> socket.AddressFamily:
+    return socket.AF_INET6 if ":" in url.host else socket.AF_INET
+
+
+def _datagrams(url: Url) -> socket.socket:
+    made = socket.socket(_family(url), socket.SOCK_DGRAM)
+    made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
+    return made
+
+
+def _bind(made: socket.socket, url: Url) -> None:
+    try:
+        made.bind((url.host, url.number))
+    except OSError as error:
+        made.close()
+        why = error.strerror or str(error)
+        raise InputError(f"{url}: cannot listen there ({why}); is the port free, the address ours?") from None
+
+
+def _ready(made: socket.socket, timeout_s: float) -> bool:
+    return bool(select.select([made], [], [], timeout_s)[0])

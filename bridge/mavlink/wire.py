@@ -1,0 +1,265 @@
+"""Messages in and out of a transport: frames, checksums, signatures, and who is where.
+
+One thread reads; whoever waits for messages opens a `box` for their types. Nothing that comes in can stop the
+thread: what is no frame, has a wrong checksum or signature, or is for somebody else is dropped and counted.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import os
+import queue
+import struct
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("MAVLINK20", "1")
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from bridge.mavlink.transport import Address, Transport, open_transport
+from bridge.mavlink.url import Url
+from mission.errors import InputError
+
+Message = Any
+"""A message of the dialect: `dialect.MAVLink_…_message`."""
+
+BOX_SIZE = 10_000
+READ_S = 0.1
+MAVLINK_EPOCH_S = 1_420_070_400
+"""2015-01-01, from which signatures count in steps of 10 µs."""
+OLDEST_STEPS = 6_000_000
+"""A sender heard for the first time may be a minute behind."""
+MAX_PARSERS = 64
+UNSIGNED_ALLOWED = (dialect.MAVLINK_MSG_ID_RADIO_STATUS,)
+"""Radios cannot sign."""
+
+
+@dataclass(frozen=True)
+class Who:
+    """Our own or somebody's system and component."""
+
+    system: int
+    component: int
+
+
+GROUND_STATION = Who(254, dialect.MAV_COMP_ID_MISSIONPLANNER)
+"""Not 255, which QGroundControl has: a vehicle must be able to tell two stations apart."""
+
+
+class Box:
+    """Messages that wait for one reader."""
+
+    def __init__(self, types: frozenset[str]) -> None:
+        self.types = types
+        self._queue: queue.Queue[Message] = queue.Queue(BOX_SIZE)
+
+    def put(self, message: Message) -> None:
+        with suppress(queue.Full):  # a flood is dropped, as on any lossy link
+            self._queue.put_nowait(message)
+
+    def get(self, timeout_s: float) -> Message | None:
+        """The next message, or `None` when the time is up."""
+        try:
+            return self._queue.get(timeout=max(0.0, timeout_s)) if timeout_s > 0 else self._queue.get_nowait()
+        except queue.Empty:
+            return None
+
+
+class Wire:
+    """One end of MAVLink traffic."""
+
+    def __init__(
+        self, transport: Transport, *, me: Who = GROUND_STATION, signing_key: bytes | None = None
+    ) -> None:
+        self.me = me
+        self.dropped: Counter[str] = Counter()
+        """What was not for us or no message at all, by reason."""
+        self._transport = transport
+        self._key = signing_key
+        self._seen = SeenStreams()
+        self._sending = self._mav()
+        self._parsers: dict[Address, Any] = {}
+        self._routes: dict[tuple[int, int], Address] = {}
+        self._boxes: list[Box] = []
+        self._lock = threading.Lock()
+        self._closing = threading.Event()
+        self._beat: Callable[[], Message] | None = None
+        self._threads = [threading.Thread(target=work, daemon=True) for work in (self._read, self._beats)]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def gone(self) -> str:
+        """Why nothing passes at the moment; empty if all is well."""
+        return self._transport.gone
+
+    def send(self, message: Message) -> None:
+        """Send to the one the message is for, if it is known where that is; else to all."""
+        target = (getattr(message, "target_system", 0), getattr(message, "target_component", 0))
+        with self._lock:
+            data = bytes(message.pack(self._sending))
+            self._sending.seq = (self._sending.seq + 1) % 256
+            self._transport.write(data, self._route(*target))
+
+    @contextmanager
+    def box(self, *types: str) -> Iterator[Box]:
+        """A box that collects messages of these types (all, if none is given) while it is open."""
+        box = Box(frozenset(types))
+        self._boxes.append(box)
+        try:
+            yield box
+        finally:
+            self._boxes.remove(box)
+
+    def beat(self, heartbeat: Callable[[], Message]) -> None:
+        """Send what `heartbeat` makes now and every second."""
+        self._beat = heartbeat
+        self.send(heartbeat())
+
+    def close(self) -> None:
+        self._closing.set()
+        for thread in self._threads:
+            thread.join()
+        self._transport.close()
+
+    def _route(self, system: int, component: int) -> Address | None:
+        if system == 0:
+            return None
+        exact = self._routes.get((system, component))
+        if exact is not None:
+            return exact
+        return next((at for (known, _), at in self._routes.items() if known == system), None)
+
+    def _beats(self) -> None:
+        while not self._closing.wait(1.0):
+            if self._beat is not None:
+                self.send(self._beat())
+
+    def _read(self) -> None:
+        while not self._closing.is_set():
+            for address, data in self._transport.read(READ_S):
+                for message in self._messages(address, data):
+                    self._take(address, message)
+
+    def _messages(self, address: Address, data: bytes) -> Iterator[Message]:
+        parser = self._parsers.get(address)
+        if parser is None or (self._transport.datagrams and parser.buf_len() > 0):
+            # Half a frame in a datagram is never completed by the next one.
+            parser = self._parsers[address] = self._mav()
+            while len(self._parsers) > MAX_PARSERS:
+                del self._parsers[next(iter(self._parsers))]
+        try:
+            yield from parser.parse_buffer(data) or ()
+        except (dialect.MAVError, struct.error, UnicodeDecodeError, ValueError, TypeError, IndexError):
+            self.dropped["unreadable"] += 1
+            self._parsers[address] = self._mav()
+
+    def _take(self, address: Address, message: Message) -> None:
+        name = message.get_type()
+        if name == "BAD_DATA" or name.startswith("UNKNOWN"):
+            self.dropped[name] += 1
+            return
+        self._routes[message.get_srcSystem(), message.get_srcComponent()] = address
+        if not self._for_us(message):
+            self.dropped["for others"] += 1
+            return
+        for box in list(self._boxes):
+            if not box.types or name in box.types:
+                box.put(message)
+
+    def _for_us(self, message: Message) -> bool:
+        system = getattr(message, "target_system", 0)
+        component = getattr(message, "target_component", 0)
+        return system in (0, self.me.system) and component in (0, self.me.component)
+
+    def _mav(self) -> Coder:
+        """A coder of its own, for each direction and peer: they keep state."""
+        mav = Coder(self.me, self._seen)
+        if self._key is not None:
+            mav.signing.secret_key = self._key
+            mav.signing.sign_outgoing = True
+            mav.signing.allow_unsigned_callback = lambda _, number: number in UNSIGNED_ALLOWED
+            mav.signing.timestamp = signing_time()
+        return mav
+
+
+class SeenStreams:
+    """The newest time signed by each sender, whatever address it comes from: nothing is taken twice."""
+
+    def __init__(self) -> None:
+        self._newest: dict[tuple[int, int, int], int] = {}
+
+    def fresh(self, stream: tuple[int, int, int], timestamp: int) -> bool:
+        newest = self._newest.get(stream, signing_time() - OLDEST_STEPS)
+        return timestamp > newest
+
+    def took(self, stream: tuple[int, int, int], timestamp: int) -> None:
+        self._newest[stream] = timestamp
+
+
+class Coder(dialect.MAVLink):
+    """The dialect's coder, but a signature's time counts only once the signature itself is right.
+
+    Otherwise one forged frame of a far future would lock its sender's stream.
+    """
+
+    def __init__(self, me: Who, seen: SeenStreams) -> None:
+        super().__init__(None, srcSystem=me.system, srcComponent=me.component)
+        self.robust_parsing = True
+        self._seen_streams = seen
+
+    def check_signature(self, msgbuf: bytearray, srcSystem: int, srcComponent: int) -> bool:
+        """MAVLink 2 message signing: SHA-256 of key and frame, its first 48 bits."""
+        signed, signature = bytes(msgbuf[:-6]), bytes(msgbuf[-6:])
+        right = hashlib.sha256(bytes(self.signing.secret_key or b"") + signed).digest()[:6]
+        timestamp = int.from_bytes(signed[-6:], "little")
+        stream = (signed[-7], srcSystem, srcComponent)
+        if not (hmac.compare_digest(right, signature) and self._seen_streams.fresh(stream, timestamp)):
+            return False
+        self._seen_streams.took(stream, timestamp)
+        return True
+
+
+def signing_time() -> int:
+    """Now, in the steps that signatures count."""
+    return round((time.time() - MAVLINK_EPOCH_S) * 1e5)
+
+
+@contextmanager
+def wire(url: Url, *, me: Who = GROUND_STATION, signing_key: bytes | None = None) -> Iterator[Wire]:
+    """An open wire at `url`; raises as `open_transport` does."""
+    opened = Wire(open_transport(url), me=me, signing_key=signing_key)
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+def read_signing_key(path: Path) -> bytes:
+    """The 32 bytes in a key file: 64 hexadecimal digits, or a passphrase of which they are the SHA-256.
+
+    The latter is how ground stations make a key from what their users type.
+
+    Raises
+    ------
+    InputError
+        If there is no key in the file.
+    """
+    try:
+        text = path.read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or "not text"
+        raise InputError(f"--signing-key {path}: cannot be read ({why})") from None
+    if not text:
+        raise InputError(f"--signing-key {path}: is empty; write 64 hexadecimal digits or a passphrase")
+    if len(text) == 64:
+        with suppress(ValueError):
+            return bytes.fromhex(text)
+    return hashlib.sha256(text.encode()).digest()
