@@ -7,7 +7,7 @@ from typing import Literal
 
 from mission.document import SiteOrigin
 
-Role = Literal["home", "corner", "stop", "settle", "trigger", "scan", "return", "other"]
+Role = Literal["home", "speed", "corner", "stop", "settle", "trigger", "scan", "return", "other"]
 """What an item does in a mission of scan stops."""
 
 NAN = float("nan")
@@ -19,10 +19,59 @@ class Command:
     NAV_WAYPOINT = 16
     NAV_DELAY = 93
     DO_CHANGE_SPEED = 178
+    DO_SET_RELAY = 181
+    DO_SET_SERVO = 183
     DO_SET_MISSION_CURRENT = 224
     DO_SEND_SCRIPT_MESSAGE = 217
     IMAGE_START_CAPTURE = 2000
     NAV_SCRIPT_TIME = 42702
+
+
+NAMES = {
+    16: "NAV_WAYPOINT",
+    17: "NAV_LOITER_UNLIM",
+    18: "NAV_LOITER_TURNS",
+    19: "NAV_LOITER_TIME",
+    20: "NAV_RETURN_TO_LAUNCH",
+    21: "NAV_LAND",
+    22: "NAV_TAKEOFF",
+    82: "NAV_SPLINE_WAYPOINT",
+    84: "NAV_VTOL_TAKEOFF",
+    85: "NAV_VTOL_LAND",
+    92: "NAV_GUIDED_ENABLE",
+    93: "NAV_DELAY",
+    112: "CONDITION_DELAY",
+    114: "CONDITION_DISTANCE",
+    115: "CONDITION_YAW",
+    177: "DO_JUMP",
+    178: "DO_CHANGE_SPEED",
+    179: "DO_SET_HOME",
+    181: "DO_SET_RELAY",
+    183: "DO_SET_SERVO",
+    187: "DO_SET_ACTUATOR",
+    189: "DO_LAND_START",
+    194: "DO_SET_REVERSE",
+    195: "DO_SET_ROI_LOCATION",
+    197: "DO_SET_ROI_NONE",
+    201: "DO_SET_ROI",
+    203: "DO_DIGICAM_CONTROL",
+    205: "DO_MOUNT_CONTROL",
+    206: "DO_SET_CAM_TRIGG_DIST",
+    211: "DO_GRIPPER",
+    213: "NAV_SET_YAW_SPEED",
+    217: "DO_SEND_SCRIPT_MESSAGE",
+    224: "DO_SET_MISSION_CURRENT",
+    530: "SET_CAMERA_MODE",
+    1000: "DO_GIMBAL_MANAGER_PITCHYAW",
+    2000: "IMAGE_START_CAPTURE",
+    2001: "IMAGE_STOP_CAPTURE",
+    2003: "DO_TRIGGER_CONTROL",
+    2500: "VIDEO_START_CAPTURE",
+    2501: "VIDEO_STOP_CAPTURE",
+    3000: "DO_VTOL_TRANSITION",
+    42702: "NAV_SCRIPT_TIME",
+}
+"""Names of the commands that mission lists hold in practice, without the prefix MAV_CMD_."""
 
 
 class Frame:
@@ -33,6 +82,8 @@ class Frame:
     GLOBAL_RELATIVE_ALT = 3
     GLOBAL_INT = 5
     GLOBAL_RELATIVE_ALT_INT = 6
+    GLOBAL_TERRAIN_ALT = 10
+    GLOBAL_TERRAIN_ALT_INT = 11
 
 
 @dataclass(frozen=True)
@@ -50,6 +101,11 @@ class Item:
     y: int = 0
     z: float = 0.0
     autocontinue: bool = True
+
+    @property
+    def name(self) -> str:
+        """As people call the command: "NAV_DELAY (93)"."""
+        return f"{NAMES.get(self.command, 'command')} ({self.command})"
 
 
 @dataclass(frozen=True)
@@ -73,6 +129,8 @@ class ItemList:
     autopilot: str
     origin: SiteOrigin
     placed: tuple[Placed, ...]
+    notes: tuple[str, ...] = ()
+    """What the mission asks for and an autopilot cannot do by itself, a line each."""
 
     @property
     def items(self) -> tuple[Item, ...]:

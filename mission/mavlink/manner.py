@@ -1,0 +1,25 @@
+"""How a mission is written as items, once every choice is made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from mission.document import SiteOrigin
+from mission.mavlink.autopilots import Autopilot
+
+Trigger = Literal["auto", "script", "camera", "none"]
+ScanWait = Literal["delay", "script_time"]
+Settle = Literal["delay", "hold"]
+
+
+@dataclass(frozen=True)
+class Manner:
+    """The choices of `mission.mavlink.translate.translate`; `trigger` is no longer `auto`."""
+
+    origin: SiteOrigin
+    vehicle: Autopilot
+    trigger: Trigger
+    scan_wait: ScanWait
+    settle: Settle
+    max_lateral_m: float

@@ -1,0 +1,48 @@
+"""What a mission asks for that no autopilot does by itself: the station that follows the run must."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from mission.document import Mission
+from mission.mavlink.manner import Manner
+
+
+def notes_of(mission: Mission, manner: Manner) -> tuple[str, ...]:
+    """A line for each thing that is not carried by the items."""
+    return (*_failures(mission), *_arrival(mission, manner), *_policy(mission))
+
+
+def _failures(mission: Mission) -> Iterator[str]:
+    retried = [stop.id for stop in mission.stops if stop.on_failure == "retry" and stop.retries > 0]
+    if retried:
+        yield f"{_some(retried)}: a failed scan is tried again only by the station that follows the run"
+    for doing in ("ask", "abort", "home"):
+        ids = [stop.id for stop in mission.stops if stop.on_failure == doing]
+        if ids:
+            yield f"{_some(ids)}: on_failure {doing} is done only by the station that follows the run"
+
+
+def _arrival(mission: Mission, manner: Manner) -> Iterator[str]:
+    name = manner.vehicle.name
+    if manner.vehicle.keeps_arrival:
+        yield "tolerance_m is sent as acceptance radius; the station still checks the pose before a scan"
+    else:
+        yield f"tolerance_m is not checked by {name}: the station checks the pose before a scan"
+    if mission.scanner.fov_deg < 360:
+        yield f"headings are sent, but not every {name} rover turns to them: the station checks them"
+    if manner.trigger == "none":
+        yield "no item starts a scan: the station does"
+
+
+def _policy(mission: Mission) -> Iterator[str]:
+    policy = mission.policy
+    yield (
+        f"link_loss {policy.link_loss} and battery_min {policy.battery_min:g} are not sent: "
+        "the vehicle has failsafe parameters of its own"
+    )
+
+
+def _some(ids: list[str]) -> str:
+    """As in "stop S1", or "stops S1 to S9 (9)"."""
+    return f"stop {ids[0]}" if len(ids) == 1 else f"stops {ids[0]} to {ids[-1]} ({len(ids)})"

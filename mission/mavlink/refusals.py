@@ -1,0 +1,121 @@
+"""Why a mission is not sent: it makes no sense as items, or it needs what the vehicle would drop."""
+
+from __future__ import annotations
+
+import math
+
+from mission.document import Mission, SiteOrigin, Stop
+from mission.errors import AnswerIsNo, InputError
+from mission.mavlink.autopilots import Autopilot
+from mission.mavlink.items import Command
+from mission.mavlink.manner import Manner
+from mission.sense import problems_of
+
+LONGEST_SCRIPT_S = 255
+"""NAV_SCRIPT_TIME keeps its timeout in a uint8."""
+LARGEST_SCRIPT_NUMBER = 32_767
+"""NAV_SCRIPT_TIME keeps the stop's number in an int16."""
+LONGEST_HOLD_S = 32_767
+"""More is kept by ArduPilot and runs as 0 (measured)."""
+LATITUDE_LIMIT = 89.0
+"""Degrees beyond which the autopilots' own rules of longitude no longer hold."""
+
+
+def origin_of(mission: Mission) -> SiteOrigin:
+    """Where on earth the mission's site is."""
+    if mission.georeference is None:
+        raise InputError(
+            f"{mission.name}: no georeference, and autopilots know only degrees; "
+            "plan again with --origin LAT,LON,ALT,HEADING"
+        )
+    return mission.georeference
+
+
+def check(mission: Mission, numbers: tuple[int, ...], manner: Manner) -> None:
+    """Refuses what cannot be written as items so that the vehicle does what the mission says."""
+    _check_manner(manner)
+    _check_origin(mission, manner.origin)
+    for problem in problems_of(mission):
+        raise InputError(f"{mission.name}: {problem}; correct the mission or plan it again")
+    _check_heading(mission, manner.vehicle)
+    for stop, number in zip(mission.stops, numbers, strict=True):
+        _check_waits(mission, stop, manner)
+        _check_handshake(mission, stop, number, manner)
+
+
+def check_count(mission: Mission, count: int, vehicle: Autopilot, most: int) -> None:
+    """Refuses more items than the vehicle holds; `count` includes home where it holds that too."""
+    if count > most:
+        raise AnswerIsNo(
+            f"{mission.name}: {len(mission.stops)} stops make {count} items, {vehicle.name} holds {most}; "
+            "settle by hold to save one per stop, or plan fewer stops at once"
+        )
+
+
+def _check_manner(manner: Manner) -> None:
+    needs = {"script": Command.DO_SEND_SCRIPT_MESSAGE, "camera": Command.IMAGE_START_CAPTURE}
+    taken, name = manner.vehicle.commands, manner.vehicle.name
+    if manner.trigger != "none" and needs.get(manner.trigger) not in taken:
+        raise InputError(f"{name} has no trigger {manner.trigger!r}; choose camera or none")
+    if manner.scan_wait == "script_time" and Command.NAV_SCRIPT_TIME not in taken:
+        raise InputError(f"{name} has no NAV_SCRIPT_TIME; wait for a scan by delay")
+    if not 0 <= manner.max_lateral_m < math.inf:
+        raise InputError(f"max_lateral_m is {manner.max_lateral_m}; it must be finite and not negative")
+
+
+def _check_origin(mission: Mission, origin: SiteOrigin) -> None:
+    for key in ("lat", "lon", "alt", "heading_deg"):
+        if not math.isfinite(getattr(origin, key)):
+            raise InputError(
+                f"{mission.name}: georeference.{key} is {getattr(origin, key)}; give a number with --origin"
+            )
+    if abs(origin.lat) > LATITUDE_LIMIT:
+        raise InputError(
+            f"{mission.name}: georeference.lat is {origin.lat}; autopilots' metres end at "
+            f"±{LATITUDE_LIMIT:g}°, give another place with --origin"
+        )
+
+
+def _check_heading(mission: Mission, vehicle: Autopilot) -> None:
+    """A scanner that does not look all round needs the heading it was planned with."""
+    if mission.scanner.fov_deg < 360 and not vehicle.keeps_arrival:
+        stop, fov = mission.stops[0], mission.scanner.fov_deg
+        heading = math.degrees(stop.heading)
+        raise AnswerIsNo(
+            f"{mission.name}: stop {stop.id}: heading {heading:.1f}° is needed (scanner.fov_deg is {fov:g}), "
+            f"and {vehicle.name} drops it; plan with --fov 360, or push to a robot of stopgo"
+        )
+
+
+def _check_waits(mission: Mission, stop: Stop, manner: Manner) -> None:
+    longest = manner.vehicle.max_delay_s
+    for field, seconds in {"settle_s": stop.settle_s, "scan.duration_s": stop.scan.duration_s}.items():
+        if seconds > longest:
+            raise AnswerIsNo(
+                f"{mission.name}: stop {stop.id}: {field} is {seconds:g}, longer than the {longest:.0f} s "
+                f"that {manner.vehicle.name} waits; shorten it"
+            )
+    if manner.settle == "hold" and not _can_be_held(stop.settle_s):
+        raise AnswerIsNo(
+            f"{mission.name}: stop {stop.id}: settle_s is {stop.settle_s:g}, a hold is whole seconds up to "
+            f"{LONGEST_HOLD_S}; round it or settle by delay"
+        )
+
+
+def _can_be_held(seconds: float) -> bool:
+    return seconds == round(seconds) and seconds <= LONGEST_HOLD_S
+
+
+def _check_handshake(mission: Mission, stop: Stop, number: int, manner: Manner) -> None:
+    if manner.scan_wait != "script_time":
+        return
+    if stop.scan.timeout_s > LONGEST_SCRIPT_S:
+        raise AnswerIsNo(
+            f"{mission.name}: stop {stop.id}: scan.timeout_s is {stop.scan.timeout_s:g}, NAV_SCRIPT_TIME "
+            f"holds {LONGEST_SCRIPT_S} s; shorten it or wait by delay"
+        )
+    if number > LARGEST_SCRIPT_NUMBER:
+        raise AnswerIsNo(
+            f"{mission.name}: stop {stop.id}: number {number} is above the {LARGEST_SCRIPT_NUMBER} that "
+            "NAV_SCRIPT_TIME holds; wait by delay"
+        )

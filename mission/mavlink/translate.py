@@ -1,0 +1,121 @@
+"""Mission -> the items of one autopilot, in the order in which no scan begins before the robot stands.
+
+At each stop: drive there, settle, trigger, wait for the scan. A command that is no NAV command runs together
+with the NAV command after it, so the trigger stands between two waits: it fires when the first is over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from mission.document import Mission, Point, Stop
+from mission.mavlink.autopilots import Autopilot, autopilot_named
+from mission.mavlink.corners import corners
+from mission.mavlink.items import Command, Item, ItemList, Placed, Role
+from mission.mavlink.manner import Manner, ScanWait, Settle, Trigger
+from mission.mavlink.notes import notes_of
+from mission.mavlink.numbers import numbers_of
+from mission.mavlink.refusals import check, check_count, origin_of
+from mission.mavlink.writing import (
+    capture,
+    corner_waypoint,
+    delay,
+    script_message,
+    script_time,
+    speed_change,
+    stop_waypoint,
+)
+
+
+def translate(
+    mission: Mission,
+    autopilot: str = "ardupilot",
+    *,
+    trigger: Trigger = "auto",
+    scan_wait: ScanWait = "delay",
+    settle: Settle = "delay",
+    max_lateral_m: float = 0.02,
+    max_items: int | None = None,
+) -> ItemList:
+    """The mission as items for an autopilot.
+
+    Parameters
+    ----------
+    trigger
+        What starts a scan: a message to a script on the vehicle (ArduPilot), a camera command, or nothing
+        (then whoever follows the run starts it). `auto` is the script on ArduPilot, else the camera.
+    scan_wait
+        Wait for the planned duration, or until a script says that the scan is done (ArduPilot).
+    settle
+        Wait in an item of its own, or, to save items, as the waypoint's hold (whole seconds).
+    max_lateral_m
+        How far the straight lines between waypoints may run from the mission's legs, metres.
+    max_items
+        What this vehicle holds, home included, where it differs from its kind.
+
+    Raises
+    ------
+    InputError
+        If the mission has no georeference, makes no sense, or the autopilot is not known.
+    AnswerIsNo
+        If the mission depends on what the autopilot would drop: a heading, a wait, items above its number.
+    """
+    vehicle = autopilot_named(autopilot)
+    manner = Manner(
+        origin=origin_of(mission), vehicle=vehicle, trigger=_meant(vehicle, trigger),
+        scan_wait=scan_wait, settle=settle, max_lateral_m=max_lateral_m,
+    )  # fmt: skip
+    numbers = numbers_of(mission)
+    check(mission, numbers, manner)
+    placed = tuple(_without_repeats(_placed(mission, numbers, manner)))
+    check_count(mission, vehicle.sequence(len(placed)), vehicle, max_items or vehicle.max_items)
+    return ItemList(vehicle.name, manner.origin, placed, notes=notes_of(mission, manner))
+
+
+def _meant(vehicle: Autopilot, trigger: Trigger) -> Trigger:
+    """The trigger that `auto` stands for."""
+    if trigger != "auto":
+        return trigger
+    return "script" if Command.DO_SEND_SCRIPT_MESSAGE in vehicle.commands else "camera"
+
+
+def _placed(mission: Mission, numbers: Sequence[int], manner: Manner) -> Iterator[Placed]:
+    """Where the robot starts is no item: it stands there."""
+    yield Placed(speed_change(mission.robot.speed), "speed")
+    for stop, number in zip(mission.stops, numbers, strict=True):
+        yield from _passed(stop.approach, "corner", manner, stop.id)
+        yield from _visited(stop, number, manner)
+    back = mission.return_ or ()
+    yield from _passed(back, "return", manner, None)
+    if len(back) > 1:
+        yield Placed(corner_waypoint(back[-1], manner), "return")
+
+
+def _passed(leg: Sequence[Point], role: Role, manner: Manner, stop: str | None) -> Iterator[Placed]:
+    """The points strictly between the leg's ends that must be driven through."""
+    for point in corners(leg, within=manner.max_lateral_m)[1:-1]:
+        yield Placed(corner_waypoint(point, manner), role, stop)
+
+
+def _visited(stop: Stop, number: int, manner: Manner) -> Iterator[Placed]:
+    yield Placed(stop_waypoint(stop, manner), "stop", stop.id)
+    if stop.settle_s > 0 and manner.settle == "delay":
+        yield Placed(delay(stop.settle_s), "settle", stop.id)
+    if manner.trigger == "script":
+        yield Placed(script_message(stop, number), "trigger", stop.id)
+    if manner.trigger == "camera":
+        yield Placed(capture(number), "trigger", stop.id)
+    wait = script_time(stop, number) if manner.scan_wait == "script_time" else delay(stop.scan.duration_s)
+    yield Placed(wait, "scan", stop.id)
+
+
+def _without_repeats(placed: Iterable[Placed]) -> Iterator[Placed]:
+    """Leaves out a corner that lies, in steps of 1e-7 degrees, where the waypoint before it is."""
+    before: Item | None = None
+    for one in placed:
+        passing = one.role in ("corner", "return")
+        if passing and before is not None and (before.x, before.y) == (one.item.x, one.item.y):
+            continue
+        if one.item.command == Command.NAV_WAYPOINT:
+            before = one.item
+        yield one

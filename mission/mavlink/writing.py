@@ -1,0 +1,73 @@
+"""Single items, each from what it is to do."""
+
+from __future__ import annotations
+
+import math
+
+from mission.document import Point, Stop
+from mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic
+from mission.mavlink.items import NAN, Command, Frame, Item
+from mission.mavlink.manner import Manner
+
+SCAN_MESSAGE = 100
+"""Message id by which a script on the vehicle knows that a scan is due."""
+SCRIPT_COMMAND = 1
+"""Command number by which a script knows the NAV_SCRIPT_TIME that waits for a scan."""
+SHORTEST_DELAY_S = 0.001
+"""A delay of 0 means "until a time of day" to ArduPilot, and a wait must follow every trigger."""
+
+
+def stop_waypoint(stop: Stop, manner: Manner) -> Item:
+    """Where the robot is to stop; with its tolerance and heading where the vehicle keeps them."""
+    held = max(manner.vehicle.brake_hold_s, stop.settle_s if manner.settle == "hold" else 0.0)
+    if not manner.vehicle.keeps_arrival:
+        return _waypoint((stop.x, stop.y), manner, hold=held)
+    bearing = round(bearing_deg(manner.origin, stop.heading), 2) % 360.0
+    return _waypoint((stop.x, stop.y), manner, hold=held, radius=stop.tolerance_m, yaw=bearing)
+
+
+def corner_waypoint(point: Point, manner: Manner) -> Item:
+    """A place to drive through; where a vehicle stops only if told to, it is told to, or it would cut it."""
+    yaw = NAN if manner.vehicle.keeps_arrival else 0.0
+    return _waypoint(point, manner, hold=manner.vehicle.brake_hold_s, yaw=yaw)
+
+
+def delay(seconds: float) -> Item:
+    """A wait; the time of day is -1, "none", for ArduPilot refuses NaN."""
+    held = max(seconds, SHORTEST_DELAY_S)
+    return Item(Command.NAV_DELAY, Frame.MISSION, params=(held, -1.0, -1.0, -1.0))
+
+
+def speed_change(speed: float) -> Item:
+    """Speed over ground in metres per second; throttle unchanged."""
+    return Item(Command.DO_CHANGE_SPEED, Frame.MISSION, params=(1.0, speed, -1.0, 0.0))
+
+
+def script_message(stop: Stop, number: int) -> Item:
+    """Message id, the stop's number, seconds of scan, seconds after which a scan has failed."""
+    scan = stop.scan
+    params = (float(SCAN_MESSAGE), float(number), scan.duration_s, scan.timeout_s)
+    return Item(Command.DO_SEND_SCRIPT_MESSAGE, Frame.MISSION, params=params)
+
+
+def script_time(stop: Stop, number: int) -> Item:
+    """Command, timeout in whole seconds; the stop's number in x, which float16 would not hold exactly."""
+    timeout = math.ceil(stop.scan.timeout_s)
+    params = (float(SCRIPT_COMMAND), float(timeout), 0.0, 0.0)
+    return Item(Command.NAV_SCRIPT_TIME, Frame.MISSION, params=params, x=number)
+
+
+def capture(number: int) -> Item:
+    """All cameras, no interval, one picture, with the stop's number."""
+    return Item(Command.IMAGE_START_CAPTURE, Frame.MISSION, params=(0.0, 0.0, 1.0, float(number)))
+
+
+def _waypoint(point: Point, manner: Manner, *, hold: float, yaw: float = 0.0, radius: float = 0.0) -> Item:
+    place = to_geodetic(manner.origin, point, manner.vehicle.rule)
+    return Item(
+        Command.NAV_WAYPOINT,
+        manner.vehicle.frame,
+        params=(float(hold), radius, 0.0, yaw),
+        x=round(place.lat * STEPS_PER_DEGREE),
+        y=round(place.lon * STEPS_PER_DEGREE),
+    )

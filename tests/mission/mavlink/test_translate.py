@@ -1,0 +1,233 @@
+"""Missions as items: what every autopilot is promised, and what each gets."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mission.document import SiteOrigin
+from mission.errors import AnswerIsNo, InputError
+from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
+from mission.mavlink.autopilots import AUTOPILOTS
+from mission.mavlink.items import Command, Frame
+from mission.mavlink.translate import translate
+from tests.mission.mavlink.worlds import (
+    NAMES,
+    changed,
+    corner_tour,
+    first_scan,
+    first_stop,
+    narrow_view,
+)
+from tests.mission.worlds import mission_of, square_tour, stop
+
+WAITS = (Command.NAV_DELAY, Command.NAV_SCRIPT_TIME)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("mission", [square_tour(), corner_tour()], ids=["square", "corner"])
+def test_every_stop_is_driven_to_settled_at_triggered_and_waited_for(name, mission):
+    items = translate(mission, name)
+    for wanted in mission.stops:
+        own = [placed for placed in items.placed if placed.stop == wanted.id and placed.role != "corner"]
+        assert [placed.role for placed in own] == ["stop", "settle", "trigger", "scan"]
+        assert own[1].item.params[0] == wanted.settle_s
+        assert own[3].item.params[0] == wanted.scan.duration_s
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("mission", [square_tour(), corner_tour()], ids=["square", "corner"])
+def test_a_trigger_fires_only_between_two_waits(name, mission):
+    items = translate(mission, name).items
+    for index, item in enumerate(items):
+        if item.command in (Command.DO_SEND_SCRIPT_MESSAGE, Command.IMAGE_START_CAPTURE):
+            assert items[index - 1].command in WAITS
+            assert items[index + 1].command in WAITS
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_only_commands_that_the_autopilot_takes_are_sent(name):
+    items = translate(corner_tour(), name).items
+    assert {item.command for item in items} <= AUTOPILOTS[name].commands
+    for item in items:
+        place = item.command == Command.NAV_WAYPOINT
+        assert item.frame == (Frame.GLOBAL_RELATIVE_ALT_INT if place else Frame.MISSION)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_only_the_real_corner_is_a_waypoint(name):
+    roles = [placed.role for placed in translate(corner_tour(), name).placed]
+    assert roles == ["speed", "corner", "stop", "settle", "trigger", "scan", "return", "return"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_finer_limit_keeps_the_bend(name):
+    roles = [placed.role for placed in translate(corner_tour(), name, max_lateral_m=0.005).placed]
+    assert roles.count("corner") == 2
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_repeated_point_is_sent_once(name):
+    mission = mission_of(
+        stop("S1", (0.0, 0.0), (4.0, 0.0), (4.0, 0.0), (4.0, 3.0)), back=((4.0, 3.0), (4.0, 3.0))
+    )
+    places = [item for item in translate(mission, name).items if item.command == Command.NAV_WAYPOINT]
+    assert len(places) == 2
+
+
+def test_four_metres_east_by_ardupilots_scale():
+    item = translate(square_tour()).items[1]
+    step = 0.011131884502145034
+    assert item.x == 515_000_000
+    assert item.y == 75_000_000 + round(4 / (step * math.cos(math.radians(51.5))))
+
+
+def test_ardupilot_is_told_to_stop_at_every_waypoint_and_nothing_that_it_drops():
+    for item in translate(corner_tour()).items:
+        if item.command == Command.NAV_WAYPOINT:
+            assert item.params == (1.0, 0.0, 0.0, 0.0)
+
+
+def test_px4_gets_the_tolerance_and_the_bearing():
+    east, north = (placed.item for placed in translate(square_tour(), "px4").placed if placed.role == "stop")
+    assert east.params == (0.0, 0.05, 0.0, 90.0)
+    assert north.params == (0.0, 0.05, 0.0, 0.0)
+
+
+def test_the_stops_number_goes_with_the_trigger():
+    mission = mission_of(
+        stop("S7", (0.0, 0.0), (1.0, 0.0)), stop("S12", (1.0, 0.0), (2.0, 0.0)), begin=(0.0, 0.0)
+    )
+    by_script = [p.item.params for p in translate(mission).placed if p.role == "trigger"]
+    by_camera = [p.item.params for p in translate(mission, "px4").placed if p.role == "trigger"]
+    assert by_script == [(100.0, 7.0, 60.0, 120.0), (100.0, 12.0, 60.0, 120.0)]
+    assert by_camera == [(0.0, 0.0, 1.0, 7.0), (0.0, 0.0, 1.0, 12.0)]
+
+
+def test_the_script_handshake_replaces_the_last_wait():
+    items = translate(square_tour(), scan_wait="script_time")
+    scans = [placed.item for placed in items.placed if placed.role == "scan"]
+    assert [(item.command, item.params[:2], item.x) for item in scans] == [
+        (Command.NAV_SCRIPT_TIME, (1.0, 120.0), 1),
+        (Command.NAV_SCRIPT_TIME, (1.0, 120.0), 2),
+    ]
+
+
+def test_settling_by_hold_saves_an_item_per_stop():
+    by_delay, by_hold = (translate(square_tour(), settle=how) for how in ("delay", "hold"))
+    assert len(by_delay.items) - len(by_hold.items) == 2
+    assert [placed.item.params[0] for placed in by_hold.placed if placed.role == "stop"] == [2.0, 2.0]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_without_a_scan_time_a_wait_still_follows_the_trigger(name):
+    items = translate(first_scan(square_tour(), duration_s=0.0), name).placed
+    scan = next(placed.item for placed in items if placed.role == "scan")
+    assert 0 < scan.params[0] <= 0.001
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_the_autopilot_cannot_do_is_noted(name):
+    notes = translate(square_tour(), name).notes
+    assert any("stops S1 to S2 (2): on_failure ask" in note for note in notes)
+    assert any("tolerance_m" in note for note in notes)
+    assert any("battery_min 0.15" in note for note in notes)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_without_a_georeference_nothing_is_written(name):
+    with pytest.raises(InputError, match=r"no georeference.*--origin"):
+        translate(changed(square_tour(), georeference=None), name)
+
+
+def test_ardupilot_refuses_a_scanner_that_needs_its_heading():
+    with pytest.raises(AnswerIsNo, match=r"stop S1: heading 0\.0°.*fov_deg is 90.*--fov 360"):
+        translate(narrow_view())
+
+
+@pytest.mark.parametrize("name", ["px4", "generic"])
+def test_who_keeps_the_heading_gets_it_with_a_note(name):
+    assert any("headings are sent" in note for note in translate(narrow_view(), name).notes)
+
+
+@pytest.mark.parametrize(
+    ("mission", "told"),
+    [
+        (first_stop(square_tour(), settle_s=math.nan), r"stops\[0\]\.settle_s: is nan"),
+        (first_stop(square_tour(), x=math.inf), r"stops\[0\]: \(inf, 0\)"),
+        (first_scan(square_tour(), duration_s=math.inf), r"duration_s: is inf"),
+        (
+            changed(square_tour(), georeference=SiteOrigin(lat=math.nan, lon=0.0, alt=0.0, heading_deg=0.0)),
+            r"georeference\.lat is nan",
+        ),
+        (
+            changed(square_tour(), georeference=SiteOrigin(lat=89.5, lon=0.0, alt=0.0, heading_deg=0.0)),
+            r"georeference\.lat is 89\.5.*--origin",
+        ),
+        (
+            changed(square_tour(), georeference=SiteOrigin(lat=9.5, lon=181.0, alt=0.0, heading_deg=0.0)),
+            r"lon 181\.0 is no place on earth",
+        ),
+    ],
+)
+def test_what_is_no_number_or_no_place_is_refused_by_name(mission, told):
+    for name in NAMES:
+        with pytest.raises(InputError, match=told):
+            translate(mission, name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_wait_that_the_vehicle_cannot_count_is_refused(name):
+    with pytest.raises(AnswerIsNo, match=r"stop S1: settle_s is 5e\+06.*4294967 s"):
+        translate(first_stop(square_tour(), settle_s=5e6), name)
+
+
+def test_a_handshake_longer_than_its_field_is_refused():
+    with pytest.raises(AnswerIsNo, match=r"stop S1: scan\.timeout_s is 256.*255 s"):
+        translate(first_scan(square_tour(), timeout_s=256.0), scan_wait="script_time")
+
+
+def test_a_fractional_hold_is_refused_and_a_fractional_delay_is_exact():
+    mission = first_stop(square_tour(), settle_s=2.5)
+    with pytest.raises(AnswerIsNo, match=r"stop S1: settle_s is 2\.5, a hold is whole seconds"):
+        translate(mission, settle="hold")
+    assert translate(mission).items[2].params[0] == 2.5
+
+
+def test_more_items_than_the_vehicle_holds_are_refused():
+    assert len(translate(square_tour(), max_items=11).items) == 10  # and home
+    with pytest.raises(AnswerIsNo, match=r"2 stops make 11 items, ardupilot holds 10"):
+        translate(square_tour(), max_items=10)
+
+
+@pytest.mark.parametrize(
+    ("how", "told"),
+    [
+        ({"autopilot": "betaflight"}, "betaflight"),
+        ({"autopilot": "px4", "trigger": "script"}, "px4 has no trigger 'script'"),
+        ({"autopilot": "px4", "scan_wait": "script_time"}, "px4 has no NAV_SCRIPT_TIME"),
+        ({"max_lateral_m": math.nan}, "max_lateral_m is nan"),
+    ],
+)
+def test_what_cannot_be_chosen_is_said(how, told):
+    with pytest.raises(InputError, match=told):
+        translate(square_tour(), **how)
+
+
+@given(
+    name=st.sampled_from(NAMES),
+    lat=st.floats(-85, 85),
+    lon=st.floats(-180, 180),
+    heading=st.floats(-360, 360),
+    x=st.floats(-3500, 3500),
+    y=st.floats(-3500, 3500),
+)
+def test_a_stop_within_5_km_is_sent_to_8_mm(name, lat, lon, heading, x, y):
+    origin = SiteOrigin(lat=lat, lon=lon, alt=0.0, heading_deg=heading)
+    mission = changed(mission_of(stop("S1", (0.0, 0.0), (x, y))), georeference=origin)
+    item = next(placed.item for placed in translate(mission, name).placed if placed.role == "stop")
+    sent = Geodetic(lat=item.x / STEPS_PER_DEGREE, lon=item.y / STEPS_PER_DEGREE)
+    assert math.dist(from_geodetic(origin, sent, AUTOPILOTS[name].rule), (x, y)) <= 0.008
