@@ -12,14 +12,14 @@ class StopComparison:
     """One stop; what did not happen is None."""
 
     stop: str
-    planned_s: float
-    """Planned arrival, from the start of the mission."""
+    planned_s: float | None
+    """Planned arrival, from the start of the mission; None if no plan has this stop."""
     driven_s: float | None
     """Last arrival in the run, from the start of the run."""
     deviation_m: float | None
     """Distance of the robot from the stop when it scanned there, else when it last arrived."""
     outcome: str
-    """`scanned`, `skipped`, `failed` or `not reached`."""
+    """`scanned`, `skipped`, `failed` or `not reached`; `withdrawn` if a revision dropped it unreached."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -311,33 +311,41 @@ def demo_command(
             station.push(report.mission)
             typer.echo(f"pushed mission {report.mission.id}, read back from the robot")
             station.command("start")
-            events, ended = _follow(station, report.mission, out / "field.rrd")
-    return _say_demo(compare(report.mission, events), ended, out)
+            tee, ended = _follow(station, report.mission, out / "field.rrd")
+    *earlier, last = tee.missions
+    return _say_demo(compare(last, tee.events, earlier=earlier), ended, out)
 
 
-def _follow(station: Station, mission: Mission, path: Path) -> tuple[list[AnyEvent], str]:
-    """Record the run to its end; its events, and the state it ended in."""
+def _follow(station: Station, mission: Mission, path: Path) -> tuple[EventTee, str]:
+    """Record the run to its end; what was told of it, and the state it ended in."""
     from bridge.watch import watch_run
     from recordings.field import FieldRecording
 
     with FieldRecording(path, mission) as recording:
-        tee = EventTee(recording)
+        tee = EventTee(recording, mission)
         last = watch_run(station, tee, say=lambda line: typer.echo(f"  {line}", err=True))
-    return tee.events, last.state
+    return tee, last.state
 
 
 class EventTee:
-    """Hands a run to a recording and keeps its events."""
+    """Hands a run to a recording and keeps its events, and the revisions of its mission."""
 
-    def __init__(self, recording: FieldRecording) -> None:
+    def __init__(self, recording: FieldRecording, mission: Mission) -> None:
         self.events: list[AnyEvent] = []
-        self.mission, self.state, self.pose = recording.mission, recording.state, recording.pose
-        self._record = recording.event
+        self.missions = [mission]
+        self.state, self.pose = recording.state, recording.pose
+        self._recording = recording
+
+    def mission(self, mission: Mission) -> None:
+        """Record the mission and keep it, if it is another revision."""
+        if mission.revision != self.missions[-1].revision:
+            self.missions.append(mission)
+        self._recording.mission(mission)
 
     def event(self, event: AnyEvent) -> None:
         """Record an event and keep it."""
         self.events.append(event)
-        self._record(event)
+        self._recording.event(event)
 
 
 def _say_demo(comparison: Comparison, ended: str, out: Path) -> int:

@@ -90,6 +90,16 @@ def part(entity: str, name: str) -> str:
     return f"{entity}/{name}"
 
 
+def headings(stops: str) -> str:
+    """Where the scanner faces at stops."""
+    return f"{stops}/heading"
+
+
+def poles(stops: str) -> str:
+    """What stops stand on in 3D."""
+    return f"{stops}/poles"
+
+
 def shape(robot: str) -> str:
     """What is drawn of a robot; the robot's own entity is its pose."""
     return f"{robot}/shape"
@@ -117,6 +127,10 @@ class Run:
         """What is tolerated of a metric."""
         return f"{self.metric(metric)}/tolerance"
 
+    def revision(self, number: int) -> Revision:
+        """Of what a revision changed while the run was under way."""
+        return Revision(self, number)
+
     @property
     def log(self) -> str:
         return f"{LOG_FIELD}/{self.run_id}"
@@ -125,6 +139,22 @@ class Run:
     def events(self) -> str:
         """Events as values."""
         return self.flat("events")
+
+
+@dataclass(frozen=True)
+class Revision:
+    """What a revision changed while a run was under way."""
+
+    run: Run
+    number: int
+
+    def flat(self, name: str) -> str:
+        """In 2D."""
+        return self.run.flat(f"revision_{self.number}/{name}")
+
+    def solid(self, name: str) -> str:
+        """In 3D."""
+        return self.run.solid(f"revision_{self.number}/{name}")
 
 
 ROBOT = "robot"
@@ -138,6 +168,11 @@ SCANNED = "scanned"
 SKIPPED = "skipped"
 FAILED = "failed"
 """Names within a run, for `Run.flat` and `Run.solid`."""
+WITHDRAWN = "withdrawn"
+WITHDRAWN_ROUTE = "withdrawn_route"
+NEW_STOPS = "stops"
+NEW_ROUTE = "route"
+"""Names within a revision, for `Revision.flat` and `Revision.solid`."""
 
 
 def run_of_events(entity: str) -> str | None:

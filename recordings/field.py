@@ -25,14 +25,16 @@ class FieldRecording:
     A field run cannot be repeated, so what was told is kept: it is written to `NAME.partial.rrd`, which
     `rerun` opens too and which remains when the writer is killed, and gets its name when it is closed.
     Reports wait for the mission, because it gives the recording id and the local origin; reports of no
-    run are left out, as is everything when no mission came.
+    run are left out, as is everything when no mission came. What is told of a new revision waits for that
+    too: the plan stays as it was drawn first, and each run shows what revisions changed, when they did.
     """
 
     def __init__(self, path: Path, mission: Mission | None = None) -> None:
         self.path = path
         self._waiting: list[Report] = []
         self._runs: dict[str, RunDrawing] = {}
-        self._mission: Mission | None = None
+        self._first: Mission | None = None
+        self._newest: Mission | None = None
         self._canvas: Canvas | None = None
         self._partial: Path | None = None
         self._given = mission
@@ -45,30 +47,30 @@ class FieldRecording:
         return self
 
     def mission(self, mission: Mission) -> None:
-        """Take the mission that is driven; of another revision of it the stops are drawn anew."""
-        if self._mission is not None and self._mission.id != mission.id:
+        """Take the mission that is driven, or a new revision of it."""
+        if self._first is not None and self._first.id != mission.id:
             raise InputError(
-                f"{self.path}: is of mission {self._mission.id}, not {mission.id}: use another file"
+                f"{self.path}: is of mission {self._first.id}, not {mission.id}: use another file"
             )
-        self._mission = mission
-        if self._canvas is None:
+        self._newest = mission
+        if self._first is None:
+            self._first = mission
             self._begin(mission)
-        draw_mission(self.canvas, mission)
         waiting, self._waiting = self._waiting, []
         for report in waiting:
-            self._draw(report)
+            self._take(report)
 
     def state(self, report: StateReport) -> None:
         """Take a snapshot of the robot's state."""
-        self._draw(report)
+        self._take(report)
 
     def pose(self, report: PoseReport) -> None:
         """Take a pose of the robot."""
-        self._draw(report)
+        self._take(report)
 
     def event(self, event: AnyEvent) -> None:
         """Take a line of the robot's journal; what was told before it is on disk then."""
-        self._draw(event)
+        self._take(event)
         if self._canvas is not None:
             self._canvas.stream.flush()
 
@@ -80,6 +82,9 @@ class FieldRecording:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._canvas is not None:
+            for report in self._waiting:
+                self._draw(report)
         self._open.close()
         if self._partial is not None:
             compact(self._partial, self.path)
@@ -94,18 +99,33 @@ class FieldRecording:
             of_run=True,
         )
         self._canvas = self._open.enter_context(open_canvas(self._partial, sheet))
+        draw_mission(self._canvas, mission)
+
+    def _take(self, report: Report) -> None:
+        """Draw the report, or let it and all after it wait for the mission it is told of."""
+        if self._newest is None or self._waiting or _revision(report) > self._newest.revision:
+            self._waiting.append(report)
+        else:
+            self._draw(report)
 
     def _draw(self, report: Report) -> None:
-        if self._mission is None:
-            self._waiting.append(report)
-        elif report.run_id is not None:
-            run = self._runs.get(report.run_id) or self._start(report.run_id)
-            _DRAW[type(report)](run, report)
+        assert self._newest is not None
+        if report.run_id is None:
+            return
+        run = self._runs.get(report.run_id) or self._start(report.run_id)
+        if run.mission.revision < min(_revision(report), self._newest.revision):
+            run.follow(self._newest, report)
+        _DRAW[type(report)](run, report)
 
     def _start(self, run_id: str) -> RunDrawing:
-        assert self._mission is not None
-        self._runs[run_id] = RunDrawing(self.canvas, run_id, self._mission)
+        assert self._first is not None
+        self._runs[run_id] = RunDrawing(self.canvas, run_id, self._first)
         return self._runs[run_id]
+
+
+def _revision(report: Report) -> int:
+    """The revision that a report is told of; poses are of any."""
+    return getattr(report, "revision", None) or 0
 
 
 class _Draw(dict[type, Callable[[RunDrawing, Any], None]]):

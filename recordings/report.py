@@ -161,6 +161,7 @@ def _findings(nouns: Nouns) -> list[str]:
 _COLOURS = (
     "- targets: green seen by a stop, red not seen, violet seen from no candidate, yellow new in a step",
     "- stops green with their number, doorway stops yellow-green; route cyan, way back dark cyan; run pink",
+    "- grey: stops and ways that a revision has withdrawn during a run",
     "- openings: white passable, magenta not",
     "- candidates: yellow kept, reddish dropped; point at one to see why",
     "- walls grey, columns orange, beams purple, stairs teal, windows and railings blue, holes rose",

@@ -17,6 +17,8 @@ class RunReview:
     """One run, from its events."""
 
     run_id: str
+    revisions: list[int] = field(default_factory=list)
+    """Those of the mission that the run followed, in this order; none in recordings that do not tell."""
     scanned: list[str] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
     failed: list[str] = field(default_factory=list)
@@ -106,6 +108,9 @@ def _take(run: RunReview, event: dict[str, Any]) -> None:
     elif kind in ("Finished", "Aborted"):
         run.ended = kind
     run.seconds = event["seconds"]
+    revision = event.get("revision")
+    if revision is not None and revision not in run.revisions:
+        run.revisions.append(revision)
 
 
 def _run_lines(run: RunReview) -> list[str]:
@@ -113,6 +118,8 @@ def _run_lines(run: RunReview) -> list[str]:
         f"  run {run.run_id}: {len(run.scanned)} scanned, {len(run.skipped)} skipped,"
         f" {len(run.failed)} failed; {run.ended or 'not ended'} after {run.seconds:.1f} s"
     ]
+    if len(run.revisions) > 1:
+        lines.append(f"    revisions {', '.join(map(str, run.revisions))} of the mission, one after another")
     if run.deviation_m:
         worst = max(run.deviation_m, key=lambda stop: run.deviation_m[stop])
         lines.append(f"    greatest deviation {run.deviation_m[worst] * 1000:.1f} mm, at {worst}")

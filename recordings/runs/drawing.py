@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import msgspec
 import numpy as np
@@ -15,6 +16,9 @@ from mission.events import (
     Failed,
     Pose,
     PoseReport,
+    RevisionDropped,
+    RevisionTaken,
+    RevisionWaits,
     Scanned,
     Skipped,
     StateReport,
@@ -26,6 +30,7 @@ from recordings.pens import ORDER
 from recordings.robot import draw_robot, quaternions
 from recordings.runs.cross_track import cross_track
 from recordings.runs.report import StopRecord, run_report
+from recordings.runs.revision import change_between, draw_change
 from recordings.stages.mission import ABOVE_FLOOR
 
 PIECE_M = 0.05
@@ -51,6 +56,7 @@ class RunDrawing:
         self.run_id = run_id
         self.names = entities.Run(run_id)
         self.mission = mission
+        self.revisions = [mission]
         self.stops = {stop.id: stop for stop in mission.stops}
         self.records: dict[str, StopRecord] = {}
         self._began_ns: int | None = None
@@ -60,10 +66,20 @@ class RunDrawing:
         self._style()
         self._describe()
 
+    def follow(self, mission: Mission, report: StateReport | PoseReport | AnyEvent) -> None:
+        """Go on by another revision of the mission from `report` on, and draw what it changes."""
+        self._tell_time(report)
+        change, names = change_between(self.mission, mission), self.names.revision(mission.revision)
+        draw_change(self.canvas, change, names, partial(self._at, robot_ns=report.robot_ns))
+        self.mission = mission
+        self.revisions.append(mission)
+        self.stops = {stop.id: stop for stop in mission.stops}
+        self._towards = None
+        self._describe()
+
     def pose(self, report: PoseReport) -> None:
         """Move the robot, lengthen its path, and measure its distance from the leg it drives."""
-        if report.mission_time_s is not None:
-            self._began_ns = report.robot_ns - round(report.mission_time_s * 1e9)
+        self._tell_time(report)
         if self._last is not None and _same(self._last, report):
             return
         if self._last is not None and report.robot_ns - self._last.robot_ns > SILENT_S * 1e9:
@@ -90,7 +106,7 @@ class RunDrawing:
 
     def event(self, event: AnyEvent) -> None:
         """Write the event down whole, mark it on the plan, and bring the report up to date."""
-        self._began_ns = event.robot_ns - round(event.mission_time_s * 1e9)
+        self._tell_time(event)
         told = {name: value for name, value in msgspec.to_builtins(event).items() if name in EVENT_FIELDS}
         self._at(self.names.events, rr.DynamicArchetype("Event", components=told), event.robot_ns)
         level = "WARN" if isinstance(event, Skipped | Failed) else "INFO"
@@ -187,9 +203,15 @@ class RunDrawing:
         stop = getattr(event, "stop", None)
         if stop is not None:
             self.records[stop] = self.records.get(stop, StopRecord()).after(event)
-        text = run_report(self.mission, self.run_id, self.records, event)
+        text = run_report(self.revisions, self.run_id, self.records, event)
         document = rr.TextDocument(text, media_type="text/markdown")
         self._at(self.names.flat(entities.RUN_REPORT), document, event.robot_ns)
+
+    def _tell_time(self, report: StateReport | PoseReport | AnyEvent) -> None:
+        """Learn when the mission began, from a report that tells."""
+        seconds = getattr(report, "mission_time_s", None)
+        if seconds is not None:
+            self._began_ns = report.robot_ns - round(seconds * 1e9)
 
     def _at(self, entity: str, archetype: object, robot_ns: int) -> None:
         """At the robot's time, and at mission time once it is known when the mission began."""
@@ -198,7 +220,7 @@ class RunDrawing:
 
 
 EVENT_FIELDS = (
-    *("event", "number", "stop", "reason", "deviation_m", "commander"),
+    *("event", "number", "revision", "stop", "reason", "deviation_m", "commander"),
     *("file", "size", "sha256", "points"),
 )
 """What is kept of an event as values, each of one type in all events."""
@@ -226,4 +248,8 @@ def _about(event: AnyEvent) -> str:
         words.append(f"{event.deviation_m * 1000:.0f} mm beside")
     if isinstance(event, Scanned):
         words.append(f"{event.file}, {event.points} points")
+    if isinstance(event, RevisionTaken):
+        words.append(f"revision {event.revision} after {event.before}")
+    if isinstance(event, RevisionWaits | RevisionDropped):
+        words.append(f"revision {event.waiting}")
     return " ".join(word for word in words if word)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from mission.document import Mission
 from mission.events import AnyEvent, Arrived, Failed, Scanned, Skipped
@@ -30,13 +32,16 @@ class StopRecord:
         return self
 
 
-def run_report(mission: Mission, run_id: str, records: dict[str, StopRecord], latest: AnyEvent) -> str:
-    """The run so far in markdown."""
+def run_report(
+    revisions: Sequence[Mission], run_id: str, records: dict[str, StopRecord], latest: AnyEvent
+) -> str:
+    """The run so far in markdown; of the mission's revisions the run follows the last."""
+    mission = revisions[-1]
     scanned = sum(record.outcome == "scanned" for record in records.values())
     lines = [
         f"# Run {run_id}",
         "",
-        f"Mission **{mission.name}**, revision {mission.revision}, robot {latest.robot}",
+        f"Mission **{mission.name}**, revision {_numbers(revisions)}, robot {latest.robot}",
         "",
         f"{scanned} of {len(mission.stops)} stops scanned after {latest.mission_time_s:.1f} s"
         f" (last event: {type(latest).__name__})",
@@ -45,7 +50,23 @@ def run_report(mission: Mission, run_id: str, records: dict[str, StopRecord], la
         "|---|---|---|---|",
     ]
     lines += [_row(stop.id, records.get(stop.id)) for stop in mission.stops]
+    lines += [f"| {stop} | | | withdrawn by revision {by} |" for stop, by in _withdrawn(revisions).items()]
     return "\n".join(lines)
+
+
+def _numbers(revisions: Sequence[Mission]) -> str:
+    """The revision that is followed, and those before it."""
+    before = ", ".join(str(mission.revision) for mission in revisions[:-1])
+    return f"{revisions[-1].revision}" + (f" (before: {before})" if before else "")
+
+
+def _withdrawn(revisions: Sequence[Mission]) -> dict[str, int]:
+    """Stops that the last revision has not, and the revision that withdrew each."""
+    gone: dict[str, int] = {}
+    for before, after in pairwise(revisions):
+        ids = {stop.id for stop in after.stops}
+        gone.update({stop.id: after.revision for stop in before.stops if stop.id not in ids})
+    return {stop: by for stop, by in gone.items() if stop not in {s.id for s in revisions[-1].stops}}
 
 
 def _row(stop: str, record: StopRecord | None) -> str:

@@ -5,18 +5,21 @@ Plan and field recordings both draw it, at the same entities.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from mission.document import Mission
+from mission.document import Mission, Point, Stop
 from mission.geometry import bounds
 from mission.planning import Route
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
 from recordings.layout import Bounds
+from recordings.palette import Colour
 from recordings.pens import ORDER
 from recordings.robot import draw_robot, quaternions
 from recordings.stages.drive import Drive
@@ -27,6 +30,8 @@ ARROW = 0.6
 """Length of a stop's heading, in metres."""
 HEAD = 1.5
 """Height of the marks on stops in 3D, in metres."""
+
+Leg = tuple[Point, ...]
 
 
 def draw_mission(canvas: Canvas, mission: Mission) -> None:
@@ -81,34 +86,81 @@ def draw_drive(canvas: Canvas, drive: Drive, *, radius: float) -> None:
 
 
 def _draw_route(canvas: Canvas, mission: Mission) -> None:
-    legs = [np.array(stop.approach) for stop in mission.stops if len(stop.approach) > 1]
+    legs, colours = legs_of(mission)
+    if legs:
+        flat, solid = route_lines(canvas, legs, colours)
+        canvas.show(entities.ROUTE, flat)
+        canvas.show(entities.WORLD_ROUTE, solid)
+
+
+def legs_of(mission: Mission) -> tuple[list[Leg], list[Colour]]:
+    """Every leg that is driven, the way back last, with its colour."""
+    legs = [stop.approach for stop in mission.stops if len(stop.approach) > 1]
     colours = [palette.ROUTE] * len(legs)
     if mission.return_:
-        legs.append(np.array(mission.return_))
+        legs.append(mission.return_)
         colours.append(palette.RETURN)
-    if not legs:
-        return
+    return legs, colours
+
+
+def route_lines(
+    canvas: Canvas, legs: Sequence[Leg], colours: Sequence[Colour], *, above: float = 0.0
+) -> tuple[rr.LineStrips2D, rr.LineStrips3D]:
+    """Legs in 2D and 3D, `above` other legs by that part of a step of ORDER, and as much wider."""
+    lines = [np.array(leg) for leg in legs]
+    order, size = ORDER["route"] + above, 1 + above
     flat = rr.LineStrips2D(
-        canvas.strips(legs), colors=colours, radii=on_screen(1.2), draw_order=ORDER["route"]
+        canvas.strips(lines), colors=colours, radii=on_screen(1.2 * size), draw_order=order
     )
-    canvas.show(entities.ROUTE, flat)
-    raised = [strokes.level(canvas.local(leg), ABOVE_FLOOR) for leg in legs]
-    canvas.show(entities.WORLD_ROUTE, rr.LineStrips3D(raised, colors=colours, radii=0.03))
+    raised = [strokes.level(canvas.local(line), ABOVE_FLOOR) for line in lines]
+    return flat, rr.LineStrips3D(raised, colors=colours, radii=0.03 * size)
 
 
 def _draw_stops(canvas: Canvas, mission: Mission) -> None:
-    xy = canvas.local(np.array([(stop.x, stop.y) for stop in mission.stops]))
-    labels = [stop.id for stop in mission.stops]
-    colours = [palette.DOORWAY if stop.doorway else palette.STOP for stop in mission.stops]
-    points = rr.Points2D(
-        xy, labels=labels, colors=colours, radii=on_screen(5), show_labels=True, draw_order=ORDER["stop"]
-    )
-    canvas.show(entities.STOPS, points, _details(mission))
-    canvas.show(entities.HEADINGS, _headings(xy, mission))
+    marks = stop_marks(canvas, mission.stops)
+    canvas.show(entities.STOPS, marks.points, _details(mission))
+    canvas.show(entities.HEADINGS, marks.headings)
+    canvas.show(entities.WORLD_STOPS, marks.heads)
+    canvas.show(entities.POLES, marks.poles)
+
+
+@dataclass(frozen=True)
+class StopMarks:
+    """Stops in 2D and 3D."""
+
+    points: rr.Points2D
+    headings: rr.Arrows2D
+    heads: rr.Points3D
+    poles: rr.LineStrips3D
+
+
+def stop_marks(
+    canvas: Canvas,
+    stops: Sequence[Stop],
+    *,
+    colour: Colour | None = None,
+    labels: Sequence[str] = (),
+    above: float = 0.0,
+) -> StopMarks:
+    """Stops in their own colours and with their names, or in one colour and with labels for pointing.
+
+    `above` is how far they lie above other stops, as a part of a step of ORDER; they are as much larger.
+    """
+    xy = canvas.local(np.array([(stop.x, stop.y) for stop in stops]))
     heads = strokes.level(xy, HEAD)
-    canvas.show(entities.WORLD_STOPS, rr.Points3D(heads, labels=labels, colors=colours, radii=0.12))
+    size, order = 1 + above, ORDER["stop"] + above
+    look: dict[str, Any] = {
+        "labels": list(labels) or [stop.id for stop in stops],
+        "show_labels": not labels,
+        "colors": [colour or (palette.DOORWAY if stop.doorway else palette.STOP) for stop in stops],
+    }
     poles = np.stack([strokes.level(xy, 0.0), heads], axis=1)
-    canvas.show(entities.POLES, rr.LineStrips3D(poles, colors=palette.STOP, radii=0.02))
+    return StopMarks(
+        points=rr.Points2D(xy, radii=on_screen(5 * size), draw_order=order, **look),
+        headings=_headings(xy, stops, colour or palette.STOP, order),
+        heads=rr.Points3D(heads, radii=0.12 * size, **look),
+        poles=rr.LineStrips3D(poles, colors=colour or palette.STOP, radii=0.02 * size),
+    )
 
 
 def _details(mission: Mission) -> rr.AnyValues:
@@ -120,9 +172,7 @@ def _details(mission: Mission) -> rr.AnyValues:
     )
 
 
-def _headings(xy: NDArray[Any], mission: Mission) -> rr.Arrows2D:
-    heading = np.array([stop.heading for stop in mission.stops])
+def _headings(xy: NDArray[Any], stops: Sequence[Stop], colour: Colour, order: float) -> rr.Arrows2D:
+    heading = np.array([stop.heading for stop in stops])
     facing = ARROW * np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    return rr.Arrows2D(
-        origins=xy, vectors=facing, colors=palette.STOP, radii=on_screen(1.5), draw_order=ORDER["stop"]
-    )
+    return rr.Arrows2D(origins=xy, vectors=facing, colors=colour, radii=on_screen(1.5), draw_order=order)

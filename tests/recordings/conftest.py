@@ -28,6 +28,23 @@ def field(tmp_path_factory: pytest.TempPathFactory, mission: Mission) -> Path:
     return write_field(tmp_path_factory.mktemp("field") / "field.rrd", mission)
 
 
+@pytest.fixture(scope="session")
+def revised(tmp_path_factory: pytest.TempPathFactory, mission: Mission) -> Path:
+    """A run that takes revision 2 after its first stop."""
+    return write_revised(tmp_path_factory.mktemp("revised") / "field.rrd", mission)
+
+
+def write_revised(path: Path, mission: Mission) -> Path:
+    """As a station hears it: the journal's events come before the state, and with it the mission."""
+    after = world.revised(mission)
+    with FieldRecording(path, mission) as recording:
+        for report in run.reports_of_two(mission, after, behind="S1"):
+            if isinstance(report, StateReport) and report.revision == 2:
+                recording.mission(after)
+            tell(recording, report)
+    return path
+
+
 def write_plan(path: Path, x: float = 0.0, y: float = 0.0) -> Path:
     with PlanRecording(path, world.MISSION_ID) as recording:
         for noun in world.nouns_at(x, y):

@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import msgspec
+
 from mission.document import Mission
 from mission.events import (
     AnyEvent,
     Arrived,
+    Event,
     Finished,
     Pose,
     PoseReport,
+    RevisionTaken,
     Scanned,
     Settled,
     Started,
@@ -52,6 +56,27 @@ def reports(mission: Mission, *, run: str = RUN) -> Iterator[StateReport | PoseR
         teller.done.append(stop.id)
     yield teller.event(Finished, float(drive.seconds[-1]))
     yield teller.state(float(drive.seconds[-1]), "FINISHED")
+
+
+def reports_of_two(
+    before: Mission, after: Mission, *, behind: str
+) -> Iterator[StateReport | PoseReport | AnyEvent]:
+    """A run that goes on by the revision `after` once the stop `behind` has been scanned."""
+    begun, rest = list(reports(before)), list(reports(after))
+    yield from begun[: _scanned(begun, behind) + 1]
+    taken = begun[_scanned(begun, behind)]
+    assert isinstance(taken, Scanned)
+    common = {name: getattr(taken, name) for name in RevisionTaken.__struct_fields__ if name != "before"}
+    common |= {"number": taken.number + 1, "revision": after.revision}
+    yield RevisionTaken(before=before.revision, **common)
+    for report in rest[_scanned(rest, behind) + 1 :]:
+        later = {"number": report.number + 1} if isinstance(report, Event) else {}
+        yield msgspec.structs.replace(report, **later)
+
+
+def _scanned(told: list[StateReport | PoseReport | AnyEvent], stop: str) -> int:
+    """Where in a run the scan of a stop is told."""
+    return next(k for k, item in enumerate(told) if isinstance(item, Scanned) and item.stop == stop)
 
 
 class _Teller:

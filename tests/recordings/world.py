@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 
 from mission.document import (
@@ -209,3 +210,14 @@ def nouns_at(x: float = 0.0, y: float = 0.0) -> list[object]:
 
 def pose_at(x: float, y: float) -> Pose:
     return Pose(x=x, y=y, heading=0.0)
+
+
+def revised(mission: Mission) -> Mission:
+    """Revision 2: the second stop 0.4 m farther down, and a third one at the end of the room."""
+    first, second = mission.stops
+    places = ((first.x, first.y), (second.x, second.y - 0.4), (second.x + 1.6, second.y + 0.6))
+    later = [
+        msgspec.structs.replace(second, id=name, x=x, y=y, approach=(places[k], (x, y)))
+        for k, (name, (x, y)) in enumerate(zip(("S2", "S3"), places[1:], strict=True))
+    ]
+    return sealed(msgspec.structs.replace(mission, revision=2, stops=(first, *later)))
