@@ -109,6 +109,12 @@ def upload_of(sent: ItemList) -> tuple[Item, ...]:
     return (*home, *sent.items)
 
 
+def placed_at(sent: ItemList, sequence: int) -> Placed | None:
+    """The item with a sequence number on the vehicle, as MISSION_CURRENT tells it; None for home."""
+    index = autopilot_named(sent.autopilot).index(sequence)
+    return sent.placed[index] if 0 <= index < len(sent.placed) else None
+
+
 def differences(sent: ItemList, read: Sequence[Item], autopilot: Autopilot | None = None) -> tuple[str, ...]:
     """How what a vehicle holds differs from what it should hold, a line each; empty when it does not.
 

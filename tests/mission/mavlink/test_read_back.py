@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mission.mavlink.autopilots import AUTOPILOTS, differences, upload_of
+from mission.mavlink.autopilots import AUTOPILOTS, differences, placed_at, upload_of
 from mission.mavlink.items import NAN, Command, Frame, Item
 from mission.mavlink.keeping import ardupilot_keeps, px4_keeps
 from mission.mavlink.translate import translate
@@ -71,6 +71,15 @@ def test_home_is_put_in_front_for_ardupilot_only():
     assert len(upload_of(translate(square_tour()))) == 11
     assert upload_of(translate(square_tour()))[0].x == 515_000_000
     assert len(upload_of(translate(square_tour(), "px4"))) == 10
+
+
+@pytest.mark.parametrize(("name", "first"), [("ardupilot", 1), ("px4", 0), ("generic", 0)])
+def test_sequence_numbers_count_home_where_it_is_an_item(name, first):
+    sent = translate(square_tour(), name)
+    assert placed_at(sent, first) is sent.placed[0]
+    assert placed_at(sent, first + 9) is sent.placed[9]
+    assert placed_at(sent, first + 10) is None
+    assert placed_at(sent, first - 1) is None
 
 
 def waypoint(*params: float, frame: int = Frame.GLOBAL_RELATIVE_ALT_INT, z: float = 0.0) -> Item:
