@@ -1,23 +1,29 @@
-"""Commands on a mission as it stands in its file: show it, check it."""
+"""Commands on a mission as it stands in its file: show it, check it, export it, import it."""
 
 from __future__ import annotations
 
 import hashlib
 import math
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 import typer
 
-from mission.document import Mission, Stop
+from mission.document import Frame, Mission, SiteOrigin, Stop, Transform, sealed
 from mission.errors import AnswerIsNo, InputError
-from mission.files.mission_json import read
+from mission.files.atomic import write_atomic
+from mission.files.mission_json import encode, next_revision, read
 from mission.geometry import frozen, polyline_length
 from mission.planning import Schedule
 from mission.schedule import schedule
 from mission.sense import Problem, problems_of
+from mission.settings import HOW, read_settings
 from mission.table import duration, printable, table
+
+if TYPE_CHECKING:
+    from mission.files.exports.format import FloorDrawing, Supplements
 
 MissionFile = Annotated[Path, typer.Argument(metavar="MISSION", help="A mission.json.")]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout and nothing else.")]
@@ -25,9 +31,11 @@ Floor = Annotated[Path | None, typer.Option(help="The floor it was planned on; i
 
 
 def add_commands(app: typer.Typer) -> None:
-    """Add `show` and `check` to the front door."""
+    """Add this folder's verbs to the front door."""
     app.command()(show)
     app.command()(check)
+    app.command()(export)
+    app.command(name="import")(import_command)
 
 
 def show(mission: MissionFile, as_json: AsJson = False) -> None:
@@ -171,3 +179,190 @@ def _length(leg: tuple[tuple[float, float], ...]) -> float:
 
 def _json(document: dict[str, Any]) -> str:
     return msgspec.json.format(msgspec.json.encode(document), indent=2).decode()
+
+
+OriginOption = Annotated[
+    str | None, typer.Option(metavar="LAT,LON,ALT,HEADING", help="Where on earth the drawing's origin is.")
+]
+AutopilotOption = Annotated[str | None, typer.Option(help="ardupilot, px4 or generic")]
+
+
+def export(
+    mission: MissionFile,
+    out: Annotated[Path, typer.Option("-o", "--out", help="The file; its suffix names the format.")],
+    to: Annotated[str | None, typer.Option(metavar="FORMAT", help="The format, whatever the suffix.")] = None,
+    floor: Annotated[Path | None, typer.Option(help="The floor's .dxf, to draw over.")] = None,
+    coverage: Annotated[Path | None, typer.Option(help="coverage.json, to draw what is seen.")] = None,
+    autopilot: AutopilotOption = None,
+    origin: OriginOption = None,
+    map_: Annotated[
+        str | None,
+        typer.Option("--map", metavar="X,Y,HEADING", help="Site to map: turn by HEADING, then shift."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a mission in a format that others open.
+
+    .plan (QGroundControl), .waypoints (QGC WPL 110), .dxf, .csv, .geojson, .nav2.yaml, .mcap (nav_msgs/Path),
+    .vda5050.json; docs/exports.md tells what opens where.
+
+    Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
+    """
+    from mission.files.exports import FORMATS, exported, format_named
+
+    document = read(mission)
+    for problem in problems_of(document)[:1]:
+        raise AnswerIsNo(f"{mission}: {problem} (stopgo check {mission} lists all)")
+    name = format_named(to, out)
+    given: dict[str, object] = {
+        "floor": floor,
+        "coverage": coverage,
+        "autopilot": autopilot,
+        "origin": origin,
+        "map": map_,
+    }
+    _refuse_unused(name, given)
+    if out.exists() and out.samefile(mission):
+        raise InputError(f"{out}: is the mission itself; choose another file for the export")
+    supplements = _supplements(document, floor, coverage, autopilot)
+    placed = _placed(document, origin, map_)
+    data = exported(placed, name, supplements)
+    _write_checked(out, data)
+    notes = FORMATS[name].notes(placed, supplements)
+    _say_export({"mission": str(mission), "file": str(out), "format": name, "bytes": len(data),
+                 "stops": len(placed.stops), "notes": notes}, as_json)  # fmt: skip
+
+
+def _refuse_unused(name: str, given: dict[str, object]) -> None:
+    from mission.files.exports import FORMATS
+
+    for option, value in given.items():
+        if value is not None and option not in FORMATS[name].uses:
+            fitting = [form.suffix for form in FORMATS.values() if option in form.uses]
+            raise InputError(
+                f"--{option}: {FORMATS[name].title} has no use for it; it is for {', '.join(fitting)}"
+            )
+
+
+def _supplements(
+    mission: Mission, floor: Path | None, coverage: Path | None, autopilot: str | None
+) -> Supplements:
+    from mission.files.exports.format import Supplements
+    from mission.files.exports.stretches import read_stretches
+    from mission.mavlink.autopilots import autopilot_named
+
+    return Supplements(
+        autopilot=autopilot_named(autopilot or "ardupilot").name,
+        floor=None if floor is None else _floor_drawing(floor, mission),
+        coverage=None if coverage is None else read_stretches(coverage, mission),
+        written=datetime.now(UTC),
+    )
+
+
+def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
+    """The drawing the mission was planned on, in the unit it was planned in."""
+    from mission.files.exports.format import FloorDrawing
+    from planner.floors.drawing import open_drawing
+    from planner.floors.dxf import metres_in
+
+    if path.suffix.lower() != ".dxf":
+        raise InputError(
+            f"--floor {path}: layers are drawn over a .dxf only; leave --floor out to have them alone"
+        )
+    for problem in _floor_problems(mission, path):
+        raise InputError(f"--floor {path}: is not the floor of this mission: its digest {problem.message}")
+    data = path.read_bytes()
+    drawing, _ = open_drawing(data, source=path)
+    return FloorDrawing(lambda: open_drawing(data, source=path)[0], metres_in(drawing, source=path))
+
+
+def _placed(mission: Mission, origin: str | None, map_: str | None) -> Mission:
+    """The mission with the georeference and the frame that the options give; its file stays as it is."""
+    if origin is not None:
+        place = read_settings(None, {"origin": _numbers(origin, "origin", HOW["origin"])}).origin
+        assert place is not None
+        lat, lon, alt, heading = place
+        known = SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=heading)
+        mission = msgspec.structs.replace(mission, georeference=known)
+    if map_ is not None:
+        frame = Frame(name=mission.frame.name, to_map=_transform(map_))
+        mission = msgspec.structs.replace(mission, frame=frame)
+    return mission
+
+
+def _transform(text: str) -> Transform:
+    how = "write X,Y,HEADING in metres and degrees, such as 1.5,2,90"
+    numbers = _numbers(text, "map", how)
+    if len(numbers) != 3 or not all(abs(number) < 1e8 for number in numbers):
+        raise InputError(f"--map {text}: {how}")
+    return Transform(x=numbers[0], y=numbers[1], heading=math.radians(numbers[2]))
+
+
+def _numbers(text: str, option: str, how: str) -> tuple[float, ...]:
+    try:
+        return tuple(map(float, text.split(",")))
+    except ValueError:
+        raise InputError(f"--{option} {text}: {how}") from None
+
+
+def _write_checked(path: Path, data: bytes) -> None:
+    """Write whole or not at all, and see that the file holds what was checked."""
+    write_atomic(path, data)
+    if path.read_bytes() != data:
+        raise InputError(f"{path}: does not hold what was written; is another program writing to it?")
+
+
+def _say_export(report: dict[str, Any], as_json: bool) -> None:
+    for note in report["notes"]:
+        typer.echo(f"stopgo: {note}", err=True)
+    line = "{file}: {format}, {stops} stops, {bytes} bytes, read back".format(**report)
+    typer.echo(_json(report) if as_json else line)
+
+
+def import_command(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A .plan, a .waypoints or a .csv of stops.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The mission.json to write.")],
+    parameters: Annotated[
+        Path | None, typer.Option("-p", "--parameters", help="plan.toml: robot, scanner and policy.")
+    ] = None,
+    origin: OriginOption = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="X,Y,HEADING", help="Where the robot starts, m and degrees.")
+    ] = None,
+    autopilot: AutopilotOption = None,
+    kind: Annotated[
+        str | None, typer.Option("--from", metavar="FORMAT", help="plan, waypoints or csv")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make a mission of waypoints or stops that another program wrote.
+
+    Waypoints at which something is waited for or triggered become stops, others corners of the way between.
+    A file that holds anything a scanning robot would not do is refused, naming the item.
+
+    Example: stopgo import site.plan -o mission.json --origin 47.3769,8.5417,408,0
+    """
+    from mission.files.imports import read_mission
+
+    given = {"origin": origin, "start": start}
+    numbers = {key: _numbers(text, key, HOW[key]) for key, text in given.items() if text is not None}
+    settings = read_settings(parameters, numbers)
+    made, track = read_mission(file, settings, kind=kind, autopilot=autopilot)
+    mission = sealed(msgspec.structs.replace(made, revision=next_revision(out, made)))
+    _write_checked(out, encode(mission))
+    _say_import(read(out), out, (*track.notes, UNASKED), as_json)
+
+
+UNASKED = "legs are straight between the file's places; no floor was asked whether they are free"
+
+
+def _say_import(mission: Mission, out: Path, notes: tuple[str, ...], as_json: bool) -> None:
+    for note in notes:
+        typer.echo(f"stopgo: {note}", err=True)
+    report = {
+        **{"mission": str(out), "id": mission.id, "revision": mission.revision, "digest": mission.digest},
+        **{"imported": mission.origin.floor, "stops": len(mission.stops), "route_m": _route_length(mission)},
+        **{"georeference": mission.georeference, "notes": notes},
+    }
+    line = f"{out}: {len(mission.stops)} stops, route {_route_length(mission):.2f} m, {_identity(mission)}"
+    typer.echo(_json(report) if as_json else line)

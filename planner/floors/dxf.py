@@ -43,6 +43,12 @@ def read_dxf(data: bytes, *, source: Path, digest: str, d_dis: float) -> FloorPl
     )
 
 
+def metres_in(drawing: Drawing, *, source: Path) -> float:
+    """Length of one drawing unit in metres, as `read_dxf` takes it: what is drawn over a floor needs it."""
+    shapes, _ = shapes_of(drawing, source=source)
+    return _scale(drawing, shapes)[0]
+
+
 def _scale(drawing: Drawing, shapes: Sequence[Shape]) -> tuple[float, list[Finding]]:
     floor = sketch(shape for shape in shapes if shape.role == "floor" and not shape.is_text)
     doors = sketch(shape for shape in shapes if shape.role == "doors" and shape.entity.dxftype() == "LINE")

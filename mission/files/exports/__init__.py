@@ -1,0 +1,115 @@
+"""Writes a mission in the formats that others open: one module per format, one line in `FORMATS`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from mission.document import Mission
+from mission.errors import InputError, StopgoError
+from mission.files.exports import (
+    geojson,
+    nav2_yaml,
+    path_mcap,
+    qgc_plan,
+    qgc_waypoints,
+    stops_csv,
+    stops_dxf,
+    vda5050,
+)
+from mission.files.exports.format import Format, Supplements
+
+QUANTUM = 0.008
+"""Metres by which 1e-7 degrees move a place at most."""
+
+FORMATS: dict[str, Format] = {
+    "plan": Format(
+        ".plan", "QGroundControl plan", qgc_plan.write, qgc_plan.read_back, QUANTUM,
+        georeferenced=True, uses=("origin", "autopilot"), notes=qgc_plan.notes,
+    ),
+    "waypoints": Format(
+        ".waypoints", "QGC WPL 110", qgc_waypoints.write, qgc_waypoints.read_back, QUANTUM,
+        georeferenced=True, uses=("origin", "autopilot"), notes=qgc_waypoints.notes,
+    ),
+    "dxf": Format(
+        ".dxf", "DXF drawing", stops_dxf.write, stops_dxf.read_back, 1e-6,
+        uses=("floor", "coverage"), notes=stops_dxf.notes,
+    ),
+    "csv": Format(
+        ".csv", "table of stops", stops_csv.write, stops_csv.read_back, 1e-6,
+        uses=("origin",), notes=stops_csv.notes,
+    ),
+    "geojson": Format(
+        ".geojson", "GeoJSON (RFC 7946)", geojson.write, geojson.read_back, 1e-3,
+        georeferenced=True, uses=("origin", "coverage"),
+    ),
+    "nav2": Format(
+        ".nav2.yaml", "Nav2 waypoints", nav2_yaml.write, nav2_yaml.read_back, 1e-5,
+        uses=("map",), notes=nav2_yaml.notes,
+    ),
+    "mcap": Format(
+        ".mcap", "nav_msgs/Path in MCAP", path_mcap.write, path_mcap.read_back, 1e-6,
+        uses=("map",), notes=path_mcap.notes,
+    ),
+    "vda5050": Format(
+        ".vda5050.json", "VDA 5050 order", vda5050.write, vda5050.read_back, 1e-5,
+        uses=("map",), notes=vda5050.notes,
+    ),
+}  # fmt: skip
+"""Every format by its name, which `--to` takes; without it the file's suffix decides."""
+
+
+def format_named(name: str | None, path: Path) -> str:
+    """The name of the format for a file: as given, or by suffix.
+
+    Raises
+    ------
+    InputError
+        When there is no such format; it lists all.
+    """
+    if name is not None:
+        if name not in FORMATS:
+            raise InputError(f"--to {name}: no such format; known: {', '.join(FORMATS)}")
+        return name
+    fitting = [key for key, form in FORMATS.items() if path.name.lower().endswith(form.suffix)]
+    if not fitting:
+        known = ", ".join(form.suffix for form in FORMATS.values())
+        raise InputError(f"{path}: no format has this suffix; known: {known} (or name one with --to)")
+    return fitting[0]
+
+
+def exported(mission: Mission, name: str, supplements: Supplements) -> bytes:
+    """The mission in a format of `FORMATS`, read back and compared before it is handed out.
+
+    Raises
+    ------
+    InputError
+        When the format needs a georeference and the mission has none.
+    AnswerIsNo
+        When the format cannot hold what the mission depends on.
+    """
+    form = FORMATS[name]
+    if form.georeferenced and mission.georeference is None:
+        raise InputError(
+            f"{mission.name}: has no georeference, and {form.title} holds latitudes and longitudes; "
+            "give --origin LAT,LON,ALT,HEADING, or plan with it"
+        )
+    data = form.write(mission, supplements)
+    _check(data, form, mission, supplements)
+    return data
+
+
+def _check(data: bytes, form: Format, mission: Mission, supplements: Supplements) -> None:
+    places = form.read_back(data, mission, supplements)
+    if len(places) != len(mission.stops):
+        raise StopgoError(
+            f"{form.title}: {len(mission.stops)} stops were written but {len(places)} read back; "
+            "nothing is kept, please report this"
+        )
+    for stop, place in zip(mission.stops, places, strict=True):
+        off = math.dist((stop.x, stop.y), place)
+        if not off <= form.tolerance:
+            raise StopgoError(
+                f"{form.title}: stop {stop.id} reads back {off:.6f} m off; nothing is kept, "
+                "please report this"
+            )

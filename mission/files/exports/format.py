@@ -1,0 +1,63 @@
+"""What an export format is, and what an export may be given besides the mission."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from mission.document import Mission, Point
+from mission.files.exports.stretches import Stretches
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing
+
+
+@dataclass(frozen=True)
+class FloorDrawing:
+    """The drawing a mission was planned on."""
+
+    open: Callable[[], Drawing]
+    """A fresh copy each time, since the exporter draws into it."""
+    unit: float
+    """Metres per drawing unit."""
+
+
+@dataclass(frozen=True)
+class Supplements:
+    """What an exporter is given besides the mission; each uses only what its `Format.uses` names."""
+
+    autopilot: str = "ardupilot"
+    floor: FloorDrawing | None = None
+    coverage: Stretches | None = None
+    written: datetime = datetime(1970, 1, 1, tzinfo=UTC)
+    """The time that files with a time stamp get."""
+
+
+Writer = Callable[[Mission, Supplements], bytes]
+ReadBack = Callable[[bytes, Mission, Supplements], list[Point]]
+"""Where a reader of the file finds the stops, in the site's frame and in order; it may use the mission's
+frame and georeference to get there, nothing else of it."""
+
+
+def _nothing(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
+    return ()
+
+
+@dataclass(frozen=True)
+class Format:
+    """A file format others open."""
+
+    suffix: str
+    title: str
+    write: Writer
+    read_back: ReadBack
+    tolerance: float
+    """Metres by which a stop may move on the way into the file and back."""
+    georeferenced: bool = False
+    """Whether it holds latitudes and longitudes, so that a mission without georeference is refused."""
+    uses: tuple[str, ...] = ()
+    """The options it has a use for, of floor, coverage, autopilot, origin and map."""
+    notes: Callable[[Mission, Supplements], tuple[str, ...]] = _nothing
+    """What the person should know of this export, such as what the format cannot hold."""

@@ -1,0 +1,64 @@
+"""Writes the stops as the waypoints file of Nav2's RViz panel ("save WPs"), for its waypoint follower."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from mission.document import Mission, Point, Stop
+from mission.files.exports.format import Supplements
+from mission.files.exports.way import SAME, frame_name, mapped, turned_back
+from mission.table import printable
+
+_NUMBER = r"(-?\d+\.\d+)"
+_POSE = re.compile(rf"^    pose: \[{_NUMBER}, {_NUMBER}, {_NUMBER}\]$", re.MULTILINE)
+
+
+def write(mission: Mission, supplements: Supplements) -> bytes:
+    """One waypoint per stop, on the robot's map; Nav2 finds its own way between them."""
+    lines = [*_head(mission), "waypoints:"]
+    for number, stop in enumerate(mapped(mission).stops):
+        lines += _waypoint(number, stop)
+    return ("\n".join(lines) + "\n").encode()
+
+
+def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
+    """The poses' places, back on the site."""
+    to_map = mission.frame.to_map or SAME
+    places = [(float(x), float(y)) for x, y, _ in _POSE.findall(data.decode())]
+    return [turned_back(to_map, place) for place in places]
+
+
+def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
+    """What Nav2 does otherwise than the mission says."""
+    way = "Nav2 plans its own way between the stops: the mission's legs are not in this file"
+    return (way, *unmapped(mission))
+
+
+def unmapped(mission: Mission) -> tuple[str, ...]:
+    """That the poses are the drawing's, where the mission does not say where its drawing lies on the map."""
+    if mission.frame.to_map is not None:
+        return ()
+    return (
+        f"poses are in the frame '{frame_name(mission)}', the drawing's metres; "
+        "say where it lies on the robot's map with --map X,Y,HEADING",
+    )
+
+
+def _head(mission: Mission) -> list[str]:
+    name = printable(mission.name)
+    frame = frame_name(mission)
+    which = "the robot's map" if frame == "map" else f"the site '{printable(frame)}', not turned onto a map"
+    return [
+        f"# Scan stops of mission {name}, id {mission.id} revision {mission.revision}",
+        f"# Frame: {which}; metres; orientation is w, x, y, z",
+    ]
+
+
+def _waypoint(number: int, stop: Stop) -> list[str]:
+    w, z = math.cos(stop.heading / 2), math.sin(stop.heading / 2)
+    return [
+        f"  waypoint{number}:  # {printable(stop.id)}",
+        f"    pose: [{stop.x + 0.0:.6f}, {stop.y + 0.0:.6f}, 0.0]",
+        f"    orientation: [{w + 0.0:.9f}, 0.0, 0.0, {z + 0.0:.9f}]",
+    ]

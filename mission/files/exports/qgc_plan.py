@@ -1,0 +1,89 @@
+"""Writes QGroundControl's .plan: the items an autopilot would be sent, with home at the site's origin."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+
+from mission.document import Mission, Point
+from mission.files.exports.format import Supplements
+from mission.files.imports import qgc_plan
+from mission.files.imports.track import Given
+from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.items import Command, Frame, Item, ItemList
+from mission.mavlink.translate import translate
+
+FIRMWARE = {"generic": 0, "ardupilot": 3, "px4": 12}
+"""MAV_AUTOPILOT of each autopilot."""
+GROUND_ROVER = 10
+"""MAV_TYPE."""
+RELATIVE = 1
+"""QGroundControl's AltitudeMode: above home."""
+
+FILE_FRAMES = {Frame.GLOBAL_INT: Frame.GLOBAL, Frame.GLOBAL_RELATIVE_ALT_INT: Frame.GLOBAL_RELATIVE_ALT}
+"""In files places are degrees, so their frames are those without INT."""
+
+
+def write(mission: Mission, supplements: Supplements) -> bytes:
+    """The plan; `stopgo` holds what items cannot: the stops' ids and the bearing of the site's +y axis."""
+    items = translate(mission, supplements.autopilot)
+    origin = items.origin
+    plan = {
+        **{"fileType": "Plan", "version": 1, "groundStation": "stopgo"},
+        "mission": {
+            **{"version": 2, "firmwareType": FIRMWARE[items.autopilot], "vehicleType": GROUND_ROVER},
+            **{"cruiseSpeed": mission.robot.speed, "hoverSpeed": mission.robot.speed},
+            **{"globalPlanAltitudeMode": RELATIVE},
+            "plannedHomePosition": [origin.lat, origin.lon, origin.alt],
+            "items": [_simple(item, number) for number, item in enumerate(items.items, 1)],
+        },
+        "geoFence": {"circles": [], "polygons": [], "version": 2},
+        "rallyPoints": {"points": [], "version": 2},
+        "stopgo": {"heading_deg": origin.heading_deg, "stops": _ids(items)},
+    }
+    return msgspec.json.format(msgspec.json.encode(plan), indent=2) + b"\n"
+
+
+def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
+    """The stops as `stopgo import` finds them."""
+    return [visit.xy for visit in qgc_plan.read(data, "plan", Given(mission.georeference)).visits]
+
+
+def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
+    """What the autopilot does not do by itself."""
+    return translate(mission, supplements.autopilot).notes
+
+
+def _simple(item: Item, number: int) -> dict[str, Any]:
+    """An item as QGroundControl writes it; null is NaN, "not said"."""
+    numbers = [*item.params, *place(item), item.z]
+    return {
+        "type": "SimpleItem",
+        **(_altitude(item) if item.command == Command.NAV_WAYPOINT else {}),
+        **{"autoContinue": item.autocontinue, "command": item.command, "doJumpId": number},
+        "frame": FILE_FRAMES.get(item.frame, item.frame),
+        "params": [None if math.isnan(value) else value for value in numbers],
+    }
+
+
+def place(item: Item) -> tuple[float, float]:
+    """Latitude and longitude in degrees, or the two plain numbers of a command without a place."""
+    if item.command == Command.NAV_WAYPOINT:
+        return item.x / STEPS_PER_DEGREE, item.y / STEPS_PER_DEGREE
+    return float(item.x), float(item.y)
+
+
+def _altitude(item: Item) -> dict[str, Any]:
+    """QGroundControl wants all three keys or none."""
+    return {"AMSLAltAboveTerrain": None, "Altitude": item.z, "AltitudeMode": RELATIVE}
+
+
+def _ids(items: ItemList) -> dict[str, str]:
+    """Id of each stop by the doJumpId of its waypoint."""
+    return {
+        str(number): placed.stop
+        for number, placed in enumerate(items.placed, 1)
+        if placed.role == "stop" and placed.stop is not None
+    }

@@ -1,0 +1,47 @@
+"""Writes QGC WPL 110, the table that Mission Planner, MAVProxy and QGroundControl read; row 0 is home."""
+
+from __future__ import annotations
+
+import math
+
+from mission.document import Mission, Point
+from mission.files.exports.format import Supplements
+from mission.files.exports.qgc_plan import FILE_FRAMES, place
+from mission.files.imports import qgc_waypoints
+from mission.files.imports.qgc_waypoints import HEAD
+from mission.files.imports.track import Given
+from mission.mavlink.autopilots import home_item
+from mission.mavlink.items import Item
+from mission.mavlink.translate import translate
+
+
+def write(mission: Mission, supplements: Supplements) -> bytes:
+    """The table: tabs, twelve columns, ten decimals of degrees, the site's origin as home."""
+    items = translate(mission, supplements.autopilot)
+    rows = [home_item(items.origin), *items.items]
+    return "".join(f"{line}\n" for line in (HEAD, *map(_row, range(len(rows)), rows))).encode()
+
+
+def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
+    """The stops as `stopgo import` finds them."""
+    given = Given(mission.georeference, supplements.autopilot)
+    return [visit.xy for visit in qgc_waypoints.read(data, "waypoints", given).visits]
+
+
+def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
+    """What the autopilot does not do by itself, and what the table has no column for."""
+    heading = "the bearing of the site's +y axis and the stops' ids are not in this table"
+    return (heading, *translate(mission, supplements.autopilot).notes)
+
+
+def _row(number: int, item: Item) -> str:
+    """Sequence, current, frame, command, param1 to param4, latitude, longitude, height, autocontinue."""
+    lat, lon = place(item)
+    numbers = [*map(_number, item.params), f"{lat:.10f}", f"{lon:.10f}", f"{item.z:.6f}"]
+    frame = FILE_FRAMES.get(item.frame, item.frame)
+    head = [str(number), str(int(number == 0)), str(frame), str(item.command)]
+    return "\t".join((*head, *numbers, str(int(item.autocontinue))))
+
+
+def _number(value: float) -> str:
+    return "nan" if math.isnan(value) else f"{value:.8f}"

@@ -1,0 +1,234 @@
+"""Draws stops, route and coverage on layers of their own, over the floor's drawing or alone, as DXF.
+
+| layer | what |
+|---|---|
+| SCAN_STOPS | a block SCAN_STOP per stop: number, id, an arrow where it faces, further attributes hidden |
+| SCAN_ROUTE | a polyline per leg, the way back dashed, a mark at the start |
+| SCAN_COVERAGE | stretches of boundary that the stops see |
+| SCAN_NOT_SEEN | the other stretches of the elements that are to be scanned |
+
+What the drawing held before stays as it was.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from mission.document import Mission, Point, Stop
+from mission.errors import InputError, StopgoError
+from mission.files.exports.format import Supplements
+from mission.table import printable
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing
+    from ezdxf.entities import Insert
+    from ezdxf.layouts import Modelspace
+
+STOPS, ROUTE, SEEN, UNSEEN = "SCAN_STOPS", "SCAN_ROUTE", "SCAN_COVERAGE", "SCAN_NOT_SEEN"
+LAYERS = {STOPS: (6, 30), ROUTE: (5, 35), SEEN: (3, 50), UNSEEN: (1, 50)}
+"""Colour (AutoCAD's index) and line weight (hundredths of a millimetre) of each layer."""
+
+DISC = 0.3
+"""Radius of a stop's disc in metres."""
+TEXT = 0.22
+"""Height of text in metres."""
+
+
+def write(mission: Mission, supplements: Supplements) -> bytes:
+    """The drawing with the layers added, in the drawing's own unit and version."""
+    drawing, size = _paper(supplements)
+    _make_layers(drawing)
+    space = drawing.modelspace()
+    for stretches, layer in _stretches(supplements):
+        for a, b in stretches:
+            space.add_line(_at(a, size), _at(b, size), dxfattribs={"layer": layer})
+    _draw_route(drawing, mission, size)
+    _draw_stops(drawing, mission, size)
+    return _encoded(drawing)
+
+
+def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
+    """Where the blocks on SCAN_STOPS stand, in metres.
+
+    Raises
+    ------
+    StopgoError
+        When an audit finds more amiss than in the floor's drawing alone.
+    """
+    drawing = _decoded(data)
+    bare, size = _paper(supplements)
+    if _amiss(drawing) > _amiss(bare):
+        raise StopgoError(
+            "the drawing is not sound with the layers added; nothing is kept, please report this"
+        )
+    blocks = [item for item in drawing.modelspace().query("INSERT") if item.dxf.layer == STOPS]
+    return [(item.dxf.insert.x / size, item.dxf.insert.y / size) for item in blocks]
+
+
+def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
+    """What the layers do without."""
+    alone = "no --floor: the layers stand alone, in metres, without the drawing"
+    blank = "no --coverage: layers SCAN_COVERAGE and SCAN_NOT_SEEN stay empty"
+    missing = (alone, supplements.floor is None), (blank, supplements.coverage is None)
+    return tuple(note for note, lacks in missing if lacks)
+
+
+def _paper(supplements: Supplements) -> tuple[Drawing, float]:
+    """The drawing to draw on, and how many of its units make a metre."""
+    import ezdxf
+
+    if supplements.floor is not None:
+        return supplements.floor.open(), 1.0 / supplements.floor.unit
+    return ezdxf.new("R2010", units=6), 1.0
+
+
+def _make_layers(drawing: Drawing) -> None:
+    for name, (colour, weight) in LAYERS.items():
+        if name in drawing.layers:
+            raise InputError(
+                f"the floor's drawing has a layer {name} already; rename or delete it there, and plan again"
+            )
+        drawing.layers.add(name, color=colour, lineweight=weight)
+
+
+def _stretches(supplements: Supplements) -> Iterator[tuple[list[list[Point]], str]]:
+    if supplements.coverage is not None:
+        yield supplements.coverage.seen.tolist(), SEEN
+        yield supplements.coverage.unseen.tolist(), UNSEEN
+
+
+def _draw_route(drawing: Drawing, mission: Mission, size: float) -> None:
+    space = drawing.modelspace()
+    look: dict[str, object] = {"layer": ROUTE}
+    for stop in mission.stops:
+        _polyline(space, stop.approach, size, look)
+    if mission.return_ is not None:
+        _polyline(space, mission.return_, size, {**look, **_dashes(drawing, size)})
+    mark = _start_block(drawing)
+    place = {"xscale": size, "yscale": size, "zscale": size, "rotation": math.degrees(mission.start.heading)}
+    space.add_blockref(mark, _at((mission.start.x, mission.start.y), size), dxfattribs={**look, **place})
+
+
+def _polyline(space: Modelspace, leg: Sequence[Point], size: float, look: dict[str, object]) -> None:
+    points = [_at(point, size) for point in leg]
+    if len(points) < 2:
+        return
+    if space.dxfversion == "AC1009":  # R12 knows no LWPOLYLINE
+        space.add_polyline2d(points, dxfattribs=look)
+    else:
+        space.add_lwpolyline(points, dxfattribs=look)
+
+
+def _dashes(drawing: Drawing, size: float) -> dict[str, object]:
+    """A line type of 30 cm dashes, whatever the drawing's scale of line types."""
+    name = _free("SCAN_BACK", drawing.linetypes)
+    drawing.linetypes.add(name, [0.45 * size, 0.3 * size, -0.15 * size])
+    scale = drawing.header.get("$LTSCALE", 1.0)
+    return {"linetype": name, "ltscale": 1.0 / scale if scale > 0 else 1.0}
+
+
+def _start_block(drawing: Drawing) -> str:
+    """A ring around the first place with an arrowhead where the robot faces, in metres."""
+    name = _free("SCAN_START", drawing.blocks)
+    block = drawing.blocks.new(name)
+    block.add_circle((0, 0), 1.5 * DISC, dxfattribs=_BLOCK)
+    block.add_solid(_arrowhead(1.5 * DISC), dxfattribs=_BLOCK)
+    return name
+
+
+def _draw_stops(drawing: Drawing, mission: Mission, size: float) -> None:
+    block = _stop_block(drawing)
+    for number, stop in enumerate(mission.stops, 1):
+        place = {"xscale": size, "yscale": size, "zscale": size, "rotation": math.degrees(stop.heading)}
+        insert = drawing.modelspace().add_blockref(
+            block, _at((stop.x, stop.y), size), dxfattribs={"layer": STOPS, **place}
+        )
+        _label(insert, number, stop, size)
+
+
+def _stop_block(drawing: Drawing) -> str:
+    """A disc with an arrow along +x, in metres; on layer 0 with the colour of the block's place."""
+    name = _free("SCAN_STOP", drawing.blocks)
+    block = drawing.blocks.new(name)
+    block.add_circle((0, 0), DISC, dxfattribs=_BLOCK)
+    block.add_line((DISC, 0), (1.8 * DISC, 0), dxfattribs=_BLOCK)
+    block.add_solid(_arrowhead(1.8 * DISC), dxfattribs=_BLOCK)
+    for tag, prompt in _PROMPTS.items():
+        hidden = {} if tag in _SHOWN else {"flags": 1}
+        block.add_attdef(tag, (0, 0), height=TEXT, dxfattribs={"prompt": prompt, **hidden})
+    return name
+
+
+_BLOCK: dict[str, object] = {"layer": "0", "color": 0}
+_SHOWN = ("NUMBER", "ID")
+_PROMPTS = {
+    "NUMBER": "place in the order of driving",
+    "ID": "stop's id",
+    "X_M": "x in metres",
+    "Y_M": "y in metres",
+    "HEADING_DEG": "degrees counter-clockwise from +x",
+    "DOORWAY": "whether it stands in a doorway",
+    "PROFILE": "scanner's profile",
+    "SCAN_S": "scan's duration in seconds",
+}
+
+
+def _label(insert: Insert, number: int, stop: Stop, size: float) -> None:
+    """Attributes upright, whichever way the block is turned; the id below the disc."""
+    from ezdxf.enums import TextEntityAlignment as Align
+
+    values = {
+        **{"NUMBER": str(number), "ID": printable(stop.id), "X_M": f"{stop.x:.3f}", "Y_M": f"{stop.y:.3f}"},
+        **{"HEADING_DEG": f"{math.degrees(stop.heading):.1f}", "DOORWAY": "yes" if stop.doorway else "no"},
+        **{"PROFILE": printable(stop.scan.profile), "SCAN_S": f"{stop.scan.duration_s:g}"},
+    }
+    below = _at((stop.x, stop.y - DISC - TEXT), size)
+    for tag, value in values.items():
+        height = TEXT * size * (0.6 if tag == "ID" else 1.0)
+        place = below if tag == "ID" else insert.dxf.insert
+        attribute = insert.add_attrib(tag, value, place, dxfattribs={"layer": STOPS, "height": height})
+        attribute.set_placement(place, align=Align.MIDDLE_CENTER)
+        attribute.is_invisible = tag not in _SHOWN
+
+
+def _arrowhead(at: float) -> list[Point]:
+    """A triangle along +x whose base stands at x = `at`; a SOLID repeats its last corner."""
+    tip = (at + 0.15, 0.0)
+    return [(at, 0.09), (at, -0.09), tip, tip]
+
+
+def _at(point: Sequence[float], size: float) -> Point:
+    return (point[0] * size, point[1] * size)
+
+
+def _free(name: str, table: object) -> str:
+    """A name that the drawing's table does not hold."""
+    number = 1
+    while (found := name if number == 1 else f"{name}_{number}") in table:  # type: ignore[operator]
+        number += 1
+    return found
+
+
+def _encoded(drawing: Drawing) -> bytes:
+    """The drawing as text in its own encoding; letters that has not are escaped as DXF does."""
+    buffer = io.BytesIO()
+    stream = io.TextIOWrapper(buffer, encoding=drawing.output_encoding, errors="dxfreplace", newline="\r\n")
+    drawing.write(stream)
+    stream.flush()
+    return buffer.getvalue()
+
+
+def _decoded(data: bytes) -> Drawing:
+    import ezdxf
+    from ezdxf.filemanagement import dxf_stream_info
+
+    encoding = dxf_stream_info(io.StringIO(data.decode("utf-8", errors="ignore"))).encoding
+    return ezdxf.read(io.StringIO(data.decode(encoding, errors="surrogateescape"), newline=None))
+
+
+def _amiss(drawing: Drawing) -> int:
+    auditor = drawing.audit()
+    return len(auditor.errors) + len(auditor.fixes)

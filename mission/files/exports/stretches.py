@@ -1,0 +1,98 @@
+"""Reads coverage.json as stretches of boundary: those that the mission's stops see, and the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from mission.document import Mission
+from mission.errors import InputError
+from mission.geometry import FloatArray, frozen
+
+Fraction = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Stretches:
+    """Straight pieces of the targets' boundary (n, 2, 2) in the site's metres."""
+
+    seen: FloatArray
+    unseen: FloatArray
+
+
+class _Segment(msgspec.Struct):
+    a: tuple[float, float]
+    b: tuple[float, float]
+    seen: tuple[Fraction, ...]
+
+
+class _Element(msgspec.Struct):
+    segments: tuple[_Segment, ...]
+
+
+class _Of(msgspec.Struct):
+    id: str
+    digest: str
+
+
+class _Coverage(msgspec.Struct):
+    schema: Literal["stopgo/coverage"]
+    version: Literal[1]
+    mission: _Of
+    elements: tuple[_Element, ...]
+
+
+def read_stretches(path: Path, mission: Mission) -> Stretches:
+    """The stretches in the coverage.json of `mission`.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, or tells the coverage of another mission.
+    """
+    try:
+        coverage = msgspec.json.decode(path.read_bytes(), type=_Coverage)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give a coverage.json") from None
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: not a coverage.json of this version ({error}); plan again") from None
+    _check_mission(coverage.mission, mission, path)
+    segments = [segment for element in coverage.elements for segment in element.segments]
+    seen = [piece for segment in segments for piece in _pieces(segment, segment.seen)]
+    unseen = [piece for segment in segments for piece in _pieces(segment, _between(segment.seen))]
+    return Stretches(*(frozen(pieces).reshape(-1, 2, 2) for pieces in (seen, unseen)))
+
+
+def _check_mission(of: _Of, mission: Mission, path: Path) -> None:
+    if of.id != mission.id:
+        raise InputError(
+            f"{path}: is the coverage of mission {of.id}, not of {mission.id}; "
+            "give the file that was written with the mission"
+        )
+    if of.digest != mission.digest:
+        raise InputError(
+            f"{path}: is the coverage of another revision (digest {of.digest[:12]}…, the mission has "
+            f"{mission.digest[:12]}…); give the file that was written with the mission"
+        )
+
+
+def _between(seen: tuple[Fraction, ...]) -> Iterator[Fraction]:
+    """What of 0 to 1 lies in none of the fractions, which are in order."""
+    begin = 0.0
+    for first, last in seen:
+        if first > begin:
+            yield begin, first
+        begin = max(begin, last)
+    if begin < 1.0:
+        yield begin, 1.0
+
+
+def _pieces(segment: _Segment, fractions: Iterator[Fraction] | tuple[Fraction, ...]) -> Iterator[FloatArray]:
+    a, b = np.array(segment.a), np.array(segment.b)
+    for first, last in fractions:
+        yield np.stack([a + first * (b - a), a + last * (b - a)])

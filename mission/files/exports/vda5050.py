@@ -1,0 +1,119 @@
+"""Writes the mission as an order of VDA 5050, version 2.1: what a fleet's master control sends to a vehicle.
+
+Every pose of the way is a node and every straight piece between two an edge, so that a vehicle drives the
+mission's legs and no others. A scan is an action at the stop's node.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import msgspec
+
+from mission.document import Mission, Point, Stop
+from mission.files.exports.format import Supplements
+from mission.files.exports.nav2_yaml import unmapped
+from mission.files.exports.way import SAME, Waypoint, frame_name, mapped, turned_back, way
+
+VERSION = "2.1.0"
+UNNAMED = "unknown"
+"""Manufacturer and serial number: the sender knows the vehicle, the mission does not."""
+
+
+def write(mission: Mission, supplements: Supplements) -> bytes:
+    """The order; master control sets headerId, timestamp, manufacturer and serialNumber when it sends it."""
+    poses = way(mapped(mission))
+    nodes = [
+        _node(waypoint, name, 2 * number, mission)
+        for number, (waypoint, name) in enumerate(zip(poses, _names(poses), strict=True))
+    ]
+    edges = [_edge(one, other, mission) for one, other in pairwise(nodes)]
+    order = {
+        "headerId": 0,
+        "timestamp": supplements.written.strftime("%Y-%m-%dT%H:%M:%S.000Z"),
+        **{"version": VERSION, "manufacturer": UNNAMED, "serialNumber": UNNAMED},
+        **{"orderId": f"{mission.id}-{mission.revision}", "orderUpdateId": 0},
+        **{"nodes": nodes, "edges": edges},
+    }
+    return msgspec.json.format(msgspec.json.encode(order), indent=2) + b"\n"
+
+
+def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
+    """The places of the nodes that have an action, back on the site."""
+    nodes = msgspec.json.decode(data)["nodes"]
+    places = [node["nodePosition"] for node in nodes if node["actions"]]
+    to_map = mission.frame.to_map or SAME
+    return [turned_back(to_map, (place["x"], place["y"])) for place in places]
+
+
+def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
+    """What the sender has to fill in."""
+    header = "manufacturer and serialNumber are 'unknown': master control names the vehicle when it sends"
+    return (header, *unmapped(mission))
+
+
+def _names(poses: Sequence[Waypoint]) -> list[str]:
+    """A node id each: the stop's, else one that no stop has."""
+    taken = {waypoint.stop.id for waypoint in poses if waypoint.stop is not None}
+    names = []
+    for number, waypoint in enumerate(poses):
+        name = f"via-{number}" if waypoint.stop is None else waypoint.stop.id
+        while waypoint.stop is None and name in taken:
+            name += "_"
+        names.append(name)
+    return names
+
+
+def _node(waypoint: Waypoint, name: str, sequence: int, mission: Mission) -> dict[str, Any]:
+    stop = waypoint.stop
+    return {
+        "nodeId": name,
+        "sequenceId": sequence,
+        "nodeDescription": "passed on the way" if stop is None else "scan stop",
+        "released": True,
+        "nodePosition": {
+            **{"x": round(waypoint.x, 6), "y": round(waypoint.y, 6)},
+            **({} if stop is None else _arrival(waypoint, stop, mission)),
+            "mapId": frame_name(mission),
+        },
+        "actions": [] if stop is None else [_scan(stop)],
+    }
+
+
+def _arrival(waypoint: Waypoint, stop: Stop, mission: Mission) -> dict[str, float]:
+    """How exactly a vehicle must stand at a stop; one that scans all round may face anywhere."""
+    arrival = {"theta": waypoint.heading, "allowedDeviationXY": stop.tolerance_m}
+    if mission.scanner.fov_deg == 360.0:
+        arrival["allowedDeviationTheta"] = math.pi
+    return arrival
+
+
+def _scan(stop: Stop) -> dict[str, Any]:
+    """A vehicle must know this action; HARD: neither driving nor another action meanwhile."""
+    parameters = {
+        **{"stop": stop.id, "profile": stop.scan.profile, "settle": stop.settle_s},
+        **{"duration": stop.scan.duration_s, "timeout": stop.scan.timeout_s},
+    }
+    return {
+        "actionType": "scan",
+        "actionId": f"scan-{stop.id}",
+        "actionDescription": "settle, then scan; times in seconds",
+        "blockingType": "HARD",
+        "actionParameters": [{"key": key, "value": value} for key, value in parameters.items()],
+    }
+
+
+def _edge(one: dict[str, Any], other: dict[str, Any], mission: Mission) -> dict[str, Any]:
+    begin, end = (node["nodePosition"] for node in (one, other))
+    return {
+        "edgeId": f"edge-{one['sequenceId'] + 1}",
+        "sequenceId": one["sequenceId"] + 1,
+        "released": True,
+        **{"startNodeId": one["nodeId"], "endNodeId": other["nodeId"]},
+        "maxSpeed": mission.robot.speed,
+        "length": round(math.dist((begin["x"], begin["y"]), (end["x"], end["y"])), 6),
+        "actions": [],
+    }

@@ -1,0 +1,109 @@
+"""The way of a mission as poses one after another: the start, corners, stops, and the way back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import msgspec
+
+from mission.document import Frame, Mission, Point, Stop, Transform
+
+SAME = Transform(x=0.0, y=0.0, heading=0.0)
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """A pose on the way: a stop, or a place that is passed (`stop` is None)."""
+
+    x: float
+    y: float
+    heading: float
+    """At a stop its heading, elsewhere the direction in which the robot drives on; radians within ±π."""
+    leg: str
+    """Id of the stop that the leg leads to, or `return`."""
+    stop: Stop | None = None
+
+    @property
+    def xy(self) -> Point:
+        return (self.x, self.y)
+
+
+def way(mission: Mission) -> tuple[Waypoint, ...]:
+    """Every pose of the way in the order of driving; the start is left out where it is the first stop."""
+    poses: list[Waypoint] = []
+    for number, stop in enumerate(mission.stops):
+        leg = _distinct(stop.approach)
+        poses += _passed(leg if number == 0 else leg[1:], leg=stop.id)
+        poses.append(Waypoint(stop.x, stop.y, math.remainder(stop.heading, math.tau), leg=stop.id, stop=stop))
+    back = _distinct(mission.return_ or ())
+    if len(back) > 1:
+        end = math.atan2(back[-1][1] - back[-2][1], back[-1][0] - back[-2][0])
+        poses += _passed(back[1:], leg="return")
+        poses.append(Waypoint(*back[-1], end, leg="return"))
+    return tuple(poses)
+
+
+def _distinct(leg: Sequence[Point]) -> list[Point]:
+    """A polyline without points that stand on the one before."""
+    return [point for number, point in enumerate(leg) if number == 0 or point != leg[number - 1]]
+
+
+def _passed(points: Sequence[Point], *, leg: str) -> Iterator[Waypoint]:
+    """All points of a polyline but its last."""
+    for (x, y), (x1, y1) in pairwise(points):
+        yield Waypoint(x, y, math.atan2(y1 - y, x1 - x), leg=leg)
+
+
+def frame_name(mission: Mission) -> str:
+    """The frame of `mapped`: the robot's map where the mission says how to get there, else the site's."""
+    return mission.frame.name if mission.frame.to_map is None else "map"
+
+
+def mapped(mission: Mission) -> Mission:
+    """The mission with all its places on the robot's map (`frame.to_map` applied)."""
+    to_map = mission.frame.to_map
+    if to_map is None:
+        return mission
+    x, y = turned(to_map, (mission.start.x, mission.start.y))
+    start = msgspec.structs.replace(
+        mission.start, x=x, y=y, heading=_turned_heading(to_map, mission.start.heading)
+    )
+    return msgspec.structs.replace(
+        mission,
+        frame=Frame(name="map"),
+        start=start,
+        stops=tuple(_turned_stop(to_map, stop) for stop in mission.stops),
+        return_=None if mission.return_ is None else _turned_leg(to_map, mission.return_),
+    )
+
+
+def turned(to_map: Transform, point: Point) -> Point:
+    """A point of the site on the map."""
+    cos, sin = math.cos(to_map.heading), math.sin(to_map.heading)
+    return (to_map.x + cos * point[0] - sin * point[1], to_map.y + sin * point[0] + cos * point[1])
+
+
+def turned_back(to_map: Transform, point: Point) -> Point:
+    """A point of the map on the site: the inverse of `turned`."""
+    cos, sin = math.cos(to_map.heading), math.sin(to_map.heading)
+    x, y = point[0] - to_map.x, point[1] - to_map.y
+    return (cos * x + sin * y, cos * y - sin * x)
+
+
+def _turned_stop(to_map: Transform, stop: Stop) -> Stop:
+    x, y = turned(to_map, (stop.x, stop.y))
+    heading = _turned_heading(to_map, stop.heading)
+    return msgspec.structs.replace(
+        stop, x=x, y=y, heading=heading, approach=_turned_leg(to_map, stop.approach)
+    )
+
+
+def _turned_leg(to_map: Transform, leg: Sequence[Point]) -> tuple[Point, ...]:
+    return tuple(turned(to_map, point) for point in leg)
+
+
+def _turned_heading(to_map: Transform, heading: float) -> float:
+    return math.remainder(heading + to_map.heading, math.tau)

@@ -1,0 +1,69 @@
+"""Reads missions from the formats of others: one module per format, one line in `READERS`."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from mission.document import Mission, SiteOrigin
+from mission.errors import InputError
+from mission.files.imports import qgc_plan, qgc_waypoints, stops_csv
+from mission.files.imports.assembling import mission_of
+from mission.files.imports.track import Given, Reader, Track
+from mission.settings import Settings
+
+READERS: dict[str, Reader] = {
+    "plan": qgc_plan.read,
+    "waypoints": qgc_waypoints.read,
+    "csv": stops_csv.read,
+}
+"""Every format that is read, by its name, which `--from` takes and which is also its suffix."""
+
+LARGEST = 64_000_000
+"""Bytes; no mission is larger."""
+
+
+def read_mission(
+    path: Path, settings: Settings, *, kind: str | None = None, autopilot: str | None = None
+) -> tuple[Mission, Track]:
+    """The mission in a file of a format of `READERS`, and what was read.
+
+    Raises
+    ------
+    InputError
+        Naming the file, what is wrong in it or means nothing to a mission, and the way out.
+    """
+    reader = READERS[_kind(path, kind)]
+    data = _bytes_of(path)
+    track = reader(data, str(path), Given(_origin(settings), autopilot))
+    digest = hashlib.sha256(data).hexdigest()
+    return mission_of(track, settings, name=path.stem, file=path.name, digest=digest), track
+
+
+def _kind(path: Path, given: str | None) -> str:
+    known = ", ".join(f".{name}" for name in READERS)
+    if given is None and path.suffix.lower().removeprefix(".") not in READERS:
+        raise InputError(
+            f"{path}: files with this suffix are not read; known: {known} (or name one with --from)"
+        )
+    name = path.suffix.lower().removeprefix(".") if given is None else given
+    if name not in READERS:
+        raise InputError(f"--from {name}: no such format; known: {', '.join(READERS)}")
+    return name
+
+
+def _bytes_of(path: Path) -> bytes:
+    try:
+        if path.stat().st_size > LARGEST:
+            raise InputError(f"{path}: is larger than {LARGEST // 1_000_000} MB, which no mission is")
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{path}: cannot be read ({why}); give a file to import") from None
+
+
+def _origin(settings: Settings) -> SiteOrigin | None:
+    if settings.origin is None:
+        return None
+    lat, lon, alt, heading = settings.origin
+    return SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=heading)

@@ -1,0 +1,173 @@
+"""Track -> mission: what the file does not say comes from the settings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import msgspec
+
+from mission import __version__
+from mission.document import (
+    Frame,
+    Mission,
+    Origin,
+    Point,
+    Policy,
+    RobotSpec,
+    Scan,
+    ScannerSpec,
+    Sees,
+    SiteOrigin,
+    Start,
+    Stop,
+    mission_id,
+    sealed,
+)
+from mission.errors import InputError
+from mission.files.imports.track import Track, Visit
+from mission.sense import problems_of
+from mission.settings import Settings
+
+DECIMALS = 6
+"""Missions hold micrometres."""
+SCAN_TIMEOUT = 2.0
+SCAN_PATIENCE = 30.0
+"""A scan may take so many times as long as planned and at least so many seconds more, as in a plan."""
+
+
+def mission_of(track: Track, settings: Settings, *, name: str, file: str, digest: str) -> Mission:
+    """The mission of a track; legs are straight between the places that the file names.
+
+    Parameters
+    ----------
+    file, digest
+        Name of the imported file and the sha256 of its bytes.
+
+    Raises
+    ------
+    InputError
+        When it makes no sense, such as two stops with one id.
+    """
+    legs = list(_legs(track, settings))
+    start = _start(track, settings, legs[0], file)
+    mission = sealed(
+        Mission(
+            id=mission_id(digest, settings, __version__),
+            revision=1,
+            name=name,
+            digest="",
+            frame=Frame(name="site"),
+            georeference=_georeference(track, settings),
+            robot=_robot(track, settings),
+            scanner=ScannerSpec(profile=settings.profile, range=settings.range, fov_deg=settings.fov),
+            start=start,
+            stops=tuple(_stops(track.visits, legs, start.heading, settings)),
+            return_=tuple(_distinct([legs[-1][-1], *track.back])) if track.back else None,
+            policy=Policy(
+                link_loss=settings.link_loss,
+                link_loss_after_s=settings.link_loss_after,
+                battery_min=settings.battery_min,
+            ),
+            origin=_origin(settings, file, digest),
+        )
+    )
+    for problem in problems_of(mission):
+        raise InputError(f"{file}: the mission in it makes no sense: {problem}; correct the file")
+    return mission
+
+
+def _legs(track: Track, settings: Settings) -> Iterator[list[Point]]:
+    """The approach of each visit; the first begins at the start, where one is known."""
+    start = settings.start[:2] if settings.start is not None else track.start
+    before = [] if start is None else [start]
+    for visit in track.visits:
+        leg = _distinct([*before, *visit.via, visit.xy])
+        yield leg
+        before = [leg[-1]]
+
+
+def _distinct(leg: Sequence[Point]) -> list[Point]:
+    """Rounded to DECIMALS, without points that stand on the one before."""
+    points = [(_rounded(x), _rounded(y)) for x, y in leg]
+    return [point for number, point in enumerate(points) if number == 0 or point != points[number - 1]]
+
+
+def _start(track: Track, settings: Settings, leg: Sequence[Point], file: str) -> Start:
+    x, y = leg[0]
+    if settings.start is not None:
+        heading = math.remainder(math.radians(settings.start[2]), math.tau)
+        return Start(x=x, y=y, heading=_rounded(heading), reason="given")
+    ahead = track.visits[0].heading or 0.0
+    return Start(x=x, y=y, heading=_rounded(_direction(leg[:2], ahead)), reason=f"the first place in {file}")
+
+
+def _direction(leg: Sequence[Point], otherwise: float) -> float:
+    """The direction of a polyline's last piece."""
+    if len(leg) < 2:
+        return otherwise
+    (x0, y0), (x1, y1) = leg[-2:]
+    return math.atan2(y1 - y0, x1 - x0)
+
+
+def _stops(
+    visits: Sequence[Visit], legs: Sequence[list[Point]], heading: float, settings: Settings
+) -> Iterator[Stop]:
+    """A stop whose heading is not known faces as the robot arrives."""
+    width = max(2, len(str(len(visits))))
+    for number, (visit, leg) in enumerate(zip(visits, legs, strict=True), 1):
+        heading = _direction(leg, heading) if visit.heading is None else visit.heading
+        yield _stop(visit, visit.id or f"s{number:0{width}d}", leg, _rounded(heading), settings)
+
+
+def _stop(visit: Visit, name: str, leg: list[Point], heading: float, settings: Settings) -> Stop:
+    return Stop(
+        id=name,
+        x=leg[-1][0],
+        y=leg[-1][1],
+        heading=heading,
+        doorway=visit.doorway,
+        tolerance_m=_or(visit.tolerance_m, settings.tolerance),
+        settle_s=_or(visit.settle_s, settings.settle),
+        scan=_scan(visit, settings),
+        on_failure=visit.on_failure or settings.on_failure,
+        retries=settings.retries if visit.retries is None else visit.retries,
+        approach=tuple(leg),
+        sees=Sees(units=0, new_units=0),
+    )
+
+
+def _scan(visit: Visit, settings: Settings) -> Scan:
+    duration = _or(visit.scan_s, settings.scan_time)
+    timeout = _or(visit.timeout_s, max(SCAN_TIMEOUT * duration, duration + SCAN_PATIENCE))
+    return Scan(profile=visit.profile or settings.profile, duration_s=duration, timeout_s=timeout)
+
+
+def _georeference(track: Track, settings: Settings) -> SiteOrigin | None:
+    if settings.origin is None:
+        return track.origin
+    lat, lon, alt, heading = settings.origin
+    return SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=heading)
+
+
+def _robot(track: Track, settings: Settings) -> RobotSpec:
+    return RobotSpec(
+        radius=settings.radius,
+        speed=_or(track.speed, settings.speed),
+        turn_rate=_rounded(math.radians(settings.turn_rate)),
+        acceleration=settings.acceleration,
+    )
+
+
+def _origin(settings: Settings, file: str, digest: str) -> Origin:
+    parameters = msgspec.json.decode(msgspec.json.encode(settings))
+    return Origin(floor=file, floor_digest=digest, parameters=parameters, stopgo=__version__)
+
+
+def _or(value: float | None, otherwise: float) -> float:
+    return otherwise if value is None else value
+
+
+def _rounded(value: float) -> float:
+    """Without float noise, and never minus zero."""
+    return round(value, DECIMALS) + 0.0
