@@ -48,7 +48,7 @@ def px4_keeps(item: Item) -> Item:
         return item
     hold, radius, _, yaw = item.params
     frame = _PX4_FRAMES.get(item.frame, item.frame)
-    return replace(item, frame=frame, params=(hold, radius, 0.0, float32(yaw % 360.0)))
+    return replace(item, frame=frame, params=(hold, radius, 0.0, float32(yaw % 360.0) % 360.0))
 
 
 def float32(value: float) -> float:

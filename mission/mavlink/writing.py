@@ -52,7 +52,7 @@ def script_message(stop: Stop, number: int) -> Item:
 
 def script_time(stop: Stop, number: int) -> Item:
     """Command, timeout in whole seconds; the stop's number in x, which float16 would not hold exactly."""
-    timeout = math.ceil(stop.scan.timeout_s)
+    timeout = max(1, math.ceil(stop.scan.timeout_s))  # 0 would wait for ever
     params = (float(SCRIPT_COMMAND), float(timeout), 0.0, 0.0)
     return Item(Command.NAV_SCRIPT_TIME, Frame.MISSION, params=params, x=number)
 
