@@ -75,21 +75,23 @@ def slow_push(station: Station) -> None:
     mission = corridor(stops=STOPS_OF_10_MB, revision=2)
     size = len(msgspec.json.encode(mission))
     latencies: list[float] = []
-    pushed = threading.Event()
+    reading: list[float] = []
+    sent, pushed = threading.Event(), threading.Event()
 
     def ask_now_and_then() -> None:
-        while not pushed.wait(0.2):
-            latencies.append(timed(station.info))
+        while not pushed.wait(0.05):
+            (reading if sent.is_set() else latencies).append(timed(station.info))
 
     asking = threading.Thread(target=ask_now_and_then)
     asking.start()
     began = time.monotonic()
-    station.push(mission)
+    station.push(mission, progress=lambda held, size: sent.set() if held == size else None)
     seconds = time.monotonic() - began
     pushed.set()
     asking.join()
     print(f"push of {size / 1e6:.1f} MB at 8 Mbit/s: {seconds:.1f} s; the line alone {size * 8 / 8e6:.1f} s")
     tell("info meanwhile", latencies)
+    tell("info while the robot reads the document", reading)
 
 
 def at_rest(pid: int, seconds: float = 10.0) -> None:

@@ -10,9 +10,6 @@ from typing import Any
 
 from bridge.protocol import Keys
 
-ADVANCED = "@adv/**"
-"""Below a publication's key: how late listeners get what was sent before."""
-
 
 def access_control(keys: Keys) -> dict[str, Any]:
     """zenoh's `access_control` for one robot: default deny, viewers watch, stations command as well.
@@ -34,13 +31,13 @@ def access_control(keys: Keys) -> dict[str, Any]:
 
 def _watching(keys: Keys) -> list[dict[str, Any]]:
     every = Keys("*", keys.site)
-    asked = [every.info, keys.log, keys.mission("*", "part/*"), f"{keys.root}/tel/*/{ADVANCED}"]
-    told = [f"{keys.root}/tel/*", f"{keys.root}/tel/*/{ADVANCED}"]
-    tokens = [every.alive, f"{keys.root}/tel/*/{ADVANCED}"]
+    asked = [every.info, keys.log, keys.poses, keys.mission("*", "part/*")]
+    told = [f"{keys.root}/tel/*"]
+    tokens = [every.alive]
     watchers = [keys.watcher("*")]
     return [
         _rule("watch_ask", ["query"], "ingress", asked),
-        _rule("watch_answer", ["reply", "declare_queryable"], "egress", [*asked, f"{keys.root}/tel/*"]),
+        _rule("watch_answer", ["reply", "declare_queryable"], "egress", asked),
         _rule("watch_told", ["put"], "egress", told),
         _rule("watch_listen", ["declare_subscriber"], "ingress", told),
         _rule("watch_alive", ["liveliness_token"], "egress", tokens),

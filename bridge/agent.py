@@ -7,9 +7,11 @@ least every second, its pose many times a second, and every event as soon as the
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
+from itertools import islice
 from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
@@ -24,6 +26,7 @@ from bridge.protocol import (
     CHUNK_BYTES,
     LOG_PAGE,
     MAX_DOCUMENT_BYTES,
+    POSE_PAGE,
     VERSION,
     Command,
     Commit,
@@ -32,6 +35,7 @@ from bridge.protocol import (
     LogPage,
     Malformed,
     Message,
+    PosePage,
     Rejected,
     count_of,
     decode,
@@ -50,7 +54,7 @@ POSE_EVERY_S = 0.05
 LEAST_POSE_PAUSE_S = 0.02
 """However fast the simulated clock runs, poses go out at most fifty times a second."""
 POSES_KEPT = 3000
-EVENTS_KEPT = 1000
+"""For stations that come late or were cut off."""
 
 
 Order = TypeVar("Order", Command, Commit)
@@ -107,6 +111,7 @@ class Agent:
         self._error: Exception | None = None
         self._threads: list[threading.Thread] = []
         self._watchers: set[str] = set()
+        self._poses: deque[PoseReport] = deque(maxlen=POSES_KEPT)
         self._heard_ns = command_clock.now_ns()
 
     def serve(self) -> None:
@@ -114,7 +119,8 @@ class Agent:
         keys, link = self._keys, self._link
         link.serve(keys.info, self._info)
         link.serve(keys.log, self._log)
-        link.serve(keys.mission("*", "**"), self._mission)
+        link.serve(keys.poses, self._past_poses, bulk=True)
+        link.serve(keys.mission("*", "**"), self._mission, bulk=True)
         link.serve(keys.command("*"), self._command)
         link.watch_presence(keys.watcher("*"), self._watcher)
 
@@ -122,9 +128,9 @@ class Agent:
         """Answer, begin to work and to tell, and announce the robot."""
         self.serve()
         keys, link = self._keys, self._link
-        self._tell_state = link.publisher(keys.state, kept=1)
-        self._tell_event = link.publisher(keys.event, kept=EVENTS_KEPT)
-        self._tell_pose = link.publisher(keys.pose, kept=POSES_KEPT)
+        self._tell_state = link.publisher(keys.state)
+        self._tell_event = link.publisher(keys.event)
+        self._tell_pose = link.publisher(keys.pose, bulk=True)
         self._controller.changed = self._news.set
         for work in (self._controller.serve, self._tell_news, self._tell_poses):
             thread = threading.Thread(target=self._watched, args=(work,), name=work.__name__, daemon=True)
@@ -229,6 +235,17 @@ class Agent:
         events = self._journal.events(since=since, run_id=run_id, limit=LOG_PAGE)
         return encode(LogPage(events=events, newest=self._journal.newest))
 
+    def _past_poses(self, request: Request) -> bytes:
+        self._contact()
+        try:
+            since = count_of(request.parameters.get("since", "0"))
+        except ValueError as error:
+            return encode(Malformed(message=f"since: {error}"))
+        run_id = request.parameters.get("run")
+        # A copy: meanwhile the robot goes on writing.
+        later = (pose for pose in self._poses.copy() if pose.seq > since and run_id in (None, pose.run_id))
+        return encode(PosePage(boot_id=self._controller.boot_id, poses=tuple(islice(later, POSE_PAGE))))
+
     def _tell_news(self) -> None:
         """State on every change and every second; each event once, in order."""
         told = self._journal.newest
@@ -245,7 +262,9 @@ class Agent:
         seq = 0
         while not self._closing.wait(self._pose_pause_s):
             seq += 1
-            self._tell_pose(encode(self._pose_report(seq)))
+            report = self._pose_report(seq)
+            self._poses.append(report)
+            self._tell_pose(encode(report))
 
     def _pose_report(self, seq: int) -> PoseReport:
         run, now_ns = self._controller.run, self._clock.now_ns()

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,6 +34,11 @@ As = Annotated[
 Timeout = Annotated[
     float, typer.Option("--timeout", min=0.1, metavar="S", help="How long to wait, in seconds.")
 ]
+PushTimeout = Annotated[
+    float | None,
+    typer.Option("--timeout", min=0.1, metavar="S", help="How long to go on without an answer, in seconds; "
+                 "if not given, 5 to find the robot and 20 for each piece."),
+]  # fmt: skip
 Insecure = Annotated[
     bool, typer.Option("--insecure", help="Allow addresses beyond this machine without keys.")
 ]
@@ -43,6 +49,8 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on std
 TakeOver = Annotated[bool, typer.Option("--take-over", help="Command it though somebody else does.")]
 StopId = Annotated[str | None, typer.Option("--stop", metavar="ID", help="The stop that is meant.")]
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+LEAST_S = 0.5
+"""Left for a question or an order, however long it took to find the robot."""
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -122,7 +130,7 @@ def push(
     site: Site = None,
     who: As = None,
     take_over: TakeOver = False,
-    timeout: Timeout = 5.0,
+    timeout: PushTimeout = None,
     insecure: Insecure = False,
     keys: KeyFolder = None,
     json_: Json = False,
@@ -135,7 +143,7 @@ def push(
 
     document = read(mission)
     with (
-        reached(Way(robot, connect, site, who, timeout, insecure, keys)) as station,
+        reached(pushing(Way(robot, connect, site, who, 5.0, insecure, keys), timeout)) as station,
         Bar("pushing") as bar,
     ):
         told = turning(station.info().to_map, document)
@@ -183,7 +191,7 @@ def start(
 
     Example: stopgo start --robot r1 --connect tcp/127.0.0.1:7447
     """
-    with reached(Way(robot, connect, site, who, timeout, insecure, keys)) as station:
+    with in_time(Way(robot, connect, site, who, timeout, insecure, keys)) as station:
         answer = station.command("start", again=again, from_here=from_here, take_over=take_over)
     report_answer(answer, robot, json_)
 
@@ -216,7 +224,7 @@ def order_of(verb: Verb) -> Callable[..., None]:
         keys: KeyFolder = None,
         json_: Json = False,
     ) -> None:
-        with reached(Way(robot, connect, site, who, timeout, insecure, keys)) as station:
+        with in_time(Way(robot, connect, site, who, timeout, insecure, keys)) as station:
             answer = station.command(verb, stop=stop, take_over=take_over)
         report_answer(answer, robot, json_)
 
@@ -246,7 +254,7 @@ def status(
         reports = fleet(connect, site=site, timeout_s=timeout, insecure=insecure, keys=keys)
         as_json: dict[str, Any] = {"robots": [status_json(report) for report in reports]}
     else:
-        with reached(Way(robot, connect, site, None, timeout, insecure, keys)) as station:
+        with in_time(Way(robot, connect, site, None, timeout, insecure, keys)) as station:
             reports = (station.status(),)
         as_json = status_json(reports[0])
     if json_:
@@ -305,14 +313,24 @@ def keys_issue(
     typer.echo(f"{files.folder}: keys of {role} {name} for {days} days; give it the folder as --keys")
 
 
-def keys_show(*, folder: SiteFolder, json_: Json = False) -> None:
+def keys_show(
+    site: Annotated[
+        Path | None, typer.Argument(metavar="DIR", help="The site's folder of keys.", show_default=False)
+    ] = None,
+    *,
+    folder: Annotated[Path | None, typer.Option("--in", metavar="DIR", help="The same.")] = None,
+    json_: Json = False,
+) -> None:
     """List who holds keys, and until when.
 
-    Example: stopgo keys show --in site-keys
+    Example: stopgo keys show site-keys
     """
     from bridge.keys import holders, now_utc
 
-    found = holders(folder)
+    given = [path for path in (site, folder) if path is not None]
+    if len(given) != 1:
+        raise InputError("keys show: name the site's folder of keys once, as in: stopgo keys show site-keys")
+    found = holders(given[0])
     if json_:
         keys = [{"role": who.role, "name": who.name, "not_after": who.not_after.isoformat()} for who in found]
         print_json({"keys": keys})
@@ -387,15 +405,31 @@ class Way:
     timeout_s: float
     insecure: bool
     keys: Path | None
+    patience_s: float = 20.0
+    """For each piece of a mission that is pushed."""
+
+
+def pushing(way: Way, timeout_s: float | None) -> Way:
+    """The way for a push, which takes as long as it takes: its timeout is that without an answer."""
+    return way if timeout_s is None else replace(way, timeout_s=timeout_s, patience_s=timeout_s)
 
 
 def reached(way: Way) -> AbstractContextManager[Station]:
     from bridge.station import connect
 
     return connect(
-        way.endpoint, robot=way.robot, site=way.site, commander=way.who,
-        timeout_s=way.timeout_s, insecure=way.insecure, keys=way.keys,
+        way.endpoint, robot=way.robot, site=way.site, commander=way.who, timeout_s=way.timeout_s,
+        patience_s=way.patience_s, insecure=way.insecure, keys=way.keys,
     )  # fmt: skip
+
+
+@contextmanager
+def in_time(way: Way) -> Iterator[Station]:
+    """A robot that has been reached, with what is left of the time for one question or order."""
+    began = time.monotonic()
+    with reached(way) as station:
+        station.timeout_s = max(LEAST_S, way.timeout_s - (time.monotonic() - began))
+        yield station
 
 
 def report_answer(answer: Answer, robot: str, json_: bool) -> None:

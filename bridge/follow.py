@@ -12,13 +12,14 @@ from typing import Any
 import msgspec
 
 from bridge.link import Link
-from bridge.protocol import Info, Keys, LogPage, decode
+from bridge.protocol import POSE_PAGE, Info, Keys, LogPage, PosePage, decode
 from mission.events import Aborted, AnyEvent, Finished, PoseReport, StateReport
 
 SILENCE_S = 1.0
 """After this long without a word the robot is asked."""
 ASK_S = 1.0
-POSES_LATE = 3000
+PAGE_S = 5.0
+"""How long a page of events or poses is waited for: on a slow line it takes a second."""
 LAST_POSES_S = 1.0
 """How long to wait, after the end, for poses that are still on their way."""
 
@@ -40,17 +41,66 @@ def reports(link: Link, keys: Keys) -> Iterator[Report]:
     follower = Follower(link, keys)
     last = time.monotonic()
     while not follower.ended:
-        try:
-            item: Heard | None = heard.get(timeout=SILENCE_S)
+        item = _next(heard, 0.0 if follower.path.behind else SILENCE_S)
+        if item is not None:
             last = time.monotonic()
-        except queue.Empty:
-            item = None
-        if item is None:
+        elif follower.path.behind:
+            yield from follower.path.catch_up()
+        if item is None and time.monotonic() - last >= SILENCE_S:
             yield Silence(seconds=time.monotonic() - last)
             item = _asked_state(link, keys)
         if item is not None:
             yield from follower.take(item)
     yield from _late_poses(heard, follower)
+
+
+class Path:
+    """Which poses of a run have been told; those that were missed are asked for, page by page."""
+
+    def __init__(self, link: Link, keys: Keys) -> None:
+        self._link = link
+        self._keys = keys
+        self._newest = 0
+        self.run_id: str | None = None
+        self.boot_id: str | None = None
+        self.told = 0
+
+    @property
+    def behind(self) -> bool:
+        """Whether there are poses of the run that have not been told."""
+        return self.run_id is not None and self._newest > self.told
+
+    def take(self, pose: PoseReport) -> Iterator[PoseReport]:
+        """Tell a pose if it is the next one; else it will be asked for with the others."""
+        if pose.run_id != self.run_id or self.run_id is None:
+            return
+        self._booted(pose.boot_id)
+        self._newest = pose.seq
+        if pose.seq == self.told + 1:
+            self.told = pose.seq
+            yield pose
+
+    def catch_up(self) -> Iterator[PoseReport]:
+        """A page of what was missed."""
+        page = self._page()
+        if page is None:
+            return
+        self._booted(page.boot_id)
+        for pose in page.poses:
+            self.told = pose.seq
+            yield pose
+        if len(page.poses) < POSE_PAGE:
+            self.told = max(self.told, self._newest)
+
+    def _booted(self, boot_id: str) -> None:
+        """Each boot counts its poses anew."""
+        if boot_id != self.boot_id:
+            self.boot_id, self.told, self._newest = boot_id, 0, 0
+
+    def _page(self) -> PosePage | None:
+        parameters = {"since": str(self.told)} | ({"run": self.run_id} if self.run_id else {})
+        reply = self._link.ask(self._keys.poses, timeout_s=PAGE_S, parameters=parameters)
+        return None if reply is None else decode(reply, PosePage)
 
 
 class Follower:
@@ -59,7 +109,7 @@ class Follower:
     def __init__(self, link: Link, keys: Keys) -> None:
         self._link = link
         self._keys = keys
-        self._waiting: list[PoseReport] = []
+        self.path = Path(link, keys)
         self.run_id: str | None = None
         self.told = -1
         self.end: Finished | Aborted | None = None
@@ -79,8 +129,7 @@ class Follower:
                 self.last_state = item
                 yield item
         elif isinstance(item, PoseReport):
-            if self.run_id is not None and item.run_id == self.run_id:
-                yield item
+            yield from self.path.take(item)
         elif self.run_id is not None:
             yield from self._missed(item.number)
 
@@ -90,11 +139,12 @@ class Follower:
             self.told = state.last_event
         if self.run_id is None and state.run_id is not None:
             self.run_id, self.told = state.run_id, 0
+            self.path.run_id = state.run_id
 
     def _missed(self, newest: int) -> Iterator[AnyEvent]:
         """Events up to `newest` that have not been told, read from the journal."""
         while self.run_id is not None and self.told < newest and self.end is None:
-            page = log_page(self._link, self._keys, since=self.told, run_id=self.run_id, timeout_s=ASK_S)
+            page = log_page(self._link, self._keys, since=self.told, run_id=self.run_id, timeout_s=PAGE_S)
             if page is None:
                 return
             for event in page.events:
@@ -117,12 +167,19 @@ def _listen(link: Link, keys: Keys) -> queue.SimpleQueue[Heard]:
     """A queue that fills with what the robot tells; listening comes before asking, so no gap is left."""
     heard: queue.SimpleQueue[Heard] = queue.SimpleQueue()
     link.hear(keys.event, lambda key, payload: _put(heard, payload, AnyEvent))
-    link.hear(keys.pose, lambda key, payload: _put(heard, payload, PoseReport), late=POSES_LATE)
+    link.hear(keys.pose, lambda key, payload: _put(heard, payload, PoseReport))
     link.hear(keys.state, lambda key, payload: _put(heard, payload, StateReport))
     state = _asked_state(link, keys)
     if state is not None:
         heard.put(state)
     return heard
+
+
+def _next(heard: queue.SimpleQueue[Heard], wait_s: float) -> Heard | None:
+    try:
+        return heard.get(timeout=wait_s) if wait_s else heard.get_nowait()
+    except queue.Empty:
+        return None
 
 
 def _put(heard: queue.SimpleQueue[Heard], payload: bytes, kind: Any) -> None:
@@ -137,15 +194,13 @@ def _asked_state(link: Link, keys: Keys) -> StateReport | None:
 
 
 def _late_poses(heard: queue.SimpleQueue[Heard], follower: Follower) -> Iterator[Heard]:
-    """Poses of the run that are still on their way; poses come in order, so a later one ends them."""
-    deadline = time.monotonic() + LAST_POSES_S
+    """Poses of the run that have not come yet, up to the first after its end."""
     end_ns = follower.end.robot_ns if follower.end else 0
+    deadline = time.monotonic() + LAST_POSES_S
     while (left := deadline - time.monotonic()) > 0:
-        try:
-            item = heard.get(timeout=left)
-        except queue.Empty:
-            return
-        if isinstance(item, PoseReport) and item.run_id == follower.run_id:
-            yield item
-            if item.robot_ns > end_ns:
+        for pose in follower.path.catch_up():
+            yield pose
+            if pose.robot_ns > end_ns:
                 return
+            deadline = time.monotonic() + LAST_POSES_S
+        _next(heard, left)

@@ -29,11 +29,14 @@ Presence = Callable[[str, bool], None]
 class Link(Protocol):
     """What both ends need of a transport. Callbacks come from the link's own threads."""
 
-    def serve(self, key: str, answer: Answering) -> None:
-        """Answer every question on `key` (which may hold wildcards), one at a time."""
+    def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
+        """Answer every question on `key` (which may hold wildcards), one at a time.
 
-    def publisher(self, key: str, *, kept: int = 0) -> Publish:
-        """A function that sends on `key`; the last `kept` samples are given to those who come late."""
+        Answers that are `bulk` give way to others on a full line.
+        """
+
+    def publisher(self, key: str, *, bulk: bool = False) -> Publish:
+        """A function that sends on `key`; what is `bulk` may be left out on a full line."""
 
     def announce(self, key: str) -> None:
         """Show that this end is alive until the link is closed."""
@@ -53,8 +56,8 @@ class Link(Protocol):
     def ask_all(self, key: str, *, timeout_s: float) -> list[bytes]:
         """The answers of all who serve a key that `key` (with wildcards) includes."""
 
-    def hear(self, key: str, heard: Hearing, *, late: int = 0) -> None:
-        """Call `heard` with every sample on `key`, and with up to `late` that were sent before."""
+    def hear(self, key: str, heard: Hearing) -> None:
+        """Call `heard` with every sample on `key` from now on."""
 
     def watch_presence(self, key: str, changed: Presence) -> None:
         """Call `changed` with (key, alive) for every announcement on `key`, past ones included."""
@@ -70,7 +73,6 @@ class Switchboard:
         self.hearing: list[tuple[str, Hearing]] = []
         self.watching: list[tuple[str, Presence]] = []
         self.alive: set[str] = set()
-        self.kept: dict[str, list[bytes]] = {}
         self.cut = False
         """While true nothing passes."""
 
@@ -85,14 +87,11 @@ class MemoryLink:
         self._board = board
         self._announced: list[str] = []
 
-    def serve(self, key: str, answer: Answering) -> None:
+    def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
         self._board.serving[key] = answer
 
-    def publisher(self, key: str, *, kept: int = 0) -> Publish:
+    def publisher(self, key: str, *, bulk: bool = False) -> Publish:
         def publish(payload: bytes) -> None:
-            past = self._board.kept.setdefault(key, [])
-            past.append(payload)
-            del past[: max(0, len(past) - kept)]
             for pattern, heard in list(self._board.hearing):
                 if not self._board.cut and matches(pattern, key):
                     heard(key, payload)
@@ -127,11 +126,7 @@ class MemoryLink:
         serving = self._board.serving.items()
         return [answer(Request(served, b"")) for served, answer in serving if matches(key, served)]
 
-    def hear(self, key: str, heard: Hearing, *, late: int = 0) -> None:
-        for kept_key, past in self._board.kept.items():
-            if matches(key, kept_key):
-                for payload in past[-late:] if late else ():
-                    heard(kept_key, payload)
+    def hear(self, key: str, heard: Hearing) -> None:
         self._board.hearing.append((key, heard))
 
     def watch_presence(self, key: str, changed: Presence) -> None:

@@ -56,13 +56,15 @@ BULK_TRY_S = 6.0
 """The same for pieces of a document: asked again too early, they would fill a slow line with copies."""
 COMMIT_BYTES_PER_S = 1e6
 """How fast, at least, a robot reads and stores a document."""
+LEAST_S = 0.5
+"""Left for an order itself when finding the robot took nearly all its time."""
 PAUSE_S = 0.05
 """Between tries: a query just after a reconnect may come back empty at once."""
 GATHER_S = 0.3
 """Once one robot of a fleet has shown itself, the others get this long."""
 COMMIT_VALID_S = 60.0
-TRIES_S = 10.0
-"""How long the steps of a push are tried, each."""
+PATIENCE_S = 20.0
+"""How long a push goes on without an answer: on a line that loses much, the link may be opened anew."""
 
 Progress = Callable[[int, int], None]
 """Called with bytes held by the robot and bytes in all."""
@@ -76,6 +78,7 @@ def connect(
     site: str | None = None,
     commander: str | None = None,
     timeout_s: float = 5.0,
+    patience_s: float = PATIENCE_S,
     insecure: bool = False,
     keys: Path | None = None,
 ) -> Iterator[Station]:
@@ -94,8 +97,10 @@ def connect(
     who = commander or (held.holder.name if held else whoami())
     if held and who != held.holder.name:
         raise InputError(f"--as {who}: the keys in {keys} are those of {held.holder.name}")
-    with connecting(endpoint, Guard(held, insecure)) as link:
-        station = Station(link, Keys(robot, site), commander=who, timeout_s=timeout_s, held=held)
+    with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
+        station = Station(
+            link, Keys(robot, site), commander=who, timeout_s=timeout_s, patience_s=patience_s, held=held
+        )
         station.reach(endpoint)
         yield station
 
@@ -118,7 +123,7 @@ def fleet(
     from bridge.zenoh_link import Guard, connecting
 
     held = None if keys is None else read_keys(keys, now=now_utc())
-    with connecting(endpoint, Guard(held, insecure)) as link:
+    with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
         station = Station(link, Keys("*", site), commander=whoami(), timeout_s=timeout_s)
         station.reach(endpoint)
         time.sleep(GATHER_S)
@@ -141,6 +146,7 @@ class Station:
         *,
         commander: str,
         timeout_s: float = 5.0,
+        patience_s: float = PATIENCE_S,
         held: HeldKeys | None = None,
     ) -> None:
         self.link = link
@@ -148,6 +154,9 @@ class Station:
         self.keys = keys
         self.commander = commander
         self.timeout_s = timeout_s
+        """For a question or an order."""
+        self.patience_s = max(patience_s, timeout_s)
+        """For each piece of a mission."""
 
     def reach(self, endpoint: str) -> None:
         """Wait until the robot shows itself: a question sent before comes back empty at once."""
@@ -159,9 +168,10 @@ class Station:
                 f" (key {self.keys.alive}); nothing was sent. Is it running, under this name and site?"
             )
 
-    def info(self) -> Info:
+    def info(self, *, within_s: float | None = None) -> Info:
         """What the robot says of itself."""
-        info = self._answered(self._insist(self.keys.info, b"", self.timeout_s), Info, "info")
+        reply = self._insist(self.keys.info, b"", self.timeout_s if within_s is None else within_s)
+        info = self._answered(reply, Info, "info")
         if info.protocol != VERSION:
             raise InputError(
                 f"robot {info.robot} speaks protocol {info.protocol}, this stopgo {VERSION}; update the older"
@@ -195,7 +205,7 @@ class Station:
         )  # fmt: skip
         begun = self._step(manifest, "begin", encode(manifest), Ready)
         self._send_chunks(manifest, document, set(begun.held), progress)
-        info = self.info()
+        info = self.info(within_s=self.patience_s)
         commit = Commit(
             manifest=manifest, commander=self.commander, take_over=take_over, nonce=uuid.uuid4().hex,
             not_after_ns=info.clock_ns + round(COMMIT_VALID_S * 1e9),
@@ -215,7 +225,7 @@ class Station:
             progress(min(manifest.size, (number + 1) * manifest.chunk_bytes), manifest.size)
 
     def _read_back(self, manifest: Manifest) -> None:
-        state = self.status()
+        state = self.info(within_s=self.patience_s).state
         kept = self._part(manifest.mission_id, manifest.revision, 0).manifest
         told = state.mission_id == manifest.mission_id and manifest.revision in (
             state.revision, state.next_revision,
@@ -232,7 +242,7 @@ class Station:
         while True:
             part = self._part(mission_id, revision, len(parts))
             parts.append(part.data)
-            if len(parts) * CHUNK_BYTES >= part.manifest.size:
+            if sum(map(len, parts)) >= part.manifest.size or not part.data:
                 break
         return parse(b"".join(parts), f"mission {mission_id} on {self.keys.robot}")
 
@@ -245,9 +255,18 @@ class Station:
             If the robot refuses.
         OutcomeUnknown
             If no answer came: the order may or may not have been carried out.
+        RobotUnreachable
+            If the robot did not even tell its state: the order was not sent.
         """
         self._may_order(verb)
-        return self.give(self.order(verb, **details))
+        deadline = time.monotonic() + self.timeout_s
+        try:
+            order = self.order(verb, **details)
+        except OutcomeUnknown:
+            raise RobotUnreachable(
+                f"{self.keys.robot} did not tell its state within {self.timeout_s:g} s; {verb} was not sent"
+            ) from None
+        return self.give(order, within_s=max(LEAST_S, deadline - time.monotonic()))
 
     def _may_order(self, what: str) -> None:
         """Viewers are told here; the robot would not even answer them."""
@@ -255,9 +274,10 @@ class Station:
             holder = self.held.holder
             raise AnswerIsNo(f"{what}: {holder.name} is a {holder.role}, and only stations give orders")
 
-    def give(self, order: Command) -> Answer:
+    def give(self, order: Command, *, within_s: float | None = None) -> Answer:
         """Give an order that was written before; given again it is still carried out once."""
-        reply = self._insist(self.keys.command(order.verb), encode(order), self.timeout_s)
+        within_s = self.timeout_s if within_s is None else within_s
+        reply = self._insist(self.keys.command(order.verb), encode(order), within_s)
         answer = self._answered(reply, Answer, order.verb)
         if answer.outcome == "refused":
             raise AnswerIsNo(f"{self.keys.robot} refused {order.verb}: {answer.reason}: {answer.message}")
@@ -302,19 +322,18 @@ class Station:
 
     def _part(self, mission_id: str, revision: int, number: int) -> MissionPart:
         key = self.keys.mission(mission_id, f"part/{number}")
-        reply = self._insist(
-            key, b"", max(self.timeout_s, BULK_TRY_S), try_s=BULK_TRY_S, revision=str(revision)
-        )
+        reply = self._insist(key, b"", self.patience_s, try_s=BULK_TRY_S, revision=str(revision))
         return self._answered(reply, MissionPart, "reading the mission back")
 
     def _step(self, manifest: Manifest, step: str, payload: bytes, kind: type[Any], **parameters: str) -> Any:
         key = self.keys.mission(manifest.mission_id, step)
-        # The robot reads and stores a large document before it answers the commit.
         bulk = step.startswith("chunk")
-        try_s = BULK_TRY_S if bulk else TRY_S
+        try_s, within_s = BULK_TRY_S if bulk else TRY_S, self.patience_s
         if step == "commit":
-            try_s += manifest.size / COMMIT_BYTES_PER_S
-        reply = self._insist(key, payload, max(TRIES_S, 3 * try_s), try_s=try_s, bulk=bulk, **parameters)
+            # The robot reads and stores a large document before it answers.
+            reading_s = manifest.size / COMMIT_BYTES_PER_S
+            try_s, within_s = try_s + reading_s, within_s + 2 * reading_s
+        reply = self._insist(key, payload, within_s, try_s=try_s, bulk=bulk, **parameters)
         return self._answered(reply, kind, f"push ({step})")
 
     def _insist(

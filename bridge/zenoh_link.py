@@ -16,17 +16,25 @@ from dataclasses import dataclass
 from typing import Any
 
 import zenoh
-import zenoh.ext
 
 from bridge.keys import Keys
 from bridge.link import Answering, Hearing, Presence, Publish, Request
 from mission.errors import InputError
 
 LEASE_MS = 2000
+OPEN_S = 5.0
+LEAST_OPEN_S = 0.5
+BATCH_BYTES = 8192
+"""Of what zenoh sends in one piece: one that takes longer than the lease to arrive closes the link."""
+SEND_BUFFER_BYTES = 32 * 1024
+"""Of the operating system, per link: what lies there no urgent message can overtake."""
 MAX_MESSAGE_BYTES = 1_000_000
 OPEN = ("tcp", "udp", "ws")
 ENCRYPTED = ("tls", "quic")
 JSON = zenoh.Encoding.APPLICATION_JSON
+
+PROMPT = zenoh.Priority.INTERACTIVE_LOW
+BULK = zenoh.Priority.DATA_LOW
 
 COMMON: dict[str, Any] = {
     "scouting/multicast/enabled": False,
@@ -34,6 +42,9 @@ COMMON: dict[str, Any] = {
     "scouting/delay": 0,
     "transport/shared_memory/enabled": False,
     "transport/link/tx/lease": LEASE_MS,
+    "transport/link/tx/batch_size": BATCH_BYTES,
+    "transport/link/tcp/so_sndbuf": SEND_BUFFER_BYTES,
+    "transport/link/tls/so_sndbuf": SEND_BUFFER_BYTES,
     "transport/link/rx/max_message_size": MAX_MESSAGE_BYTES,
     "adminspace/enabled": False,
 }
@@ -74,10 +85,14 @@ def joining(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
 
 
 @contextmanager
-def connecting(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
-    """A station's link to `endpoint`; returned at once, it connects, again and again, in the background."""
+def connecting(endpoint: str, guard: Guard = UNGUARDED, *, open_s: float = OPEN_S) -> Iterator[ZenohLink]:
+    """A station's link to `endpoint`; returned at once, it connects, again and again, in the background.
+
+    Each attempt takes at most `open_s`; closing waits for the one under way.
+    """
     check_endpoint(endpoint, guard, option="--connect")
-    with _opened({"mode": "peer", **_reaching(endpoint)}, endpoint, guard) as link:
+    opening = {"transport/unicast/open_timeout": round(max(LEAST_OPEN_S, open_s) * 1e3)}
+    with _opened({"mode": "peer", **_reaching(endpoint), **opening}, endpoint, guard) as link:
         yield link
 
 
@@ -130,25 +145,22 @@ class ZenohLink:
         # A token or subscriber that nobody refers to is collected, and gone.
         self._declared: list[Any] = []
 
-    def serve(self, key: str, answer: Answering) -> None:
+    def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
+        priority = BULK if bulk else PROMPT
+
         def answered(query: zenoh.Query) -> None:
             with query:
                 payload = b"" if query.payload is None else query.payload.to_bytes()
                 signature = b"" if query.attachment is None else query.attachment.to_bytes()
                 request = Request(str(query.key_expr), payload, _parameters(query.parameters), signature)
-                query.reply(query.key_expr, answer(request), encoding=JSON)
+                query.reply(query.key_expr, answer(request), encoding=JSON, priority=priority)
 
         self._declared.append(self._session.declare_queryable(key, answered, complete=True))
 
-    def publisher(self, key: str, *, kept: int = 0) -> Publish:
-        publisher = zenoh.ext.declare_advanced_publisher(
-            self._session,
-            key,
-            encoding=JSON,
-            congestion_control=zenoh.CongestionControl.BLOCK,
-            cache=zenoh.ext.CacheConfig(max(1, kept)),
-            sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=0.5),
-            publisher_detection=True,
+    def publisher(self, key: str, *, bulk: bool = False) -> Publish:
+        control = zenoh.CongestionControl.DROP if bulk else zenoh.CongestionControl.BLOCK
+        publisher = self._session.declare_publisher(
+            key, encoding=JSON, congestion_control=control, priority=BULK if bulk else PROMPT
         )
         self._declared.append(publisher)
         return publisher.put
@@ -194,18 +206,11 @@ class ZenohLink:
         )
         return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 
-    def hear(self, key: str, heard: Hearing, *, late: int = 0) -> None:
-        self._declared.append(
-            zenoh.ext.declare_advanced_subscriber(
-                self._session,
-                key,
-                lambda sample: heard(str(sample.key_expr), sample.payload.to_bytes()),
-                history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=late)
-                if late
-                else None,
-                recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
-            )
-        )
+    def hear(self, key: str, heard: Hearing) -> None:
+        def sampled(sample: zenoh.Sample) -> None:
+            heard(str(sample.key_expr), sample.payload.to_bytes())
+
+        self._declared.append(self._session.declare_subscriber(key, sampled))
 
     def watch_presence(self, key: str, changed: Presence) -> None:
         def noticed(sample: zenoh.Sample) -> None:

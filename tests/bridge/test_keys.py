@@ -197,6 +197,8 @@ def test_the_commands_make_keys(tmp_path: Path) -> None:
     assert stopgo("keys", "init", folder).returncode == 0
     assert stopgo("keys", "issue", "station", "alice", "--in", folder).returncode == 0
     assert "alice" in stopgo("keys", "show", "--in", folder).stdout
+    assert "alice" in stopgo("keys", "show", folder).stdout
+    assert stopgo("keys", "show").returncode == stopgo("keys", "show", folder, "--in", folder).returncode == 2
     assert stopgo("keys", "issue", "king", "bob", "--in", folder).returncode == 2
     assert stopgo("keys", "show", "--in", str(tmp_path / "nowhere")).returncode == 2
     wrong = stopgo(

@@ -95,7 +95,7 @@ def main(folder: Path, loss: float, delay_s: float, bits_per_s: float, stops: in
         ]
         for way in ways:
             way.open()
-        with connect(f"tcp/{ROBOT}:7447", robot="r1", insecure=True, timeout_s=30.0) as station:
+        with connect(f"tcp/{ROBOT}:7447", robot="r1", insecure=True, timeout_s=60.0) as station:
             outcome = whole_mission(station, stops)
         counts = {name: sum(getattr(way, name) for way in ways) for name in ("carried", "lost", "overtaken")}
         print(json.dumps(outcome | counts))
