@@ -30,6 +30,8 @@ class Situation:
     """On the clock of commands."""
     new_run_id: str
     lease: Lease | None
+    not_ready: str = ""
+    """Why the robot's base cannot drive at present."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,8 @@ def _verb(command: Command, situation: Situation) -> Change | Refused:
         return Refused(
             "wrong_state", f"{command.verb} needs {' or '.join(needed)}; the robot is {situation.run.state}"
         )
+    if situation.not_ready and command.verb in DRIVING:
+        return Refused("not_ready", situation.not_ready)
     return VERBS[command.verb](command, situation.mission, situation)
 
 
@@ -232,6 +236,9 @@ STATES: dict[str, tuple[str, ...]] = {
     "home": ("RUNNING", "PAUSED", "HELD"),
 }
 """The states in which each verb means something."""
+
+DRIVING = ("start", "resume", "retry", "home")
+"""Verbs that a base which cannot drive refuses at once."""
 
 
 def _xy(start: object) -> str:

@@ -150,6 +150,7 @@ class Controller:
             command_ns=self._command_clock.now_ns(),
             new_run_id=uuid.uuid4().hex[:12],
             lease=self.lease,
+            not_ready=self._base.not_ready(),
         )
 
     def _answer(self, command: Command, decision: Decision | Refused) -> Answer:
@@ -214,7 +215,10 @@ class Controller:
         return None
 
     def _unfit(self, mission: Mission) -> Refused | None:
-        """Why a mission cannot be taken during the present run."""
+        """Why a mission cannot be taken: by this base, or during the present run."""
+        unfit = self._base.unfit(mission)
+        if unfit:
+            return Refused("infeasible", unfit)
         run, held = self._run, self._mission
         if run.over or held is None:
             return None
@@ -299,7 +303,7 @@ class Controller:
             outcome = self._base.goto(path, heading=heading, limits=mission.robot, interrupt=self._interrupt)
         here = self._base.pose()
         if outcome == "blocked":
-            reason = f"the way to {stop.id} is blocked at ({here.x:.2f}, {here.y:.2f})"
+            reason = self._blocked(f"the way to {stop.id}", here)
             self._advance(run, lambda now: runs.held(now, reason))
         elif outcome == "arrived":
             self._advance(run, lambda now: runs.reached(now, mission, here, distance(here, stop)))
@@ -348,10 +352,14 @@ class Controller:
         outcome = self._base.goto(path, heading=None, limits=mission.robot, interrupt=self._interrupt)
         if outcome == "blocked":
             here = self._base.pose()
-            reason = f"the way home is blocked at ({here.x:.2f}, {here.y:.2f})"
+            reason = self._blocked("the way home", here)
             self._advance(run, lambda now: runs.held(now, reason))
         elif outcome == "arrived":
             self._advance(run, lambda now: runs.came_home_by(now, mission))
+
+    def _blocked(self, way: str, here: Pose) -> str:
+        why = self._base.blocked_by()
+        return f"{way} is blocked at ({here.x:.2f}, {here.y:.2f})" + (f": {why}" if why else "")
 
     # Storing
 

@@ -48,6 +48,15 @@ class OnMap:
     def stop(self) -> None:
         self._base.stop()
 
+    def unfit(self, mission: Mission) -> str:
+        return self._base.unfit(mission)
+
+    def not_ready(self) -> str:
+        return self._base.not_ready()
+
+    def blocked_by(self) -> str:
+        return self._base.blocked_by()
+
 
 def turned_point(point: Point, to_map: Transform) -> Point:
     """Site to map: turned by `heading`, then shifted."""

@@ -8,7 +8,7 @@ from typing import Literal, Protocol
 
 import msgspec
 
-from mission.document import Point, RobotSpec, Scan
+from mission.document import Mission, Point, RobotSpec, Scan
 from mission.events import Pose
 
 Outcome = Literal["arrived", "interrupted", "blocked"]
@@ -46,6 +46,15 @@ class Base(Protocol):
 
     def stop(self) -> None:
         """Stand still, whatever was going on (after a reboot the wheels may still turn)."""
+
+    def unfit(self, mission: Mission) -> str:
+        """Why it can never drive this mission; empty if it can."""
+
+    def not_ready(self) -> str:
+        """Why it cannot drive at present; empty if it can."""
+
+    def blocked_by(self) -> str:
+        """What ended the last drive as blocked, if more is known than where; else empty."""
 
 
 class Scanner(Protocol):

@@ -17,7 +17,7 @@ import msgspec
 from bridge.clock import Clock
 from bridge.motion import Brake, Motion, along
 from bridge.robots import Outcome, ScanFailed, ScanResult
-from mission.document import Point, RobotSpec, Scan
+from mission.document import Mission, Point, RobotSpec, Scan
 from mission.errors import InputError
 from mission.events import Pose
 
@@ -150,6 +150,15 @@ class SimulatedBase:
     def stop(self) -> None:
         if self._world.placed:  # to stop is not to say where the robot stands
             self._stand(self.pose())
+
+    def unfit(self, mission: Mission) -> str:
+        return ""
+
+    def not_ready(self) -> str:
+        return ""
+
+    def blocked_by(self) -> str:
+        return ""
 
     def stand_at(self, pose: Pose) -> None:
         """Put the robot there by hand."""
