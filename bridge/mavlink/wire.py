@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 os.environ.setdefault("MAVLINK20", "1")
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -37,6 +37,8 @@ MAVLINK_EPOCH_S = 1_420_070_400
 OLDEST_STEPS = 6_000_000
 """A sender heard for the first time may be a minute behind."""
 MAX_PARSERS = 64
+SIGNATURE = "wrong or no signature"
+"""Reason by which `dropped` counts what was not signed with our key, or is a replay."""
 UNSIGNED_ALLOWED = (dialect.MAVLINK_MSG_ID_RADIO_STATUS,)
 """Radios cannot sign."""
 
@@ -53,12 +55,19 @@ GROUND_STATION = Who(254, dialect.MAV_COMP_ID_MISSIONPLANNER)
 """Not 255, which QGroundControl has: a vehicle must be able to tell two stations apart."""
 
 
-class Box:
-    """Messages that wait for one reader."""
+B = TypeVar("B", bound="Box")
 
-    def __init__(self, types: frozenset[str]) -> None:
+
+class Box:
+    """Messages that wait for one reader: of these types (empty: all), from one sender (`None`: all)."""
+
+    def __init__(self, types: frozenset[str] = frozenset(), of: Who | None = None) -> None:
         self.types = types
+        self.of = of
         self._queue: queue.Queue[Message] = queue.Queue(BOX_SIZE)
+
+    def wants(self, message: Message) -> bool:
+        return (not self.types or message.get_type() in self.types) and self.of in (None, sender(message))
 
     def put(self, message: Message) -> None:
         with suppress(queue.Full):  # a flood is dropped, as on any lossy link
@@ -72,13 +81,25 @@ class Box:
             return None
 
 
+def sender(message: Message) -> Who:
+    """Who sent a message that was received."""
+    return Who(message.get_srcSystem(), message.get_srcComponent())
+
+
 class Wire:
     """One end of MAVLink traffic."""
 
     def __init__(
-        self, transport: Transport, *, me: Who = GROUND_STATION, signing_key: bytes | None = None
+        self,
+        transport: Transport,
+        *,
+        me: Who = GROUND_STATION,
+        signing_key: bytes | None = None,
+        name: str = "the link",
     ) -> None:
         self.me = me
+        self.name = name
+        """What errors call it."""
         self.dropped: Counter[str] = Counter()
         """What was not for us or no message at all, by reason."""
         self._transport = transport
@@ -104,14 +125,20 @@ class Wire:
         """Send to the one the message is for, if it is known where that is; else to all."""
         target = (getattr(message, "target_system", 0), getattr(message, "target_component", 0))
         with self._lock:
+            self._sending.signing.timestamp = max(self._sending.signing.timestamp, signing_time())
             data = bytes(message.pack(self._sending))
             self._sending.seq = (self._sending.seq + 1) % 256
             self._transport.write(data, self._route(*target))
 
     @contextmanager
-    def box(self, *types: str) -> Iterator[Box]:
+    def box(self, *types: str, of: Who | None = None) -> Iterator[Box]:
         """A box that collects messages of these types (all, if none is given) while it is open."""
-        box = Box(frozenset(types))
+        with self.filling(Box(frozenset(types), of)) as box:
+            yield box
+
+    @contextmanager
+    def filling(self, box: B) -> Iterator[B]:
+        """A box of the caller's own, which is filled while this is open."""
         self._boxes.append(box)
         try:
             yield box
@@ -164,14 +191,14 @@ class Wire:
     def _take(self, address: Address, message: Message) -> None:
         name = message.get_type()
         if name == "BAD_DATA" or name.startswith("UNKNOWN"):
-            self.dropped[name] += 1
+            self.dropped[_why_dropped(message)] += 1
             return
         self._routes[message.get_srcSystem(), message.get_srcComponent()] = address
         if not self._for_us(message):
             self.dropped["for others"] += 1
             return
         for box in list(self._boxes):
-            if not box.types or name in box.types:
+            if box.wants(message):
                 box.put(message)
 
     def _for_us(self, message: Message) -> bool:
@@ -188,6 +215,12 @@ class Wire:
             mav.signing.allow_unsigned_callback = lambda _, number: number in UNSIGNED_ALLOWED
             mav.signing.timestamp = signing_time()
         return mav
+
+
+def _why_dropped(message: Message) -> str:
+    if message.get_type() != "BAD_DATA":
+        return "unknown"
+    return SIGNATURE if message.reason == "Invalid signature" else "unreadable"
 
 
 class SeenStreams:
@@ -235,7 +268,7 @@ def signing_time() -> int:
 @contextmanager
 def wire(url: Url, *, me: Who = GROUND_STATION, signing_key: bytes | None = None) -> Iterator[Wire]:
     """An open wire at `url`; raises as `open_transport` does."""
-    opened = Wire(open_transport(url), me=me, signing_key=signing_key)
+    opened = Wire(open_transport(url), me=me, signing_key=signing_key, name=str(url))
     try:
         yield opened
     finally:

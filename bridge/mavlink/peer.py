@@ -1,0 +1,431 @@
+"""The vehicle at the other end of a wire: found by its heartbeat, asked and ordered until it answers.
+
+Whoever waits gives up on silence: after so many seconds in which the vehicle said nothing that counts, never
+after so many tries.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import count
+
+from bridge.mavlink.url import Url
+from bridge.mavlink.wire import SIGNATURE, Box, Message, Who, Wire, dialect, sender, wire
+from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from mission.geodesy import STEPS_PER_DEGREE
+
+PATIENCE_S = 5.0
+"""Silence after which a vehicle is given up."""
+AGAIN_S = 0.3
+"""Between two tries of the same question or order."""
+OTHERS_S = 1.3
+"""Every vehicle beats once a second: so long one waits for a second one after the first."""
+BACK_MS = 1_000
+"""A clock that goes back by more was started again; by less, two messages changed places."""
+UNSET_ANSWERS = 8
+"""So often a vehicle takes the question and sends nothing before that means there is nothing to send."""
+AUTOPILOTS = {dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot", dialect.MAV_AUTOPILOT_PX4: "px4"}
+"""Names by which `mission.mavlink.autopilots` knows them; all others are `generic`."""
+ARDUPILOT_AUTO = {
+    dialect.MAV_TYPE_FIXED_WING: 10,
+    dialect.MAV_TYPE_GROUND_ROVER: 10,
+    dialect.MAV_TYPE_SURFACE_BOAT: 10,
+}
+"""custom_mode of AUTO by type of vehicle; copters and submarines have 3."""
+PX4_AUTO_MISSION = 4 << 16 | 4 << 24
+"""Main mode AUTO, sub-mode MISSION."""
+
+UNSAID: tuple[float, ...] = (0.0,) * 7
+
+
+@dataclass(frozen=True)
+class Ack:
+    """A vehicle's answer to a command."""
+
+    command: int
+    result: int
+    detail: int = 0
+    """result_param2: what the command says it means."""
+
+    @property
+    def accepted(self) -> bool:
+        return self.result == dialect.MAV_RESULT_ACCEPTED
+
+    @property
+    def name(self) -> str:
+        """As in "DENIED"."""
+        return enum_name("MAV_RESULT", self.result)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a vehicle's local metres count from, degrees and metres above the sea."""
+
+    lat: float
+    lon: float
+    alt: float
+
+
+class Newest(Box):
+    """The newest message of each type from one vehicle, and how often its clock began again."""
+
+    def __init__(self, of: Who) -> None:
+        super().__init__(of=of)
+        self.boots = 0
+        self.heard_s = time.monotonic()
+        self.messages: dict[str, Message] = {}
+        self._boot_ms = 0
+
+    def put(self, message: Message) -> None:
+        self.heard_s = time.monotonic()
+        self.messages[message.get_type()] = message
+        now_ms = getattr(message, "time_boot_ms", None)
+        if now_ms is not None:
+            self._count_boots(now_ms)
+
+    def _count_boots(self, now_ms: int) -> None:
+        began_again = now_ms + BACK_MS < self._boot_ms
+        self.boots += began_again
+        self._boot_ms = now_ms if began_again else max(now_ms, self._boot_ms)
+
+
+class Peer:
+    """A vehicle that was found on a wire."""
+
+    def __init__(self, wire: Wire, newest: Newest, autopilot: str, patience_s: float = PATIENCE_S) -> None:
+        assert newest.of is not None
+        self.wire = wire
+        self.who = newest.of
+        self.autopilot = autopilot
+        """"ardupilot", "px4" or "generic"."""
+        self.patience_s = patience_s
+        self._newest = newest
+        self._ordering = threading.Lock()
+
+    def __str__(self) -> str:
+        return f"vehicle {self.who.system} ({self.autopilot})"
+
+    @property
+    def heartbeat(self) -> Message:
+        """The last one."""
+        return self._newest.messages["HEARTBEAT"]
+
+    @property
+    def armed(self) -> bool:
+        return bool(self.heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+
+    @property
+    def in_auto(self) -> bool:
+        """Whether it is in the mode in which it follows the mission it holds."""
+        return in_auto(self.heartbeat, self.autopilot)
+
+    @property
+    def silent_s(self) -> float:
+        """Seconds since anything was heard of it."""
+        return time.monotonic() - self._newest.heard_s
+
+    @property
+    def boots(self) -> int:
+        """How often it was started again since it was found, as far as its clock tells."""
+        return self._newest.boots
+
+    def newest(self, name: str) -> Message | None:
+        """Its last message of a type, whenever that came."""
+        return self._newest.messages.get(name)
+
+    @contextmanager
+    def box(self, *types: str) -> Iterator[Box]:
+        """A box for what this vehicle sends, as `Wire.box`."""
+        with self.wire.box(*types, of=self.who) as box:
+            yield box
+
+    def send(self, message: Message) -> None:
+        self.wire.send(message)
+
+    def command(self, number: int, *params: float, patience_s: float | None = None) -> Ack:
+        """A COMMAND_LONG, sent until it is answered; what is not given of the seven params is 0.
+
+        Raises
+        ------
+        OutcomeUnknown
+            If there is no answer.
+        """
+        filled = (*params, *UNSAID)[:7]
+        target = (self.who.system, self.who.component)
+        return self._commanded(
+            number,
+            lambda nth: dialect.MAVLink_command_long_message(*target, number, min(nth, 255), *filled),
+            patience_s,
+        )
+
+    def command_int(
+        self,
+        number: int,
+        *params: float,
+        x: int = 0,
+        y: int = 0,
+        z: float = 0.0,
+        frame: int = dialect.MAV_FRAME_GLOBAL,
+        patience_s: float | None = None,
+    ) -> Ack:
+        """A COMMAND_INT with up to four params and a place (1e-7 degrees); as `command`."""
+        filled = (*params, *UNSAID)[:4]
+        message = dialect.MAVLink_command_int_message(
+            self.who.system, self.who.component, frame, number, 0, 0, *filled, x, y, z
+        )
+        return self._commanded(number, lambda _: message, patience_s)
+
+    def order(self, number: int, *params: float, what: str = "", patience_s: float | None = None) -> Ack:
+        """As `command`, and anything but ACCEPTED is an error.
+
+        Raises
+        ------
+        AnswerIsNo
+            If the vehicle does not accept it.
+        """
+        ack = self.command(number, *params, patience_s=patience_s)
+        if not ack.accepted:
+            named = what or enum_name("MAV_CMD", number)
+            raise AnswerIsNo(f"{self}: {named} was answered {ack.name}{self._last_text()}")
+        return ack
+
+    def ask(self, number: int, *, patience_s: float | None = None) -> Message | None:
+        """The message of this number, or `None` if the vehicle has none to send or does not know it.
+
+        Raises
+        ------
+        RobotUnreachable
+            If there is neither the message nor an answer.
+        """
+        name = dialect.mavlink_map[number].msgname
+        taken = 0
+        with self._ordering, self.box(name, "COMMAND_ACK") as box:
+            for _ in self._tries(AGAIN_S, patience_s):
+                self.wire.send(self._request(number))
+                reply = self._reply(box, name, AGAIN_S)
+                if reply is None:
+                    continue
+                if reply.get_type() == name:
+                    return reply
+                taken += 1
+                if reply.result != dialect.MAV_RESULT_ACCEPTED or taken >= UNSET_ANSWERS:
+                    return None
+        if taken:
+            return None
+        raise RobotUnreachable(f"{self} does not answer{self.why_silent()}; nothing was sent to it")
+
+    def origin(self, *, patience_s: float | None = None) -> Origin | None:
+        """What its metres count from (GPS_GLOBAL_ORIGIN); `None` if it is not set, or not told."""
+        message = self.ask(dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, patience_s=patience_s)
+        return None if message is None else _origin(message)
+
+    def set_origin(self, origin: Origin, *, patience_s: float | None = None) -> Origin | None:
+        """Tell it what its metres count from, and the origin it then has: the old one if it had one."""
+        message = dialect.MAVLink_set_gps_global_origin_message(
+            self.who.system,
+            round(origin.lat * STEPS_PER_DEGREE),
+            round(origin.lon * STEPS_PER_DEGREE),
+            round(origin.alt * 1000),
+        )
+        for _ in self._tries(0.0, patience_s):
+            self.wire.send(message)
+            held = self.origin(patience_s=patience_s)
+            if held is not None:
+                return held
+        return None
+
+    def why_silent(self) -> str:
+        """What may be the reason that a vehicle heard of does not answer, to be put into a sentence."""
+        if self.wire.gone:
+            return f" ({self.wire.gone})"
+        if self.wire.dropped[SIGNATURE]:
+            return f" ({self.wire.dropped[SIGNATURE]} frames had a {SIGNATURE}: is the signing key its own?)"
+        if self.silent_s > OTHERS_S:
+            return f" (silent for {self.silent_s:.0f} s)"
+        if self.heartbeat.get_header().incompat_flags & dialect.MAVLINK_IFLAG_SIGNED:
+            return " (it signs its messages, and may want ours signed: --signing-key FILE)"
+        return " (its heartbeats come: does it want signed messages, or is the line one-way?)"
+
+    def _commanded(self, number: int, message: Callable[[int], Message], patience_s: float | None) -> Ack:
+        with self._ordering, self.box("COMMAND_ACK") as box:
+            patience = self.patience_s if patience_s is None else patience_s
+            until = time.monotonic() + patience
+            for nth in count():
+                self.wire.send(message(nth))
+                while (ack := self._acked(box, number, min(AGAIN_S, until - time.monotonic()))) is not None:
+                    if ack.result != dialect.MAV_RESULT_IN_PROGRESS:
+                        return ack
+                    until = time.monotonic() + patience
+                if time.monotonic() >= until:
+                    break
+        raise OutcomeUnknown(
+            f"{self}: {enum_name('MAV_CMD', number)} was sent and not answered{self.why_silent()}: "
+            "whether it was carried out is unknown"
+        )
+
+    def _acked(self, box: Box, number: int, timeout_s: float) -> Ack | None:
+        """The next answer to this command."""
+        until = time.monotonic() + timeout_s
+        while (message := box.get(until - time.monotonic())) is not None:
+            if message.command == number:
+                return Ack(message.command, message.result, message.result_param2)
+        return None
+
+    def _request(self, number: int) -> Message:
+        return dialect.MAVLink_command_long_message(
+            self.who.system, self.who.component, dialect.MAV_CMD_REQUEST_MESSAGE, 0, number, 0, 0, 0, 0, 0, 0
+        )
+
+    def _reply(self, box: Box, name: str, timeout_s: float) -> Message | None:
+        """The message asked for, else the answer to the question, whichever says more."""
+        until, answer = time.monotonic() + timeout_s, None
+        while (message := box.get(until - time.monotonic())) is not None:
+            if message.get_type() == name:
+                return message
+            if message.command == dialect.MAV_CMD_REQUEST_MESSAGE:
+                answer = message
+                until = min(until, time.monotonic() + AGAIN_S / 3)  # the message may follow its answer
+        return answer
+
+    def _tries(self, again_s: float, patience_s: float | None) -> Iterator[int]:
+        """One more try as long as there is time for it; at least one."""
+        patience = self.patience_s if patience_s is None else patience_s
+        until = time.monotonic() + patience - again_s
+        for nth in count():
+            yield nth
+            if time.monotonic() > until:
+                return
+
+    def _last_text(self) -> str:
+        text = self.newest("STATUSTEXT")
+        return f' (it last said "{text.text}")' if text is not None else ""
+
+
+@contextmanager
+def reached(
+    url: Url,
+    *,
+    vehicle: int | None = None,
+    signing_key: bytes | None = None,
+    timeout_s: float = PATIENCE_S,
+) -> Iterator[Peer]:
+    """A vehicle at `url`, on a wire of its own; raises as `wire` and `found` do."""
+    with wire(url, signing_key=signing_key) as opened, found(opened, vehicle, timeout_s=timeout_s) as peer:
+        yield peer
+
+
+@contextmanager
+def found(
+    wire: Wire,
+    vehicle: int | None = None,
+    *,
+    timeout_s: float = PATIENCE_S,
+    beat: Callable[[], Message] | None = None,
+) -> Iterator[Peer]:
+    """The vehicle whose heartbeats come over `wire`, while our own go out every second.
+
+    Parameters
+    ----------
+    vehicle
+        Its system id; not needed if only one is heard.
+    timeout_s
+        How long to wait for a heartbeat, and then the peer's patience.
+    beat
+        Makes our heartbeats; those of a ground station if not given.
+
+    Raises
+    ------
+    RobotUnreachable
+        If none is heard.
+    InputError
+        If several are, and none was named.
+    """
+    with wire.box("HEARTBEAT") as box:
+        wire.beat(beat or station_beat)
+        heard = _heard(box, vehicle, timeout_s)
+    heartbeat = _meant(wire, heard, vehicle, timeout_s)
+    newest = Newest(sender(heartbeat))
+    newest.put(heartbeat)
+    with wire.filling(newest):
+        yield Peer(wire, newest, autopilot_of(heartbeat), timeout_s)
+
+
+def station_beat() -> Message:
+    """The heartbeat of a ground station."""
+    return dialect.MAVLink_heartbeat_message(
+        dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
+    )
+
+
+def autopilot_of(heartbeat: Message) -> str:
+    return AUTOPILOTS.get(heartbeat.autopilot, "generic")
+
+
+def in_auto(heartbeat: Message, autopilot: str) -> bool:
+    """Whether a vehicle is in the mode in which it follows the mission it holds."""
+    if autopilot == "ardupilot":
+        return heartbeat.custom_mode == ARDUPILOT_AUTO.get(heartbeat.type, 3)
+    if autopilot == "px4":
+        return heartbeat.custom_mode == PX4_AUTO_MISSION
+    return bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_AUTO_ENABLED)
+
+
+def enum_name(enum: str, number: int) -> str:
+    """As in "DENIED" for 2 of MAV_RESULT; the number itself if it has no name."""
+    entry = dialect.enums[enum].get(number)
+    return str(number) if entry is None else entry.name.removeprefix(f"{enum}_")
+
+
+def _heard(box: Box, vehicle: int | None, timeout_s: float) -> dict[int, Message]:
+    """Heartbeats of autopilots by system id: of the one that is meant, or of all until no other can come."""
+    heard: dict[int, Message] = {}
+    until = time.monotonic() + timeout_s
+    while (message := box.get(until - time.monotonic())) is not None:
+        if not _of_autopilot(message):
+            continue
+        if not heard and vehicle is None:
+            until = min(until, time.monotonic() + OTHERS_S)
+        heard[message.get_srcSystem()] = message
+        if message.get_srcSystem() == vehicle:
+            break
+    return heard
+
+
+def _of_autopilot(heartbeat: Message) -> bool:
+    return (
+        heartbeat.get_srcComponent() == dialect.MAV_COMP_ID_AUTOPILOT1
+        and heartbeat.autopilot != dialect.MAV_AUTOPILOT_INVALID
+        and heartbeat.type != dialect.MAV_TYPE_GCS
+    )
+
+
+def _meant(wire: Wire, heard: dict[int, Message], vehicle: int | None, timeout_s: float) -> Message:
+    if vehicle is None and len(heard) == 1:
+        return next(iter(heard.values()))
+    if vehicle in heard:
+        return heard[vehicle]
+    names = ", ".join(f"{system} ({autopilot_of(heard[system])})" for system in sorted(heard))
+    if vehicle is None and heard:
+        raise InputError(f"{wire.name}: several vehicles: {names}; name one with --vehicle ID")
+    whom = "no vehicle" if vehicle is None else f"no vehicle {vehicle}"
+    others = f" (heard: {names})" if heard else ""
+    raise RobotUnreachable(
+        f"{wire.name}: {whom} within {timeout_s:g} s{others}{_why_none(wire)}; nothing was sent. "
+        "Is it on, and does it send there?"
+    )
+
+
+def _why_none(wire: Wire) -> str:
+    if wire.gone:
+        return f" ({wire.gone})"
+    dropped = wire.dropped[SIGNATURE]
+    return f" ({dropped} frames had a {SIGNATURE}: is the signing key the vehicle's?)" if dropped else ""
+
+
+def _origin(message: Message) -> Origin:
+    steps = STEPS_PER_DEGREE
+    return Origin(lat=message.latitude / steps, lon=message.longitude / steps, alt=message.altitude / 1000)

@@ -1,0 +1,142 @@
+"""A vehicle is found by its heartbeat, and asked until it answers."""
+
+from __future__ import annotations
+
+import pytest
+
+from bridge.mavlink.peer import Origin, found, reached, station_beat
+from bridge.mavlink.url import read_url
+from bridge.mavlink.wire import Message, Who, dialect, wire
+from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from tests.bridge.mavlink.scripted import Scripted, free_udp_port
+
+ARM = dialect.MAV_CMD_COMPONENT_ARM_DISARM
+
+
+class ArduPilot(Scripted):
+    autopilot = dialect.MAV_AUTOPILOT_ARDUPILOTMEGA
+
+
+def test_a_vehicle_is_found_by_its_heartbeat() -> None:
+    with ArduPilot() as vehicle, reached(vehicle.url, vehicle=1) as peer:
+        assert (peer.who, peer.autopilot) == (Who(1, 1), "ardupilot")
+        assert not peer.armed and not peer.in_auto
+
+
+def test_its_mode_is_that_of_its_last_heartbeat() -> None:
+    with ArduPilot() as vehicle:
+        vehicle.base_mode, vehicle.custom_mode = dialect.MAV_MODE_FLAG_SAFETY_ARMED, 10
+        with reached(vehicle.url) as peer:
+            assert peer.armed and peer.in_auto
+
+
+def test_where_nobody_is_nothing_was_sent() -> None:
+    url = read_url(f"udpout:127.0.0.1:{free_udp_port()}")
+    told = pytest.raises(RobotUnreachable, match=r"within 0.3 s \(nothing listens there\); nothing was sent")
+    with told, reached(url, timeout_s=0.3):
+        pass
+
+
+def test_of_several_vehicles_one_must_be_named() -> None:
+    port = free_udp_port()
+    out = read_url(f"udpout:127.0.0.1:{port}")
+    with (
+        wire(read_url(f"udpin:127.0.0.1:{port}")) as station,
+        wire(out, me=Who(1, 1)) as one,
+        wire(out, me=Who(2, 1)) as other,
+    ):
+        for vehicle in (one, other):
+            vehicle.beat(vehicle_beat)
+        names = r"several vehicles: 1 \(ardupilot\), 2 \(ardupilot\); .*--vehicle"
+        with pytest.raises(InputError, match=names), found(station):
+            pass
+        with found(station, 2) as peer:
+            assert peer.who == Who(2, 1)
+        unheard = pytest.raises(RobotUnreachable, match=r"no vehicle 3 within .*heard: 1")
+        with unheard, found(station, 3, timeout_s=1.2):
+            pass
+
+
+def vehicle_beat() -> Message:
+    return dialect.MAVLink_heartbeat_message(
+        dialect.MAV_TYPE_GROUND_ROVER, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, 0, 0, 4, 3
+    )
+
+
+def test_stations_and_cameras_are_no_vehicles() -> None:
+    port = free_udp_port()
+    out = read_url(f"udpout:127.0.0.1:{port}")
+    with (
+        wire(read_url(f"udpin:127.0.0.1:{port}")) as station,
+        wire(out, me=Who(255, 190)) as other,
+        wire(out, me=Who(1, 100)) as camera,
+    ):
+        other.beat(station_beat)
+        camera.beat(vehicle_beat)
+        with pytest.raises(RobotUnreachable), found(station, timeout_s=0.3):
+            pass
+
+
+class Slow(Scripted):
+    """Answers an order at the third time, after saying that it is at work."""
+
+    def on_command_long(self, message: Message, to: Who) -> None:
+        if self.heard["COMMAND_LONG"] >= 3:
+            self.answer(message.command + 1, dialect.MAV_RESULT_DENIED, to)
+            self.answer(message.command, dialect.MAV_RESULT_IN_PROGRESS, to)
+            self.answer(message.command, dialect.MAV_RESULT_ACCEPTED, to)
+
+
+def test_an_order_is_repeated_until_it_is_answered() -> None:
+    with Slow() as vehicle, reached(vehicle.url, vehicle=1) as peer:
+        assert peer.command(ARM, 1).accepted
+        assert vehicle.heard["COMMAND_LONG"] >= 3
+
+
+class Refusing(Scripted):
+    def on_command_long(self, message: Message, to: Who) -> None:
+        self.send(dialect.MAVLink_statustext_message(2, b"Arm: no position"))
+        self.answer(message.command, dialect.MAV_RESULT_FAILED, to)
+
+
+def test_a_refusal_is_told_with_the_vehicles_words() -> None:
+    told = pytest.raises(AnswerIsNo, match=r"COMPONENT_ARM_DISARM was answered FAILED .*Arm: no position")
+    with Refusing() as vehicle, reached(vehicle.url, vehicle=1) as peer, told:
+        peer.order(ARM, 1)
+
+
+class Deaf(Scripted):
+    def take(self, message: Message) -> None:
+        pass
+
+
+def test_an_unanswered_order_is_unknown_and_an_unanswered_question_is_not() -> None:
+    with Deaf() as vehicle, reached(vehicle.url, vehicle=1) as peer:
+        with pytest.raises(OutcomeUnknown, match="heartbeats come: does it want signed messages"):
+            peer.command(ARM, 1, patience_s=0.4)
+        with pytest.raises(RobotUnreachable, match=r"does not answer .*; nothing was sent to it"):
+            peer.ask(dialect.MAVLINK_MSG_ID_HOME_POSITION, patience_s=0.4)
+
+
+def test_the_origin_is_asked_and_set() -> None:
+    with Scripted() as vehicle, reached(vehicle.url, vehicle=1) as peer:
+        assert peer.origin() == Origin(lat=47.0, lon=8.0, alt=0.0)
+        vehicle.origin = None
+        assert peer.origin() is None
+        there = Origin(lat=47.5, lon=8.5, alt=400.0)
+        assert peer.set_origin(there) == there
+        assert peer.set_origin(Origin(lat=1.0, lon=1.0, alt=0.0)) == there, "a second one is not taken"
+
+
+def test_what_it_does_not_know_is_none() -> None:
+    with Scripted() as vehicle, reached(vehicle.url, vehicle=1) as peer:
+        assert peer.ask(dialect.MAVLINK_MSG_ID_HOME_POSITION) is None
+
+
+def test_a_clock_that_goes_back_is_a_new_boot() -> None:
+    with Scripted() as vehicle, reached(vehicle.url, vehicle=1) as peer, peer.box("SYSTEM_TIME") as box:
+        box.get(5.0)
+        vehicle.boot_ms = 0
+        while box.get(5.0).time_boot_ms > 10_000:
+            pass
+        assert peer.boots == 1
