@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from mission.document import Mission, SiteOrigin, Stop
 from mission.errors import AnswerIsNo, InputError
 from mission.mavlink.autopilots import Autopilot
-from mission.mavlink.items import Command
+from mission.mavlink.items import Command, Placed
+from mission.mavlink.keeping import as_sent
 from mission.mavlink.manner import Manner
 from mission.sense import problems_of
 
@@ -41,6 +43,20 @@ def check(mission: Mission, numbers: tuple[int, ...], manner: Manner) -> None:
     for stop, number in zip(mission.stops, numbers, strict=True):
         _check_waits(mission, stop, manner)
         _check_handshake(mission, stop, number, manner)
+
+
+def check_fields(mission: Mission, placed: Sequence[Placed]) -> None:
+    """Refuses numbers that a float32 on the wire does not hold; NaN is meant where it stands."""
+    for one in placed:
+        for number, (value, sent) in enumerate(
+            zip(one.item.params, as_sent(one.item).params, strict=True), start=1
+        ):
+            if math.isinf(sent):
+                whose = "robot" if one.stop is None else f"stop {one.stop}"
+                raise InputError(
+                    f"{mission.name}: {whose}: param{number} of {one.item.name} would be {value:g}, "
+                    "more than a float32 holds; correct the mission"
+                )
 
 
 def check_count(mission: Mission, count: int, vehicle: Autopilot, most: int) -> None:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from mission.document import Mission, Point, Stop
+from mission.document import Mission, Stop
 from mission.mavlink.autopilots import Autopilot, autopilot_named
 from mission.mavlink.corners import corners
-from mission.mavlink.items import Command, Item, ItemList, Placed, Role
+from mission.mavlink.items import Command, Item, ItemList, Placed
 from mission.mavlink.manner import Manner, ScanWait, Settle, Trigger
 from mission.mavlink.notes import notes_of
 from mission.mavlink.numbers import numbers_of
-from mission.mavlink.refusals import check, check_count, origin_of
+from mission.mavlink.refusals import check, check_count, check_fields, origin_of
 from mission.mavlink.writing import (
     capture,
     corner_waypoint,
@@ -68,6 +68,7 @@ def translate(
     numbers = numbers_of(mission)
     check(mission, numbers, manner)
     placed = tuple(_without_repeats(_placed(mission, numbers, manner)))
+    check_fields(mission, placed)
     check_count(mission, vehicle.sequence(len(placed)), vehicle, max_items or vehicle.max_items)
     return ItemList(vehicle.name, manner.origin, placed, notes=notes_of(mission, manner))
 
@@ -83,18 +84,11 @@ def _placed(mission: Mission, numbers: Sequence[int], manner: Manner) -> Iterato
     """Where the robot starts is no item: it stands there."""
     yield Placed(speed_change(mission.robot.speed), "speed")
     for stop, number in zip(mission.stops, numbers, strict=True):
-        yield from _passed(stop.approach, "corner", manner, stop.id)
+        for point in corners(stop.approach, within=manner.max_lateral_m)[1:-1]:
+            yield Placed(corner_waypoint(point, manner), "corner", stop.id)
         yield from _visited(stop, number, manner)
-    back = mission.return_ or ()
-    yield from _passed(back, "return", manner, None)
-    if len(back) > 1:
-        yield Placed(corner_waypoint(back[-1], manner), "return")
-
-
-def _passed(leg: Sequence[Point], role: Role, manner: Manner, stop: str | None) -> Iterator[Placed]:
-    """The points strictly between the leg's ends that must be driven through."""
-    for point in corners(leg, within=manner.max_lateral_m)[1:-1]:
-        yield Placed(corner_waypoint(point, manner), role, stop)
+    for point in corners(mission.return_ or (), within=manner.max_lateral_m)[1:]:
+        yield Placed(corner_waypoint(point, manner), "return")
 
 
 def _visited(stop: Stop, number: int, manner: Manner) -> Iterator[Placed]:

@@ -160,6 +160,8 @@ def test_half_a_degree_is_fifty_kilometres_and_one_and_a_half_is_another_site():
     assert round_in(waypoint(5_000_000), wait(1.0)).visits[0].at[0] == pytest.approx(34_650, rel=1e-3)
     with pytest.raises(InputError, match=r"item 1: 51\.5.*104 km from the site's origin.*--origin"):
         round_in(waypoint(15_000_000), wait(1.0))
+    with pytest.raises(InputError, match=r"item 0: "):
+        round_of(recognise([waypoint(15_000_000), wait(1.0)]), ORIGIN, first=0)
 
 
 @pytest.mark.parametrize(

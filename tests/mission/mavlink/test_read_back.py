@@ -13,7 +13,7 @@ from mission.mavlink.autopilots import AUTOPILOTS, differences, placed_at, uploa
 from mission.mavlink.items import NAN, Command, Frame, Item
 from mission.mavlink.keeping import ardupilot_keeps, px4_keeps
 from mission.mavlink.translate import translate
-from tests.mission.mavlink.worlds import NAMES, corner_tour, narrow_view, read_back
+from tests.mission.mavlink.worlds import NAMES, corner_tour, first_scan, narrow_view, read_back
 from tests.mission.worlds import square_tour
 
 
@@ -30,18 +30,24 @@ def test_the_handshake_is_kept_as_predicted():
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("field", ["command", "frame", "params", "x", "y", "z"])
+@pytest.mark.parametrize("field", ["command", "frame", "params", "x", "y", "z", "autocontinue"])
 def test_a_changed_field_is_found_and_named(name, field):
     sent = translate(square_tour(), name)
     read = read_back(sent)
     at = AUTOPILOTS[name].sequence(1)
-    was = getattr(read[at], field)
-    other = tuple(value + 1 for value in was) if field == "params" else was + 1
-    read[at] = replace(read[at], **{field: other})
+    read[at] = one_changed(read[at], field)
     lines = differences(sent, read)
     assert lines
     assert all(line.startswith(f"item {at} (stop of S1): ") for line in lines)
     assert field.removesuffix("s") in lines[0]
+
+
+def one_changed(item: Item, field: str) -> Item:
+    """The item with another value in one field, or in all its params."""
+    was = getattr(item, field)
+    if isinstance(was, tuple):
+        return replace(item, params=tuple(value + 1 for value in was))
+    return replace(item, **{field: not was if isinstance(was, bool) else was + 1})
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -65,6 +71,13 @@ def test_another_kind_of_vehicle_keeps_other_things():
     assert differences(sent, kept, AUTOPILOTS["px4"]) == ()
     dropped = [ardupilot_keeps(item) for item in sent.items]
     assert "param2 sent 0.05, should be kept as 0.05" in differences(sent, dropped, AUTOPILOTS["px4"])[1]
+
+
+def test_a_second_in_a_day_is_a_difference():
+    sent = translate(first_scan(square_tour(), duration_s=86_400.0, timeout_s=90_000.0))
+    read = read_back(sent)
+    read[5] = replace(read[5], params=(86_401.0, -1.0, -1.0, -1.0))
+    assert len(differences(sent, read)) == 1
 
 
 def test_home_is_put_in_front_for_ardupilot_only():
@@ -112,6 +125,20 @@ def test_ardupilot_keeps_script_messages_and_times_in_their_types():
     wait = Item(Command.NAV_SCRIPT_TIME, Frame.MISSION, (1.0, 300.0, 0.1, 0.0), x=40_000)
     assert ardupilot_keeps(wait).params == (1.0, 44.0, 0.0999755859375, 0.0)
     assert ardupilot_keeps(wait).x == 40_000 - 65_536
+
+
+@pytest.mark.parametrize(
+    ("command", "sent", "kept"),
+    [
+        (Command.DO_CHANGE_SPEED, (257.0, 0.5, -1.0, 9.0), (1.0, 0.5, -1.0, 0.0)),
+        (Command.NAV_DELAY, (2.5, -1.9, 130.0, 7.0), (2.5, -1.0, -126.0, 7.0)),
+        (Command.IMAGE_START_CAPTURE, (1.5, 2.5, 3.5, 65_537.0), (1.0, 2.0, 3.0, 1.0)),
+        (Command.DO_SET_SERVO, (9.0, 1500.5, 1.0, 1.0), (9.0, 1500.0, 0.0, 0.0)),
+        (Command.DO_SET_RELAY, (1.0, 1.0, 1.0, 1.0), (1.0, 1.0, 0.0, 0.0)),
+    ],
+)
+def test_ardupilot_keeps_commands_in_their_types(command, sent, kept):
+    assert ardupilot_keeps(Item(command, Frame.MISSION, sent)).params == kept
 
 
 def test_ardupilot_always_goes_on():

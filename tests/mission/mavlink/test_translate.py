@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import pytest
 from hypothesis import given
@@ -12,7 +14,7 @@ from mission.document import SiteOrigin
 from mission.errors import AnswerIsNo, InputError
 from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
 from mission.mavlink.autopilots import AUTOPILOTS
-from mission.mavlink.items import Command, Frame
+from mission.mavlink.items import Command, Frame, Item
 from mission.mavlink.translate import translate
 from tests.mission.mavlink.worlds import (
     NAMES,
@@ -49,6 +51,40 @@ def test_a_trigger_fires_only_between_two_waits(name, mission):
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("settle", ["delay", "hold"])
+def test_driven_by_the_rules_every_scan_begins_settled_and_ends_in_place(name, settle):
+    for fired in scans_of(translate(corner_tour(), name, settle=settle).items):
+        assert fired.stood_s >= 2.0
+        assert fired.stands_s == 60.0
+
+
+@dataclass
+class Fired:
+    """A trigger: seconds the robot had stood when it fired, and stands from then on."""
+
+    stood_s: float
+    stands_s: float = 0.0
+
+
+def scans_of(items: Sequence[Item]) -> list[Fired]:
+    """What a vehicle does that runs commands which are no NAV commands as the next NAV command starts."""
+    fired: list[Fired] = []
+    waiting, stood = 0, 0.0
+    for item in items:
+        if item.command in (Command.DO_SEND_SCRIPT_MESSAGE, Command.IMAGE_START_CAPTURE):
+            waiting += 1
+            continue
+        if item.command not in (*WAITS, Command.NAV_WAYPOINT):
+            continue
+        moves = item.command == Command.NAV_WAYPOINT
+        fired += [Fired(-1.0 if moves else stood) for _ in range(waiting)]
+        waiting, stood = 0, item.params[0] if moves else stood + item.params[0]
+        if fired and not moves:
+            fired[-1].stands_s += item.params[0]
+    return fired
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_only_commands_that_the_autopilot_takes_are_sent(name):
     items = translate(corner_tour(), name).items
     assert {item.command for item in items} <= AUTOPILOTS[name].commands
@@ -76,6 +112,20 @@ def test_a_repeated_point_is_sent_once(name):
     )
     places = [item for item in translate(mission, name).items if item.command == Command.NAV_WAYPOINT]
     assert len(places) == 2
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_two_stops_in_one_place_are_both_driven_to(name):
+    mission = mission_of(stop("S1", (0.0, 0.0), (4.0, 0.0)), stop("S2", (4.0, 0.0)), back=((4.0, 0.0),))
+    roles = [placed.role for placed in translate(mission, name).placed]
+    assert roles.count("stop") == 2
+    assert roles.count("return") == 0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_where_nothing_is_to_settle_no_wait_stands_before_the_trigger(name):
+    roles = [placed.role for placed in translate(first_stop(square_tour(), settle_s=0.0), name).placed]
+    assert roles[:5] == ["speed", "stop", "trigger", "scan", "stop"]
 
 
 def test_four_metres_east_by_ardupilots_scale():
@@ -116,6 +166,18 @@ def test_the_script_handshake_replaces_the_last_wait():
     ]
 
 
+@pytest.mark.parametrize(("timeout", "sent"), [(0.0, 1.0), (0.2, 1.0), (90.5, 91.0), (255.0, 255.0)])
+def test_a_handshake_never_waits_shorter_or_for_ever(timeout, sent):
+    mission = first_scan(square_tour(), duration_s=0.0, timeout_s=timeout)
+    items = translate(mission, scan_wait="script_time").placed
+    assert next(placed.item for placed in items if placed.role == "scan").params[1] == sent
+
+
+def test_a_bearing_is_sent_to_a_hundredth_of_a_degree():
+    mission = first_stop(square_tour(), heading=math.radians(33.337))
+    assert translate(mission, "px4").items[1].params[3] == 56.66
+
+
 def test_settling_by_hold_saves_an_item_per_stop():
     by_delay, by_hold = (translate(square_tour(), settle=how) for how in ("delay", "hold"))
     assert len(by_delay.items) - len(by_hold.items) == 2
@@ -135,6 +197,15 @@ def test_what_the_autopilot_cannot_do_is_noted(name):
     assert any("stops S1 to S2 (2): on_failure ask" in note for note in notes)
     assert any("tolerance_m" in note for note in notes)
     assert any("battery_min 0.15" in note for note in notes)
+
+
+def test_what_nobody_asks_for_is_not_noted():
+    mission = first_stop(square_tour(), on_failure="retry", retries=0)
+    notes = translate(changed(mission, stops=mission.stops[:1], return_=None)).notes
+    assert not any("S1" in note for note in notes)
+    retried = first_stop(square_tour(), on_failure="retry", retries=2)
+    assert translate(retried).notes[0].startswith("stop S1: a failed scan is tried again only by the station")
+    assert "no item starts a scan: the station does" in translate(square_tour(), trigger="none").notes
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -190,11 +261,48 @@ def test_a_handshake_longer_than_its_field_is_refused():
         translate(first_scan(square_tour(), timeout_s=256.0), scan_wait="script_time")
 
 
+def test_a_handshake_has_no_room_for_numbers_above_an_int16():
+    mission = mission_of(stop("S32768", (0.0, 0.0), (1.0, 0.0)))
+    with pytest.raises(AnswerIsNo, match=r"stop S32768: number 32768 is above the 32767"):
+        translate(first_scan(mission, timeout_s=100.0), scan_wait="script_time")
+
+
+def test_a_hold_that_would_run_as_none_is_refused():
+    with pytest.raises(AnswerIsNo, match=r"stop S1: settle_s is 32768, a hold"):
+        translate(first_stop(square_tour(), settle_s=32_768.0), settle="hold")
+
+
 def test_a_fractional_hold_is_refused_and_a_fractional_delay_is_exact():
     mission = first_stop(square_tour(), settle_s=2.5)
     with pytest.raises(AnswerIsNo, match=r"stop S1: settle_s is 2\.5, a hold is whole seconds"):
         translate(mission, settle="hold")
     assert translate(mission).items[2].params[0] == 2.5
+
+
+@pytest.mark.parametrize(
+    ("name", "mission", "told"),
+    [
+        (
+            "ardupilot",
+            first_scan(square_tour(), timeout_s=1e39),
+            r"stop S1: param4 of DO_SEND_SCRIPT",
+        ),
+        ("px4", first_stop(square_tour(), tolerance_m=1e39), r"stop S1: param2 of NAV_WAYPOINT"),
+    ],
+)
+def test_what_a_float32_does_not_hold_is_refused(name, mission, told):
+    with pytest.raises(InputError, match=told):
+        translate(mission, name)
+
+
+@pytest.mark.parametrize(("name", "most"), [("ardupilot", 163), ("px4", 124)])
+def test_four_items_per_stop_fill_a_vehicle(name, most):
+    """Home, the speed and 163 × 4 are 654 of 655; the speed and 124 × 4 are 497 of 500."""
+    legs = [((float(x), 0.0), (float(x + 1), 0.0)) for x in range(most + 1)]
+    stops = [stop(f"S{number}", *leg) for number, leg in enumerate(legs, 1)]
+    translate(mission_of(*stops[:-1]), name)
+    with pytest.raises(AnswerIsNo, match=rf"{most + 1} stops make .* items, {name} holds"):
+        translate(mission_of(*stops), name)
 
 
 def test_more_items_than_the_vehicle_holds_are_refused():
