@@ -39,7 +39,8 @@ Reason = Literal[
     "malformed", "expired", "id_reused", "wrong_state", "wrong_run", "wrong_mission", "no_mission",
     "finished_before", "not_at_start", "off_route", "not_at_stop", "not_the_commander", "fenced",
     "running", "revision_taken", "older_revision", "too_large", "incomplete", "digest", "infeasible",
-    "storage", "untrusted", "replayed", "way_differs", "not_ready",
+    "storage", "untrusted", "replayed", "way_differs",
+    "unsupported", "not_armed", "wrong_origin", "mission_differs", "no_position", "denied", "not_ready",
 ]  # fmt: skip
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")

@@ -68,6 +68,15 @@ class Scanned(Event, frozen=True, kw_only=True):
     points: int
 
 
+class Unconfirmed(Event, frozen=True, kw_only=True):
+    """The robot is through with a stop, and nobody says that a scan was made (autopilots without a word)."""
+
+    stop: str
+    pose: Pose | None
+    """Where it stood; `None` if nobody saw it."""
+    reason: str
+
+
 class Skipped(Event, frozen=True, kw_only=True):
     stop: str
     reason: str
@@ -141,6 +150,7 @@ AnyEvent = (
     | Arrived
     | Settled
     | Scanned
+    | Unconfirmed
     | Skipped
     | Failed
     | Held

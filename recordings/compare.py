@@ -7,7 +7,18 @@ from collections.abc import Iterable, Sequence
 
 from mission.comparison import Comparison, StopComparison
 from mission.document import Mission, Stop
-from mission.events import Aborted, AnyEvent, Arrived, Failed, Finished, Pose, Scanned, Settled, Skipped
+from mission.events import (
+    Aborted,
+    AnyEvent,
+    Arrived,
+    Failed,
+    Finished,
+    Pose,
+    Scanned,
+    Settled,
+    Skipped,
+    Unconfirmed,
+)
 from mission.schedule import schedule
 
 
@@ -32,7 +43,7 @@ def compare(mission: Mission, events: Iterable[AnyEvent], *, earlier: Sequence[M
     )
 
 
-VISITS = (Arrived, Settled, Scanned, Skipped, Failed)
+VISITS = (Arrived, Settled, Scanned, Unconfirmed, Skipped, Failed)
 """Events at a stop."""
 
 
@@ -74,7 +85,7 @@ def _xy(place: Pose | Stop) -> tuple[float, float]:
 
 
 def _outcome(events: Sequence[AnyEvent]) -> str:
-    words = {Scanned: "scanned", Skipped: "skipped", Failed: "failed"}
+    words = {Scanned: "scanned", Unconfirmed: "unconfirmed", Skipped: "skipped", Failed: "failed"}
     last = [words[type(event)] for event in events if type(event) in words]
     return last[-1] if last else "not reached"
 

@@ -20,6 +20,8 @@ class RunReview:
     revisions: list[int] = field(default_factory=list)
     """Those of the mission that the run followed, in this order; none in recordings that do not tell."""
     scanned: list[str] = field(default_factory=list)
+    unconfirmed: list[str] = field(default_factory=list)
+    """Worked off by an autopilot that told nothing of a scan."""
     skipped: list[str] = field(default_factory=list)
     failed: list[str] = field(default_factory=list)
     deviation_m: dict[str, float] = field(default_factory=dict)
@@ -100,7 +102,9 @@ def _events(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
 
 def _take(run: RunReview, event: dict[str, Any]) -> None:
     kind, stop = event["event"], event.get("stop", "")
-    outcomes = {"Scanned": run.scanned, "Skipped": run.skipped, "Failed": run.failed}
+    outcomes = {
+        "Scanned": run.scanned, "Unconfirmed": run.unconfirmed, "Skipped": run.skipped, "Failed": run.failed,
+    }  # fmt: skip
     if kind in outcomes:
         outcomes[kind].append(stop)
     elif kind == "Arrived":
@@ -114,8 +118,9 @@ def _take(run: RunReview, event: dict[str, Any]) -> None:
 
 
 def _run_lines(run: RunReview) -> list[str]:
+    unsure = f" {len(run.unconfirmed)} unconfirmed," if run.unconfirmed else ""
     lines = [
-        f"  run {run.run_id}: {len(run.scanned)} scanned, {len(run.skipped)} skipped,"
+        f"  run {run.run_id}: {len(run.scanned)} scanned,{unsure} {len(run.skipped)} skipped,"
         f" {len(run.failed)} failed; {run.ended or 'not ended'} after {run.seconds:.1f} s"
     ]
     if len(run.revisions) > 1:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from mission.document import Mission
-from mission.events import AnyEvent, Arrived, Failed, Scanned, Skipped
+from mission.events import AnyEvent, Arrived, Failed, Scanned, Skipped, Unconfirmed
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class StopRecord:
     arrived_s: float | None = None
     deviation_m: float | None = None
     outcome: str = "on the way"
-    """`arrived`, `scanned`, `skipped` or `failed`, with the reason."""
+    """`arrived`, `scanned`, `unconfirmed`, `skipped` or `failed`, with the reason."""
 
     def after(self, event: AnyEvent) -> StopRecord:
         """The record once the event has happened."""
@@ -27,7 +27,7 @@ class StopRecord:
             )
         if isinstance(event, Scanned):
             return replace(self, outcome="scanned")
-        if isinstance(event, Skipped | Failed):
+        if isinstance(event, Unconfirmed | Skipped | Failed):
             return replace(self, outcome=f"{type(event).__name__.lower()}: {event.reason}")
         return self
 

@@ -1,0 +1,206 @@
+"""What is seen of a vehicle in AUTO, told as the steps of a run: arrived, settled, scanned, or why not.
+
+Nothing here touches a vehicle, a clock or a disk. That a waypoint is reached is the vehicle's word; whether
+the robot stands at the stop is measured here, by its pose. That a scan was made is believed only of the
+vehicle's camera or scanner.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from bridge import run as runs
+from bridge.mavlink.visits import Course, Visit
+from bridge.robots import ScanFailed, ScanResult
+from bridge.run import Change, Run, changed
+from mission.document import Stop
+from mission.events import Paused, Pose, Resumed, Settled, Started, Unconfirmed
+
+SOMEBODY = "the vehicle's operator"
+"""Who gives orders that were not given here."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """A vehicle at one moment, as far as it is known."""
+
+    mode: str
+    """"AUTO", "HOLD", or what else it calls itself."""
+    armed: bool
+    place: int
+    """The item it works on, as a place in the list; the list's length once all is done."""
+    pose: Pose | None = None
+    """Measured while it worked on that item."""
+    still: bool = False
+    """Stands, by that measurement."""
+    scan: ScanResult | ScanFailed | None = None
+    """What the scanner told of the stop that is worked on."""
+    in_vain: bool = False
+    """No word of the scanner is to be expected any more."""
+
+    @property
+    def drives(self) -> bool:
+        """Whether it follows its mission."""
+        return self.mode == "AUTO" and self.armed
+
+
+def steps(run: Run, course: Course, sight: Sight) -> tuple[Change, ...]:
+    """All that has happened since the run was stored, one after another; none past a failure."""
+    taken: list[Change] = []
+    while (change := step(run, course, sight)) is not None:
+        taken.append(change)
+        if tried_again(run, change.run):  # it must be sent back before it is looked at again
+            break
+        run = change.run
+    return tuple(taken)
+
+
+def step(run: Run, course: Course, sight: Sight) -> Change | None:
+    """The next thing that has happened, if anything has."""
+    if run.stop_state == "VERIFYING" and run.state == "PAUSED":
+        return _verified(run, course, sight)
+    if run.state == "HOMING":
+        return runs.ended(run, run.then) if sight.place >= course.end else None
+    if run.state != "RUNNING" or run.at >= len(course.visits):
+        return None
+    return STEPS[run.stop_state](run, course, sight, course.visits[run.at])
+
+
+def _begun(run: Run, course: Course, sight: Sight, visit: Visit) -> Change | None:
+    return runs.leaving(run)
+
+
+def _driven(run: Run, course: Course, sight: Sight, visit: Visit) -> Change | None:
+    """The vehicle says that it is there; is it?"""
+    if sight.place <= visit.at:
+        return None
+    if sight.place >= visit.after:
+        return _unseen(run, course)
+    if sight.pose is None:
+        return None
+    stop = course.mission.stops[run.at]
+    away = deviation(sight.pose, stop)
+    if away <= stop.tolerance_m:
+        return runs.reached(changed(run, leg=run.at), course.mission, sight.pose, away)
+    if sight.still or sight.place >= visit.scan:
+        return runs.failed(run, course.mission, _beside(away, stop))
+    return None
+
+
+def _settled(run: Run, course: Course, sight: Sight, visit: Visit) -> Change | None:
+    if sight.place <= visit.at:
+        return Change(changed(run, stop_state="NAVIGATING"))
+    if sight.place < visit.scan:
+        return None
+    if sight.place >= visit.after or sight.pose is None:
+        return Change(changed(run, stop_state="SCANNING")) if sight.place >= visit.after else None
+    stop = course.mission.stops[run.at]
+    away = deviation(sight.pose, stop)
+    if away > stop.tolerance_m:
+        return runs.failed(run, course.mission, f"moved while it settled: {_beside(away, stop)}")
+    settled = partial(Settled, stop=stop.id, pose=sight.pose)
+    return Change(changed(run, stop_state="SCANNING"), (settled,))
+
+
+def _scanned(run: Run, course: Course, sight: Sight, visit: Visit) -> Change | None:
+    """The scanner's word is taken when it comes; the stop is done when its wait is over."""
+    if sight.place <= visit.at:
+        return Change(changed(run, stop_state="NAVIGATING"))
+    if isinstance(sight.scan, ScanResult):
+        return runs.scan_ended(run, course.mission, sight.scan)
+    if isinstance(sight.scan, ScanFailed):
+        gone = sight.place >= visit.after  # it has left: to go back would be a way nobody planned
+        tried = changed(run, attempt=course.mission.stops[run.at].retries) if gone else run
+        return runs.scan_ended(tried, course.mission, sight.scan)
+    if sight.place < visit.after or not sight.in_vain:
+        return None
+    return _unconfirmed(run, course, sight.pose, "the vehicle told nothing of a scan")
+
+
+def _scan_over(run: Run, course: Course, sight: Sight, visit: Visit) -> Change | None:
+    """A scan that has come in counts once its wait is over."""
+    return None if visit.at < sight.place < visit.after else _verified(run, course, sight)
+
+
+def _verified(run: Run, course: Course, sight: Sight) -> Change | None:
+    return None if sight.pose is None else runs.verified(run, course.mission, sight.pose)
+
+
+def _unseen(run: Run, course: Course) -> Change:
+    return _unconfirmed(run, course, None, "nobody saw where the vehicle stood")
+
+
+def _unconfirmed(run: Run, course: Course, pose: Pose | None, reason: str) -> Change:
+    """The vehicle is through with the stop, and that is all that is known."""
+    stop = course.mission.stops[run.at].id
+    behind = runs.next_stop(changed(run, leg=run.at + 1, done=(*run.done, stop)), course.mission)
+    telling = partial(Unconfirmed, stop=stop, pose=pose, reason=reason)
+    return Change(behind.run, (telling, *behind.events))
+
+
+STEPS: dict[str, Callable[[Run, Course, Sight, Visit], Change | None]] = {
+    "WAITING": _begun,
+    "NAVIGATING": _driven,
+    "SETTLING": _settled,
+    "SCANNING": _scanned,
+    "VERIFYING": _scan_over,
+}
+
+
+def tried_again(before: Run, after: Run) -> bool:
+    """Whether the vehicle must go back to the stop's waypoint for another attempt."""
+    same = (before.at, after.state, after.stop_state) == (after.at, "RUNNING", "WAITING")
+    return same and after.attempt > before.attempt
+
+
+def passed_by(run: Run, course: Course, sight: Sight) -> int | None:
+    """Where a vehicle goes on that waits at a stop that was left out; `None` if it does not."""
+    for visit in course.visits[: run.at]:
+        if visit.stop in run.skipped and visit.at < sight.place < visit.after < course.end:
+            return visit.after
+    return None
+
+
+def taken_over(run: Run, course: Course, sight: Sight, *, by: str = SOMEBODY) -> Change | None:
+    """What a change of the vehicle's mode that was not ordered here means for the run."""
+    going = run.state in ("RUNNING", "HOMING")
+    if going and not sight.drives and sight.place < course.end:
+        why = "disarmed" if sight.mode == "AUTO" else f"mode {sight.mode}"
+        return halted(run, f"{why}, by {by}")
+    if run.state in ("PAUSED", "HELD") and sight.drives and sight.place < course.end:
+        return resumed(run, by)
+    return None
+
+
+def halted(run: Run, reason: str) -> Change:
+    """The run stands; a scan that was under way will be taken again, one that has come in is kept."""
+    keep = run.stop_state if run.stop_state == "VERIFYING" else "WAITING"
+    homing = run.homing or run.state == "HOMING"
+    paused = changed(run, state="PAUSED", stop_state=keep, reason=reason, homing=homing)
+    return Change(paused, (partial(Paused, reason=reason),))
+
+
+def resumed(run: Run, by: str) -> Change:
+    keep = run.stop_state if run.stop_state == "VERIFYING" else "WAITING"
+    onward = changed(run, state="HOMING" if run.homing else "RUNNING", stop_state=keep, attempt=0, reason="")
+    return Change(onward, (partial(Resumed, commander=by),))
+
+
+def started(run: Run, course: Course, *, run_id: str, now_ns: int, by: str) -> Change:
+    """A new run, begun by whoever switched the vehicle to AUTO."""
+    fresh = Run(
+        state="RUNNING", mission_id=run.mission_id, revision=run.revision, run_id=run_id, started_ns=now_ns
+    )
+    return Change(fresh, (partial(Started, commander=by),))
+
+
+def deviation(pose: Pose, stop: Stop) -> float:
+    """Metres from the stop."""
+    return math.hypot(pose.x - stop.x, pose.y - stop.y)
+
+
+def _beside(away: float, stop: Stop) -> str:
+    return f"{away:.3f} m from the stop, tolerance is {stop.tolerance_m:g} m; the vehicle calls it reached"
