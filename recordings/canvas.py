@@ -148,13 +148,17 @@ def _try(path: Path) -> None:
 
 
 @contextmanager
-def open_canvas(path: Path, sheet: Sheet) -> Iterator[Canvas]:
-    """A recording written to `path`, with the blueprint that all recordings share; leaving closes it."""
+def open_canvas(path: Path, sheet: Sheet, *, port: int | None = None) -> Iterator[Canvas]:
+    """A recording written to `path`, with the blueprint that all recordings share; leaving closes it.
+
+    With a port, viewers of this machine can follow there what is drawn; until it is closed, all of it is
+    kept for those that come later.
+    """
     rr.set_strict_mode(True)
     with rr.RecordingStream(
         entities.APPLICATION, recording_id=sheet.recording_id, send_properties=False
     ) as stream:
-        _save(stream, path, sheet)
+        _save(stream, path, sheet, port)
         stream.set_log_time_enabled(False)
         stream.send_recording_name(sheet.name)
         canvas = Canvas(stream, sheet.origin)
@@ -162,10 +166,11 @@ def open_canvas(path: Path, sheet: Sheet) -> Iterator[Canvas]:
         yield canvas
 
 
-def _save(stream: rr.RecordingStream, path: Path, sheet: Sheet) -> None:
+def _save(stream: rr.RecordingStream, path: Path, sheet: Sheet, port: int | None) -> None:
     layout = blueprint(sheet.local_extent, of_run=sheet.of_run)
+    viewers = [] if port is None else [rr.GrpcServerSink("127.0.0.1", port)]
     try:
-        stream.save(path, default_blueprint=layout)
+        stream.set_sinks(rr.FileSink(str(path)), *viewers, default_blueprint=layout)
     except RuntimeError as error:
         raise InputError(f"{path}: cannot be written ({error})") from None
 

@@ -37,6 +37,7 @@ class FieldRecording:
         self._newest: Mission | None = None
         self._canvas: Canvas | None = None
         self._partial: Path | None = None
+        self._port: int | None = None
         self._given = mission
         self._open = ExitStack()
 
@@ -45,6 +46,10 @@ class FieldRecording:
         if self._given is not None:
             self.mission(self._given)
         return self
+
+    def serve(self, port: int) -> None:
+        """Let viewers of this machine follow the recording at a port, once it has begun."""
+        self._port = port
 
     def mission(self, mission: Mission) -> None:
         """Take the mission that is driven, or a new revision of it."""
@@ -98,7 +103,7 @@ class FieldRecording:
             extent=mission_extent(mission),
             of_run=True,
         )
-        self._canvas = self._open.enter_context(open_canvas(self._partial, sheet))
+        self._canvas = self._open.enter_context(open_canvas(self._partial, sheet, port=self._port))
         draw_mission(self._canvas, mission)
 
     def _take(self, report: Report) -> None:

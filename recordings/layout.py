@@ -22,10 +22,18 @@ MARGIN = 0.04
 
 
 def blueprint(bounds: Bounds | None = None, *, of_run: bool = False) -> rrb.Blueprint:
-    """Tabs for the mission, its planning stages, the run, and the log; 2D views show `bounds`."""
+    """Tabs for the mission, its planning stages, the run, and the log; 2D views show `bounds`.
+
+    A run is shown at its newest moment: a live one as it goes on, a recorded one at its end.
+    """
     return rrb.Blueprint(
         rrb.Tabs(_mission(bounds, of_run), _stages(bounds), _run(), _log(), active_tab=0),
-        rrb.TimePanel(timeline=at.MISSION_TIME, play_state="paused", state="collapsed", fps=STEPS_PER_SECOND),
+        rrb.TimePanel(
+            timeline=at.MISSION_TIME,
+            play_state="following" if of_run else "paused",
+            state="collapsed",
+            fps=STEPS_PER_SECOND,
+        ),
         auto_views=False,
         auto_layout=False,
         collapse_panels=True,

@@ -1,11 +1,13 @@
-"""Opens the Rerun viewer: on recordings that are closed, or on one that is still being written.
+"""Opens the Rerun viewer: on recordings that are closed, or on a run that is being recorded.
 
-The viewer listens on this machine only. It follows a file that grows, so a run is seen as it is recorded.
+A viewer reads a file once and does not see it grow, so it is told of a run while that is recorded. Both
+listen on this machine only.
 """
 
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -21,15 +23,15 @@ from recordings.field import FieldRecording
 def open_viewer(recordings: Sequence[Path]) -> None:
     """Show the recordings, and wait until the viewer is closed."""
     must_have_screen()
-    code = subprocess.run(_command(recordings), check=False).returncode
+    code = subprocess.run(_command(list(map(str, recordings))), check=False).returncode
     if code != 0:
         raise InputError(f"the Rerun viewer ended with code {code}; without a screen leave out --view")
 
 
-def start_viewer(recordings: Sequence[Path]) -> None:
-    """Show the recordings in a viewer that stays open, also after Ctrl-C here."""
+def start_viewer(address: str) -> None:
+    """Show what is recorded live, in a viewer that stays open, also after Ctrl-C here."""
     subprocess.Popen(
-        _command(recordings),
+        _command(["--connect", address]),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,
@@ -50,22 +52,22 @@ def must_have_screen() -> None:
         raise InputError(f"--view: no screen here ({' and '.join(screens)} are not set); leave out --view")
 
 
-def _command(recordings: Sequence[Path]) -> list[str]:
-    return [str(VIEWER), "--bind", "127.0.0.1", "--port", "auto", *map(str, recordings)]
+def _command(what: Sequence[str]) -> list[str]:
+    return [str(VIEWER), "--bind", "127.0.0.1", "--port", "auto", *what]
 
 
 class Viewed:
     """A field recording that is looked at: the viewer opens once there is something to be seen."""
 
-    def __init__(
-        self, record: FieldRecording, start: Callable[[Sequence[Path]], None] = start_viewer
-    ) -> None:
+    def __init__(self, record: FieldRecording, start: Callable[[str], None] = start_viewer) -> None:
         self._record = record
         self._start = start
+        self._port = _free_port()
         self._shown = False
 
     def __enter__(self) -> Viewed:
         must_have_screen()
+        self._record.serve(self._port)
         self._record.__enter__()
         return self
 
@@ -76,8 +78,7 @@ class Viewed:
         self._record.mission(mission)
         if not self._shown:
             self._shown = True
-            self._record.canvas.stream.flush()
-            self._start([being_written(self._record.path)])
+            self._start(f"rerun+http://127.0.0.1:{self._port}/proxy")
 
     def state(self, report: StateReport) -> None:
         self._record.state(report)
@@ -89,7 +90,7 @@ class Viewed:
         self._record.event(event)
 
 
-def being_written(path: Path) -> Path:
-    """The file that becomes `path` when the recording is closed: the newest of the partial ones."""
-    partial = path.parent.glob(f"{path.stem}.partial*.rrd")
-    return max(partial, key=lambda file: file.stat().st_mtime_ns, default=path)
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

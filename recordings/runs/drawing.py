@@ -84,15 +84,10 @@ class RunDrawing:
             return
         if self._last is not None and report.robot_ns - self._last.robot_ns > SILENT_S * 1e9:
             self._drawn = None
+        self._move(report.pose, report.robot_ns, first=self._last is None)
         self._last = report
-        pose = report.pose
-        place = self.canvas.local(np.array([pose.x, pose.y]))
-        turn = quaternions(np.array(pose.heading))
-        for robot in (self.names.flat(entities.ROBOT), self.names.solid(entities.ROBOT)):
-            moved = rr.Transform3D(translation=[*place, 0.0], quaternion=rr.Quaternion(xyzw=turn))
-            self._at(robot, moved, report.robot_ns)
-        self._lengthen(pose, report.robot_ns)
-        self._measure(pose, report.robot_ns)
+        self._lengthen(report.pose, report.robot_ns)
+        self._measure(report.pose, report.robot_ns)
 
     def state(self, report: StateReport) -> None:
         """Put the robot's and the stop's state on their lanes, and the battery on its plot."""
@@ -119,9 +114,7 @@ class RunDrawing:
 
     def _style(self) -> None:
         """What things look like, which stays the same for the whole run."""
-        canvas, names, radius = self.canvas, self.names, self.mission.robot.radius
-        robots = (names.flat(entities.ROBOT), names.solid(entities.ROBOT))
-        draw_robot(canvas, *robots, radius=radius, colour=palette.DRIVEN)
+        canvas, names = self.canvas, self.names
         states = rr.StateConfiguration(
             values=list(palette.STATE_COLOURS), colors=list(palette.STATE_COLOURS.values())
         )
@@ -149,6 +142,17 @@ class RunDrawing:
             "local_origin": list(self.canvas.origin),
         }
         self.canvas.describe(entities.PROPERTY_RUN, about)
+
+    def _move(self, pose: Pose, robot_ns: int, *, first: bool) -> None:
+        """Put the robot at its pose; with the first one its shape is drawn."""
+        robots = (self.names.flat(entities.ROBOT), self.names.solid(entities.ROBOT))
+        if first:
+            draw = partial(self._at, robot_ns=robot_ns)
+            draw_robot(draw, *robots, radius=self.mission.robot.radius, colour=palette.DRIVEN)
+        place = self.canvas.local(np.array([pose.x, pose.y]))
+        turn = rr.Quaternion(xyzw=quaternions(np.array(pose.heading)))
+        for robot in robots:
+            self._at(robot, rr.Transform3D(translation=[*place, 0.0], quaternion=turn), robot_ns)
 
     def _lengthen(self, pose: Pose, robot_ns: int) -> None:
         """Add the piece from the last drawn pose, once it is long enough to be seen."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import rerun as rr
@@ -11,10 +10,9 @@ from mission.document import Mission, Stop
 from recordings import entities, palette
 from recordings.canvas import Canvas
 from recordings.palette import Colour
+from recordings.robot import Draw
 from recordings.stages.mission import Leg, StopMarks, legs_of, route_lines, stop_marks
 
-Draw = Callable[[str, object], None]
-"""Draws an archetype at an entity, at the time of the change."""
 STEP = 0.02
 """How far what a revision changes lies above what was drawn before, as a share of a step of ORDER."""
 
@@ -48,7 +46,10 @@ def _place(stop: Stop) -> tuple[object, ...]:
 
 
 def draw_change(canvas: Canvas, change: Change, names: entities.Revision, draw: Draw) -> None:
-    """Grey over what is withdrawn, and what is new in the colours of stops and routes."""
+    """Grey over what is withdrawn, and what is new in the colours of stops and routes.
+
+    `draw` draws an archetype at an entity, at the time of the change.
+    """
     low = 2 * STEP * names.number
     high = low + STEP
     if change.withdrawn_legs:

@@ -82,7 +82,7 @@ def draw_drive(canvas: Canvas, drive: Drive, *, radius: float) -> None:
         columns = rr.Transform3D.columns(translation=strokes.level(xy, 0.0), quaternion=turn)
         canvas.columns(robot, index, columns)
     robots = (entities.PLANNED_ROBOT, entities.WORLD_PLANNED_ROBOT)
-    draw_robot(canvas, *robots, radius=radius, colour=palette.PLANNED)
+    draw_robot(canvas.show, *robots, radius=radius, colour=palette.PLANNED)
 
 
 def _draw_route(canvas: Canvas, mission: Mission) -> None:
@@ -112,7 +112,7 @@ def route_lines(
     flat = rr.LineStrips2D(
         canvas.strips(lines), colors=colours, radii=on_screen(1.2 * size), draw_order=order
     )
-    raised = [strokes.level(canvas.local(line), ABOVE_FLOOR) for line in lines]
+    raised = [strokes.level(canvas.local(line), ABOVE_FLOOR + 0.2 * above) for line in lines]
     return flat, rr.LineStrips3D(raised, colors=colours, radii=0.03 * size)
 
 

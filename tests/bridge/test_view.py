@@ -1,8 +1,8 @@
-"""Watching with the viewer: it opens once, on the file that is being written, or the reason is told."""
+"""Watching with the viewer: it opens once, on what is being recorded, or the reason is told."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import socket
 from pathlib import Path
 
 import pytest
@@ -15,20 +15,22 @@ from recordings.viewer import Viewed, open_viewer
 from tests.bridge.world import corridor
 
 
-def test_the_viewer_opens_once_on_what_is_being_written(
+def test_the_viewer_opens_once_on_what_is_being_recorded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("DISPLAY", ":0")
-    opened: list[Path] = []
+    opened: list[str] = []
 
-    def start(recordings: Sequence[Path]) -> None:
-        assert recordings[0].stat().st_size > 0
-        opened.extend(recordings)
+    def start(address: str) -> None:
+        port = int(address.removeprefix("rerun+http://127.0.0.1:").removesuffix("/proxy"))
+        socket.create_connection(("127.0.0.1", port)).close()
+        opened.append(address)
 
     with Viewed(FieldRecording(tmp_path / "field.rrd"), start) as record:
+        assert not opened
         record.mission(corridor())
         record.mission(corridor(stops=4, revision=2))
-    assert opened == [tmp_path / "field.partial.rrd"]
+    assert len(opened) == 1
     assert (tmp_path / "field.rrd").exists()
 
 
@@ -48,5 +50,5 @@ def test_to_view_is_to_record(tmp_path: Path) -> None:
 
 
 def test_the_viewer_listens_on_this_machine_only() -> None:
-    command = viewer._command([Path("f.rrd")])
+    command = viewer._command(["f.rrd"])
     assert command[1:3] == ["--bind", "127.0.0.1"]

@@ -63,6 +63,14 @@ def test_nothing_that_changes_is_hidden_by_something_static(field: Path) -> None
         assert not fixed & changing, f"{entity}: static {fixed & changing} hides what changes"
 
 
+def test_the_robot_is_not_drawn_before_its_first_pose(field: Path) -> None:
+    for robot in (f"{RUN}/robot", f"/world{RUN}/robot"):
+        moves = on(field, robot, "Transform3D:translation", entities.MISSION_TIME)
+        dimension = "3D" if robot.startswith("/world") else "2D"
+        shapes = on(field, entities.shape(robot), f"LineStrips{dimension}:strips", entities.MISSION_TIME)
+        assert list(shapes) == [min(moves)]
+
+
 def test_the_driven_path_grows_piece_by_piece(field: Path) -> None:
     pieces = on(field, f"{RUN}/driven", "LineStrips2D:strips", entities.MISSION_TIME)
     lengths = [float(np.hypot(*np.subtract(*strip))) for (strip,) in pieces.values()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,12 @@ import pytest
 from PIL import Image
 from rerun.experimental import ViewerClient
 
+from bridge.watch import hand_over
+from mission.document import Mission
 from recordings import palette
+from recordings.field import FieldRecording
+from recordings.viewer import Viewed
+from tests.recordings import run
 from tests.recordings.viewer import PATIENCE_S, has_vulkan, look, viewer
 
 pytestmark = pytest.mark.skipif(
@@ -67,6 +73,24 @@ def test_planning_is_played_on_its_own_timelines(
     with viewer([plan]) as client:
         client.set_time(timeline, sequence=1, play_state="paused")
         assert_shown(client, "Planning", {view: colour}, tmp_path)
+
+
+def test_a_viewer_follows_a_run_that_is_being_recorded(
+    tmp_path: Path, mission: Mission, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":0")
+    with ExitStack() as opened:
+        clients: list[ViewerClient] = []
+
+        def start(address: str) -> None:
+            clients.append(opened.enter_context(viewer(["--connect", address])))
+
+        with Viewed(FieldRecording(tmp_path / "field.rrd"), start) as record:
+            record.mission(mission)
+            assert_shown(clients[0], "Mission", {"Plan and run": palette.ROUTE}, tmp_path)
+            for report in run.reports(mission):
+                hand_over(record, report)
+            assert_shown(clients[0], "Mission", {"Plan and run": palette.DRIVEN}, tmp_path)
 
 
 def assert_shown(

@@ -28,8 +28,8 @@ def has_vulkan() -> bool:
 
 
 @contextmanager
-def viewer(files: Sequence[Path], *, size: str = "1600x1000") -> Iterator[ViewerClient]:
-    """A viewer that opened the files; its process group ends with the block.
+def viewer(files: Sequence[Path | str], *, size: str = "1600x1000") -> Iterator[ViewerClient]:
+    """A viewer that opened the files, or follows `--connect ADDRESS`; its processes end with the block.
 
     The files are given on the command line, as a person would: opened later they would not be merged.
     """
