@@ -12,6 +12,8 @@ JOIN = 1e-3
 """Metres within which the ends of two legs are the same place."""
 FAR = 1e8
 """Metres beyond which no site's coordinates lie."""
+EXTENT = 20_000.0
+"""Metres from its start beyond which no mission on a floor reaches."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ def problems_of(mission: Mission) -> tuple[Problem, ...]:
         *_georeference(mission),
         *_machine(mission),
         *_start(mission.start),
-        *_stops(mission.stops),
+        *_stops(mission),
         *_legs(mission),
         *_policy(mission),
     )
@@ -67,16 +69,17 @@ def _start(start: Start) -> Iterator[Problem]:
     yield from _pose("$.start", (start.x, start.y), start.heading)
 
 
-def _stops(stops: tuple[Stop, ...]) -> Iterator[Problem]:
-    if not stops:
+def _stops(mission: Mission) -> Iterator[Problem]:
+    if not mission.stops:
         yield Problem("$.stops", "is empty; a mission has at least one stop")
     known: dict[str, int] = {}
-    for index, stop in enumerate(stops):
+    for index, stop in enumerate(mission.stops):
         path = f"$.stops[{index}]"
         if stop.id in known:
             yield Problem(f"{path}.id", f"is {stop.id!r}, which $.stops[{known[stop.id]}] has already")
         known.setdefault(stop.id, index)
         yield from _stop(path, stop)
+        yield from _far_off(path, (stop.x, stop.y), mission.start)
 
 
 def _stop(path: str, stop: Stop) -> Iterator[Problem]:
@@ -99,12 +102,14 @@ def _legs(mission: Mission) -> Iterator[Problem]:
     for index, stop in enumerate(mission.stops):
         path = f"$.stops[{index}].approach"
         yield from _leg(path, stop.approach, begin=here, where=where)
+        yield from _strays(path, stop.approach, mission.start)
         here, where = (stop.x, stop.y), f"stop {stop.id}"
         if stop.approach and _apart(stop.approach[-1], here):
             end = len(stop.approach) - 1
             yield Problem(f"{path}[{end}]", f"{_place(stop.approach[-1])} is not {where} at {_place(here)}")
     if mission.return_ is not None:
         yield from _leg("$.return", mission.return_, begin=here, where=where)
+        yield from _strays("$.return", mission.return_, mission.start)
 
 
 def _leg(path: str, leg: tuple[Point, ...], *, begin: Point, where: str) -> Iterator[Problem]:
@@ -115,6 +120,19 @@ def _leg(path: str, leg: tuple[Point, ...], *, begin: Point, where: str) -> Iter
         yield Problem(f"{path}[0]", f"{_place(leg[0])} is not {where} at {_place(begin)}")
     for index, point in enumerate(leg):
         yield from _near(f"{path}[{index}]", point)
+
+
+def _strays(path: str, leg: tuple[Point, ...], start: Start) -> Iterator[Problem]:
+    for index, point in enumerate(leg):
+        yield from _far_off(f"{path}[{index}]", point, start)
+
+
+def _far_off(path: str, place: Point, start: Start) -> Iterator[Problem]:
+    """Coordinates that are a survey's may be large; how far a mission reaches is another matter."""
+    away = math.dist(place, (start.x, start.y))
+    if EXTENT < away <= FAR:
+        told = f"{_place(place)} is {away / 1000:.1f} km from the start"
+        yield Problem(path, f"{told}; no mission reaches beyond {EXTENT / 1000:g} km")
 
 
 def _apart(one: Point, other: Point) -> bool:

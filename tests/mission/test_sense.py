@@ -84,6 +84,31 @@ def test_numbers_that_are_none_are_told() -> None:
     assert {"$.stops[0]", "$.stops[0].approach[1]"} <= set(paths(broken))
 
 
+def test_a_waypoint_that_no_robot_drives_to_is_told() -> None:
+    (problem,) = problems_of(with_stop(1, approach=((4.0, 0.0), (1e6, 0.0), (4.0, 3.0))))
+    assert str(problem) == (
+        "$.stops[1].approach[1]: (1000000.000, 0.000) is 1000.0 km from the start; "
+        "no mission reaches beyond 20 km"
+    )
+    assert paths(with_stop(1, x=0.0, y=20_001.0, approach=((4.0, 0.0), (0.0, 20_001.0)))) == [
+        *("$.stops[1]", "$.stops[1].approach[1]", "$.return[0]"),
+    ]
+    assert paths(change(square_tour(), return_=((4.0, 3.0), (4.0, 3e4), (0.0, 0.0)))) == ["$.return[1]"]
+
+
+def test_a_mission_in_survey_coordinates_is_sound() -> None:
+    x, y = 500_000.0, 5_400_000.0
+    mission = square_tour()
+    start = change(mission.start, x=mission.start.x + x, y=mission.start.y + y)
+    legs = [tuple((px + x, py + y) for px, py in item.approach) for item in mission.stops]
+    stops = tuple(
+        change(item, x=item.x + x, y=item.y + y, approach=leg)
+        for item, leg in zip(mission.stops, legs, strict=True)
+    )
+    back = tuple((px + x, py + y) for px, py in mission.return_ or ())
+    assert problems_of(change(mission, start=start, stops=stops, return_=back)) == ()
+
+
 def test_the_rest_of_the_document_is_looked_at() -> None:
     mission = square_tour()
     broken = change(
