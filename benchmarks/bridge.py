@@ -36,12 +36,16 @@ def main() -> None:
 
 
 def measure(folder: Path, *, with_keys: bool) -> None:
-    extra, keys, protocol = [], None, "tcp"
+    extra, keys, protocol = ["--endurance", "0"], None, "tcp"
     if with_keys:
         init_site(folder / "keys", now=now_utc())
         issue(folder / "keys", "robot", "r1", now=now_utc())
         issue(folder / "keys", "station", "alice", now=now_utc())
-        extra, keys, protocol = ["--keys", str(folder / "keys" / "r1")], folder / "keys" / "alice", "tls"
+        extra, keys, protocol = (
+            [*extra, "--keys", str(folder / "keys" / "r1")],
+            folder / "keys" / "alice",
+            "tls",
+        )
     port = free_port()
     robot = start_robot("r1", folder / "state", listen=f"{protocol}/127.0.0.1:{port}", extra=extra)
     try:

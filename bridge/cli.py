@@ -89,6 +89,10 @@ def robot(
         list[str] | None,
         typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="Let something go wrong, as slip@2=0.2."),
     ] = None,
+    endurance: Annotated[
+        float,
+        typer.Option(metavar="HOURS", min=0, help="How long a full battery lasts; 0: it does not run down."),
+    ] = 6.0,
     revision: Annotated[
         str, typer.Option(metavar="next-stop|refuse", help="What becomes of a revision pushed during a run.")
     ] = "next-stop",
@@ -106,7 +110,7 @@ def robot(
         name=name, listen=listen, connect=connect, state=state, site=site, speed_up=speed_up,
         at=None if at is None else read_pose("--at", at),
         to_map=None if map_ is None else read_transform("--map", map_),
-        insecure=insecure, revisions=read_revisions(revision),
+        insecure=insecure, revisions=read_revisions(revision), endurance_s=3600 * endurance,
         keys=keys, faults=Faults(tuple(read_fault(text) for text in fault or ())),
     )  # fmt: skip
     where = f"listens on {listen}" if connect is None else f"connects to {connect}"

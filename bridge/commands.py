@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from bridge import route
+from bridge.battery import what_is_missing
 from bridge.lease import FREE_VERBS, Denied, claimed
 from bridge.protocol import LONGEST_VALID_S, Command, Lease, Reason
 from bridge.run import Change, Run, Telling, changed, ended, sent_home, skipped, stop_of
@@ -30,6 +31,8 @@ class Situation:
     """On the clock of commands."""
     new_run_id: str
     lease: Lease | None
+    battery: float
+    endurance_s: float | None
     not_ready: str = ""
     """Why the robot's base cannot drive at present."""
 
@@ -124,6 +127,11 @@ def _start(command: Command, mission: Mission, situation: Situation) -> Change |
     leg = _starting_leg(command, mission, situation.pose)
     if isinstance(leg, Refused):
         return leg
+    missing = what_is_missing(
+        mission, battery=situation.battery, endurance_s=situation.endurance_s, first=leg
+    )
+    if missing:
+        return Refused("infeasible", missing)
     left_out = tuple(stop.id for stop in mission.stops[:leg])
     run = Run(
         state="RUNNING", mission_id=mission.id, revision=mission.revision,

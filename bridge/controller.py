@@ -17,6 +17,7 @@ import msgspec
 
 from bridge import revision, route
 from bridge import run as runs
+from bridge.battery import what_is_missing
 from bridge.clock import Clock
 from bridge.commands import Decision, Refused, Situation, decide, handed_over
 from bridge.journal import Journal
@@ -150,6 +151,8 @@ class Controller:
             command_ns=self._command_clock.now_ns(),
             new_run_id=uuid.uuid4().hex[:12],
             lease=self.lease,
+            battery=self._base.battery(),
+            endurance_s=self._base.endurance_s(),
             not_ready=self._base.not_ready(),
         )
 
@@ -215,13 +218,17 @@ class Controller:
         return None
 
     def _unfit(self, mission: Mission) -> Refused | None:
-        """Why a mission cannot be taken: by this base, or during the present run."""
+        """Why a mission cannot be taken: by this base, during the present run, or with this battery."""
         unfit = self._base.unfit(mission)
         if unfit:
             return Refused("infeasible", unfit)
         run, held = self._run, self._mission
         if run.over or held is None:
-            return None
+            return self._too_long(mission, first=0)
+        return self._unfit_now(run, held, mission) or self._too_long(mission, first=run.at)
+
+    def _unfit_now(self, run: Run, held: Mission, mission: Mission) -> Refused | None:
+        """Why the run cannot go on by `mission` from the next stop on."""
         if mission.id != held.id:
             return Refused("running", f"the robot is {run.state} with mission {held.id}")
         if self._revisions == "refuse":
@@ -230,6 +237,11 @@ class Controller:
             return Refused("running", "the robot is on its way home for good")
         differs = revision.what_differs(run, held, mission)
         return Refused("way_differs", f"revision {mission.revision}: {differs}") if differs else None
+
+    def _too_long(self, mission: Mission, *, first: int) -> Refused | None:
+        battery, endurance_s = self._base.battery(), self._base.endurance_s()
+        missing = what_is_missing(mission, battery=battery, endurance_s=endurance_s, first=first)
+        return Refused("infeasible", missing) if missing else None
 
     def hear_of_link(self, silent_s: float) -> None:
         """Told how long no station has been heard; the mission's policy may want something of it."""

@@ -38,6 +38,9 @@ class OnMap:
     def battery(self) -> float:
         return self._base.battery()
 
+    def endurance_s(self) -> float | None:
+        return self._base.endurance_s()
+
     def goto(
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
     ) -> Outcome:

@@ -20,7 +20,7 @@ from bridge.journal import Journal, open_journal
 from bridge.link import Link
 from bridge.protocol import Keys
 from bridge.revision import RevisionPolicy
-from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner
+from bridge.simulator import ENDURANCE_S, NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
 from mission.document import Mission, Start, Transform
 from mission.errors import InputError
 from mission.events import Pose
@@ -48,6 +48,8 @@ class RobotOptions:
     """What becomes of a new revision that is pushed during a run."""
     faults: Faults = NO_FAULTS
     """What the simulated robot is to get wrong."""
+    endurance_s: float = ENDURANCE_S
+    """How long the simulated robot's battery lasts; 0 if it does not run down."""
 
 
 def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
@@ -71,7 +73,10 @@ def robot_on(
     """A simulated robot on `link`; with keys of its own it obeys only what stations have signed."""
     with open_journal(options.state, options.name) as journal:
         clock, wall = clocks(journal, speed_up=options.speed_up)
-        simulated = SimulatedBase(clock=clock, keep=options.state / "world.json", faults=options.faults)
+        wear = Wear(battery_per_s=1.0 / options.endurance_s if options.endurance_s else 0.0)
+        simulated = SimulatedBase(
+            clock=clock, keep=options.state / "world.json", faults=options.faults, wear=wear
+        )
         base = OnMap(simulated, options.to_map)
         scanner = SimulatedScanner(clock=clock, record=options.state / "scans.log", faults=options.faults)
         journal.edge = crashing(options.faults)

@@ -39,6 +39,9 @@ class Base(Protocol):
     def battery(self) -> float:
         """0 to 1."""
 
+    def endurance_s(self) -> float | None:
+        """Seconds that a full battery lasts at work; `None` if it cannot tell."""
+
     def goto(
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
     ) -> Outcome:

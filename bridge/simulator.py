@@ -24,6 +24,7 @@ from mission.events import Pose
 SLICE_S = 0.5
 """How often a moving robot's place is written down: what a crash can cost."""
 SHAKE_M = 0.005
+ENDURANCE_S = 6 * 3600.0
 POINTS_PER_S = 360_000
 BYTES_PER_POINT = 16
 
@@ -44,7 +45,8 @@ class Wear:
     noise_m: float = 0.004
     """Standard deviation of where it ends up, each axis; never more than two of them."""
     noise_rad: float = 0.002
-    battery_per_s: float = 1.0 / (6 * 3600)
+    battery_per_s: float = 1.0 / ENDURANCE_S
+    """While it drives; 0 for a battery that does not run down."""
 
 
 FaultKind = Literal["slip", "blocked", "shaking", "drain", "scanner", "empty", "crash", "crashed"]
@@ -126,6 +128,10 @@ class SimulatedBase:
 
     def battery(self) -> float:
         return self._world.battery
+
+    def endurance_s(self) -> float | None:
+        used = self._wear.battery_per_s
+        return 1.0 / used if used > 0 else None
 
     def goto(
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event

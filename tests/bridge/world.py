@@ -36,7 +36,7 @@ from mission.document import (
     sealed,
 )
 
-EXACT = Wear(noise_m=0.0, noise_rad=0.0)
+EXACT = Wear(noise_m=0.0, noise_rad=0.0, battery_per_s=0.0)
 WALKING = RobotSpec(radius=0.35, speed=0.5, turn_rate=math.radians(45), acceleration=0.5)
 
 

@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -48,6 +48,7 @@ class Supervisor:
     state: Path
     faults: list[str]
     endpoint: str = field(default_factory=lambda: f"tcp/127.0.0.1:{free_port()}")
+    extra: Sequence[str] = ()
     kills: int = 0
     closing: bool = False
 
@@ -69,8 +70,9 @@ class Supervisor:
         """A robot that got ready; one that dies while it boots is started again."""
         while True:
             fault = ["--fault", self.faults.pop()] if self.faults else []
+            extra = ["--endurance", "0", *self.extra, *fault]
             try:
-                return start_robot("r1", self.state, listen=self.endpoint, speed_up=SPEED_UP, extra=fault)
+                return start_robot("r1", self.state, listen=self.endpoint, speed_up=SPEED_UP, extra=extra)
             except RobotUnreachable:
                 self.kills += 1
                 assert fault, "a robot without a fault did not start"

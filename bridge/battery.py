@@ -1,0 +1,34 @@
+"""Whether a robot's battery carries a mission to its end, as far as the robot can tell."""
+
+from __future__ import annotations
+
+from mission.document import Mission
+from mission.schedule import schedule
+
+
+def what_is_missing(mission: Mission, *, battery: float, endurance_s: float | None, first: int = 0) -> str:
+    """Why the battery does not last from stop `first` to the mission's end; empty if it does.
+
+    Nothing is known of a robot whose `endurance_s` (seconds on a full battery) is `None`.
+    """
+    if endurance_s is None:
+        return ""
+    least = mission.policy.battery_min
+    needed_s, lasts_s = time_left(mission, first), max(0.0, battery - least) * endurance_s
+    if needed_s <= lasts_s:
+        return ""
+    return (
+        f"the mission takes {needed_s / 3600:.1f} h as planned; the battery, at {battery:.0%}, lasts"
+        f" {lasts_s / 3600:.1f} h until {least:.0%}: charge it, or plan fewer stops"
+    )
+
+
+def time_left(mission: Mission, first: int) -> float:
+    """Seconds that the mission takes from leaving for stop `first` on, if nothing goes wrong."""
+    plan = schedule(mission)
+    if first == 0:
+        return plan.total_s
+    if first >= len(mission.stops):
+        return 0.0
+    before = mission.stops[first - 1]
+    return plan.total_s - float(plan.arrival_s[first - 1]) - before.settle_s - before.scan.duration_s
