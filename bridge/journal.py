@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar
+from typing import IO, TypeVar
 
 import msgspec
 
@@ -119,6 +119,15 @@ class Journal:
             )
         )
 
+    def last_event(self, run_id: str, kind: str) -> AnyEvent | None:
+        """The newest event of a kind in a run."""
+        statement = "SELECT body FROM events WHERE run_id = ? AND kind = ? ORDER BY number DESC LIMIT 1"
+        rows = self._rows(statement, run_id, kind)
+        return msgspec.json.decode(rows[0][0], type=AnyEvent) if rows else None
+
+    def forget_fact(self, name: str) -> None:
+        self._write("DELETE FROM facts WHERE name = ?", name)
+
     def answer(self, cmd_id: str) -> tuple[str, Answer] | None:
         """The stored answer of a command, and the hash of the order it belongs to."""
         rows = self._rows("SELECT order_sha, body FROM answers WHERE cmd_id = ?", cmd_id)
@@ -139,6 +148,12 @@ class Journal:
             *(mission_id, revision),
         )
         return (msgspec.json.decode(rows[0][0], type=Manifest), bytes(rows[0][1])) if rows else None
+
+    def store_mission(self, manifest: Manifest, document: bytes) -> None:
+        """Keep a mission that came by another way than in pieces."""
+        key = (manifest.mission_id, manifest.revision)
+        encoded = msgspec.json.encode(manifest)
+        self._write("INSERT OR REPLACE INTO missions VALUES (?, ?, ?, ?)", *key, encoded, document)
 
     def newest_revision(self, mission_id: str) -> Manifest | None:
         rows = self._rows(
@@ -219,23 +234,49 @@ def open_journal(directory: Path, robot: str) -> Iterator[Journal]:
     InputError
         If the directory cannot be used, is in use, or belongs to another robot.
     """
+    with _lock_file(directory, "lock") as lock:
+        _take(lock.fileno(), directory)
+        os.ftruncate(lock.fileno(), 0)
+        os.pwrite(lock.fileno(), str(os.getpid()).encode(), 0)
+        with _opened(directory, robot) as journal:
+            yield journal
+
+
+@contextmanager
+def shared_journal(directory: Path, robot: str) -> Iterator[Journal]:
+    """The same, while other processes may use it too; only `open_journal` excludes them, and is excluded.
+
+    Whoever writes from what was read does both in one `transaction`.
+    """
+    with _lock_file(directory, "lock") as lock, _lock_file(directory, "opening") as opening:
+        _take(lock.fileno(), directory, fcntl.LOCK_SH)
+        # Two at once cannot make the tables, or change how the file is written.
+        fcntl.flock(opening.fileno(), fcntl.LOCK_EX)
+        with _opened(directory, robot) as journal:
+            fcntl.flock(opening.fileno(), fcntl.LOCK_UN)
+            yield journal
+
+
+def _lock_file(directory: Path, name: str) -> IO[str]:
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        lock = (directory / "lock").open("a+")
+        return (directory / name).open("a+")
     except OSError as error:
         raise InputError(f"--state {directory}: cannot be used ({error.strerror})") from None
-    with lock:
-        _take(lock.fileno(), directory)
-        path = directory / "journal.sqlite"
-        connection = _connect(path)
-        try:
-            journal = Journal(connection)
-            _claim(journal, directory, robot)
-            yield journal
-        except sqlite3.DatabaseError as error:
-            raise InputError(f"{path}: {error}; is the disk full, read-only or damaged?") from None
-        finally:
-            connection.close()
+
+
+@contextmanager
+def _opened(directory: Path, robot: str) -> Iterator[Journal]:
+    path = directory / "journal.sqlite"
+    connection = _connect(path)
+    try:
+        journal = Journal(connection)
+        _claim(journal, directory, robot)
+        yield journal
+    except sqlite3.DatabaseError as error:
+        raise InputError(f"{path}: {error}; is the disk full, read-only or damaged?") from None
+    finally:
+        connection.close()
 
 
 def memory_journal() -> Journal:
@@ -253,16 +294,14 @@ def _connect(path: Path) -> sqlite3.Connection:
     return connection
 
 
-def _take(lock: int, directory: Path) -> None:
+def _take(lock: int, directory: Path, how: int = fcntl.LOCK_EX) -> None:
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(lock, how | fcntl.LOCK_NB)
     except BlockingIOError:
         holder = os.pread(lock, 32, 0).decode(errors="replace").strip() or "unknown"
         raise InputError(
             f"--state {directory}: in use by another robot process (pid {holder}); give each its own"
         ) from None
-    os.ftruncate(lock, 0)
-    os.pwrite(lock, str(os.getpid()).encode(), 0)
 
 
 def _claim(journal: Journal, directory: Path, robot: str) -> None:

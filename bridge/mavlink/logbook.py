@@ -1,0 +1,233 @@
+"""What a vehicle cannot remember, in a folder of the station: the mission it was sent, and what became of it.
+
+Every process that talks to the vehicle opens the same folder, one after another or at the same time. What a
+process sees moves the run on only from where the journal says that it is: so two that see the same tell it
+once, and none goes back.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from bridge import run as runs
+from bridge.clock import Clock, WallClock
+from bridge.journal import Journal, shared_journal
+from bridge.mavlink.url import Url
+from bridge.mavlink.visits import Course, course_of
+from bridge.protocol import CHUNK_BYTES, Manifest
+from bridge.run import Change, Run
+from mission.document import Mission
+from mission.events import Aborted, AnyEvent
+from mission.mavlink.items import ItemList
+
+REBOOT_NS = 5 * 10**9
+"""A vehicle whose clock began so much later than it was known to was started anew."""
+
+
+class Sent(msgspec.Struct, frozen=True, kw_only=True):
+    """The list by which the vehicle was sent its mission."""
+
+    mission_id: str
+    revision: int
+    sha256: str
+    """Of the items."""
+
+
+class Items(msgspec.Struct, frozen=True):
+    """An `ItemList` as msgpack, which knows NaN."""
+
+    packed: bytes
+
+
+class Boot(msgspec.Struct, frozen=True, kw_only=True):
+    """Since when the vehicle is on."""
+
+    boot_id: str
+    began_ns: int
+    """At the latest, on the station's clock."""
+
+
+class Ordered(msgspec.Struct, frozen=True, kw_only=True):
+    """An order that a process is carrying out: what the vehicle does meanwhile is not somebody else's."""
+
+    verb: str
+    by: str
+    mode: str
+    """The one the vehicle is to end in."""
+    until_ns: int
+    """Then nobody is carrying it out any more."""
+
+
+class Owed(msgspec.Struct, frozen=True, kw_only=True):
+    """What the vehicle must be told because of what the run has come to."""
+
+    deed: Literal["hold", "jump"]
+    place: int
+    since_ns: int
+
+
+class Moment(msgspec.Struct, frozen=True):
+    at_ns: int
+
+
+class Logbook:
+    """One vehicle's run, as the station's journal has it."""
+
+    def __init__(self, journal: Journal, robot: str, clock: Clock) -> None:
+        self.journal = journal
+        self.robot = robot
+        self.clock = clock
+        self._course: tuple[Sent, Course] | None = None
+
+    @property
+    def run(self) -> Run:
+        return self.journal.fact("run", Run) or Run()
+
+    @property
+    def course(self) -> Course | None:
+        """The mission that was sent last, and how; the same object until another was."""
+        sent = self.journal.fact("sent", Sent)
+        if sent is None:
+            return None
+        if self._course is None or self._course[0] != sent:
+            self._course = (sent, self._read_course(sent))
+        return self._course[1]
+
+    def _read_course(self, sent: Sent) -> Course:
+        stored = self.journal.mission(sent.mission_id, sent.revision)
+        items = self.journal.fact("items", Items)
+        assert stored is not None and items is not None
+        mission = msgspec.json.decode(stored[1], type=Mission)
+        return course_of(mission, msgspec.msgpack.decode(items.packed, type=ItemList))
+
+    @property
+    def boot_id(self) -> str:
+        boot = self.journal.fact("boot", Boot)
+        return boot.boot_id if boot else "unknown"
+
+    def booted(self, boot_ms: int) -> bool:
+        """Told of the vehicle's clock: whether it was started anew since anybody last looked."""
+        began_ns = self.clock.now_ns() - boot_ms * 10**6
+        boot = self.journal.fact("boot", Boot)
+        if boot is not None and boot.began_ns <= began_ns <= boot.began_ns + REBOOT_NS:
+            return False
+        with self.journal.transaction():
+            boot = self.journal.fact("boot", Boot)
+            anew = boot is None or began_ns > boot.began_ns + REBOOT_NS
+            boot_id = uuid.uuid4().hex[:12] if boot is None or anew else boot.boot_id
+            self.journal.store_fact("boot", Boot(boot_id=boot_id, began_ns=began_ns))
+        return anew and boot is not None
+
+    def move(self, moved: Callable[[Run], tuple[Change, ...]], owed: Owing | None = None) -> Run:
+        """Store all that has happened to the run; `moved` says what, from the run as it is stored.
+
+        `owed` tells what each change wants of the vehicle; it is stored with it.
+        """
+        if not moved(self.run):
+            return self.run
+        with self.journal.transaction():
+            run = self.run
+            for change in moved(run):
+                self._put(change)
+                deed = owed(run, change.run) if owed else None
+                if deed is not None:
+                    self.journal.store_fact("owed", deed)
+                run = change.run
+        return run
+
+    def _put(self, change: Change) -> None:
+        now_ns, run, before = self.clock.now_ns(), change.run, self.run
+        self.journal.store_fact("run", run)
+        if run.state != before.state:
+            self.journal.store_fact("changed", Moment(now_ns))
+        for telling in change.events:
+            event: AnyEvent = telling(
+                number=0, robot=self.robot, boot_id=self.boot_id, run_id=run.run_id or "",
+                mission_id=run.mission_id or "", revision=run.revision or 0, robot_ns=now_ns,
+                mission_time_s=(now_ns - run.started_ns) / 1e9,
+            )  # fmt: skip
+            self.journal.append(event)
+
+    @property
+    def changed_ns(self) -> int:
+        """When the run's state last changed."""
+        moment = self.journal.fact("changed", Moment)
+        return moment.at_ns if moment else 0
+
+    @property
+    def ordered(self) -> Ordered | None:
+        """The order that is being carried out, or was the last."""
+        return self.journal.fact("ordered", Ordered)
+
+    @property
+    def owed(self) -> Owed | None:
+        return self.journal.fact("owed", Owed)
+
+    def paid(self, owed: Owed) -> None:
+        """The vehicle was told; unless it already owes something else."""
+        with self.journal.transaction():
+            if self.owed == owed:
+                self.journal.forget_fact("owed")
+
+
+Owing = Callable[[Run, Run], Owed | None]
+
+
+def remember(book: Logbook, mission: Mission, sent: ItemList) -> None:
+    """The vehicle holds this mission now, as this list; a run of another, or of this, is over with it."""
+    document = msgspec.json.encode(mission)
+    manifest = Manifest(
+        mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
+        sha256=hashlib.sha256(document).hexdigest(), chunk_bytes=CHUNK_BYTES,
+    )  # fmt: skip
+    packed = msgspec.msgpack.encode(sent)
+    told = Sent(mission_id=mission.id, revision=mission.revision, sha256=hashlib.sha256(packed).hexdigest())
+    course_of(mission, sent)
+    with book.journal.transaction():
+        book.journal.store_mission(manifest, document)
+        book.move(lambda run: () if run.over else (_replaced(run),))
+        book.journal.store_fact("run", runs.installed(book.run, mission))
+        book.journal.store_fact("sent", told)
+        book.journal.store_fact("items", Items(packed))
+        book.journal.forget_fact("owed")
+
+
+def _replaced(run: Run) -> Change:
+    over = runs.changed(run, state="ABORTED", reason="a mission was pushed to the vehicle")
+    return Change(over, (partial(Aborted, reason=over.reason),))
+
+
+@contextmanager
+def logbook(url: Url, vehicle: int, state: Path | None = None) -> Iterator[Logbook]:
+    """The logbook of the vehicle with this system id at `url`; in `state`, if given.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be used, or belongs to another vehicle.
+    """
+    robot = name_of(vehicle)
+    with shared_journal(state or usual_folder(url, vehicle), robot) as journal:
+        wall = WallClock()
+        yield Logbook(journal, robot, WallClock(origin_ns=max(wall.now_ns(), journal.newest_ns + 1)))
+
+
+def name_of(vehicle: int) -> str:
+    """What the robot with this system id is called."""
+    return f"mavlink-{vehicle}"
+
+
+def usual_folder(url: Url, vehicle: int) -> Path:
+    """`$XDG_STATE_HOME/stopgo/…`, named by URL and vehicle."""
+    home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    return Path(home) / "stopgo" / f"{re.sub(r'[^A-Za-z0-9.-]+', '-', str(url))}-vehicle-{vehicle}"
