@@ -1,40 +1,124 @@
-"""Which points of a leg must be driven through."""
+"""Which points of a leg must be driven through: the fewest that keep the robot near it.
+
+A planned leg goes round a corner in an arc of many short pieces. At each waypoint a vehicle may stop, and it
+holds only so many, so an arc is replaced by few corners that lie a little outside it, joined by lines that
+pass a little inside: the way that leaves the leg by no more than allowed with the fewest corners.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from mission.document import Point
 
+THIN = 0.05
+"""Share of the allowance that is spent on leaving out points of nearly straight pieces, for speed."""
+OFFSETS = (0.5, 1.0)
+"""How far outside an arc a corner may be put, in shares of the rest."""
+
+
+@dataclass(frozen=True)
+class _Spot:
+    """Where a corner may be."""
+
+    at: Point
+    along: float
+    """Its place on the leg: the number of a point, or half a number more for the middle of a piece."""
+    off: float
+    """Metres from that place."""
+
 
 def corners(leg: Sequence[Point], *, within: float) -> tuple[Point, ...]:
-    """The leg's ends, and the points between them without which it would be left by more than `within`.
+    """The leg's ends, and between them the fewest points whose joining lines stay within `within` of it.
 
-    Straight lines between the points that stay run nowhere farther than `within` metres from the leg, so a
-    corner is never cut by more.
+    No straight line between them runs farther than `within` metres from the leg, nor the leg from them, so
+    no corner is cut by more.
     """
-    if not leg:
-        return ()
+    if len(leg) < 3:
+        return tuple(leg)
+    thin = _thinned(leg, within * THIN)
+    rest = within * (1 - THIN)
+    return _fewest(thin, tuple(_spots(thin, rest)), rest)
+
+
+def _thinned(leg: Sequence[Point], within: float) -> list[Point]:
+    """The leg without the points that lie on the line between those that stay."""
     kept, at = [leg[0]], 0
     while at < len(leg) - 1:
-        at = _reach(leg, at, within)
-        kept.append(leg[at])
-    return tuple(kept)
+        end = at + 1
+        while end + 1 < len(leg) and _away(leg[at + 1 : end + 1], leg[at], leg[end + 1]) <= within:
+            end += 1
+        kept.append(leg[end])
+        at = end
+    return kept
 
 
-def _reach(leg: Sequence[Point], at: int, within: float) -> int:
-    """The farthest point that can be driven to straight from `at`, all points between staying near."""
-    end = at + 1
-    while end + 1 < len(leg) and all(
-        _distance(point, leg[at], leg[end + 1]) <= within for point in leg[at + 1 : end + 1]
-    ):
-        end += 1
-    return end
+def _spots(leg: Sequence[Point], within: float) -> Iterator[_Spot]:
+    """The leg's points, places outside its corners, and places beside the middles of its inner pieces."""
+    yield _Spot(leg[0], 0.0, 0.0)
+    for k in range(1, len(leg) - 1):
+        before, here, after = leg[k - 1 : k + 2]
+        yield _Spot(here, float(k), 0.0)
+        (ux, uy), (wx, wy) = _direction(before, here), _direction(here, after)
+        yield from _beside(here, (ux - wx, uy - wy), float(k), within)
+        if k < len(leg) - 2:
+            middle = ((here[0] + after[0]) / 2, (here[1] + after[1]) / 2)
+            yield from _beside(middle, (-wy, wx), k + 0.5, within)
+            yield from _beside(middle, (wy, -wx), k + 0.5, within)
+    yield _Spot(leg[-1], float(len(leg) - 1), 0.0)
+
+
+def _beside(place: Point, towards: Point, along: float, within: float) -> Iterator[_Spot]:
+    x, y = _direction((0.0, 0.0), towards)
+    if (x, y) != (0.0, 0.0):
+        for share in OFFSETS:
+            off = share * within
+            yield _Spot((place[0] + off * x, place[1] + off * y), along, off)
+
+
+def _fewest(leg: Sequence[Point], spots: Sequence[_Spot], within: float) -> tuple[Point, ...]:
+    """The shortest chain of spots from end to end; of several, the one nearest to the leg."""
+    best = [(0, 0.0), *[(len(spots), 0.0)] * (len(spots) - 1)]
+    before = [0] * len(spots)
+    for i in range(len(spots)):
+        for j, away in _straight_on(leg, spots, i, within):
+            cost = (best[i][0] + 1, best[i][1] + away + spots[j].off)
+            if cost < best[j]:
+                best[j], before[j] = cost, i
+    chain = [len(spots) - 1]
+    while chain[-1] != 0:
+        chain.append(before[chain[-1]])
+    return tuple(spots[i].at for i in reversed(chain))
+
+
+def _straight_on(
+    leg: Sequence[Point], spots: Sequence[_Spot], start: int, within: float
+) -> Iterator[tuple[int, float]]:
+    """The spots that can be driven to straight from one, and how far that leaves the leg.
+
+    Looks no farther than one piece of the leg beyond the last that can be.
+    """
+    here = last = spots[start]
+    for j in range(start + 1, len(spots)):
+        there = spots[j]
+        if there.along > last.along + 1:
+            return
+        if there.along == here.along:
+            continue
+        away = _away(leg[math.floor(here.along) + 1 : math.ceil(there.along)], here.at, there.at)
+        if away <= within:
+            last = there
+            yield j, away
+
+
+def _away(points: Sequence[Point], a: Point, b: Point) -> float:
+    """Metres by which the farthest of some points lies from the segment from `a` to `b`."""
+    return max((_distance(point, a, b) for point in points), default=0.0)
 
 
 def _distance(point: Point, a: Point, b: Point) -> float:
-    """Metres from a point to the segment from `a` to `b`."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     length = dx * dx + dy * dy
     if length == 0:
@@ -42,3 +126,9 @@ def _distance(point: Point, a: Point, b: Point) -> float:
     along = ((point[0] - a[0]) * dx + (point[1] - a[1]) * dy) / length
     along = min(1.0, max(0.0, along))
     return math.dist(point, (a[0] + along * dx, a[1] + along * dy))
+
+
+def _direction(a: Point, b: Point) -> Point:
+    """Unit vector from one point to another; zero if they are the same."""
+    length = math.dist(a, b)
+    return ((b[0] - a[0]) / length, (b[1] - a[1]) / length) if length > 0 else (0.0, 0.0)

@@ -64,7 +64,7 @@ def check_count(mission: Mission, count: int, vehicle: Autopilot, most: int) -> 
     if count > most:
         raise AnswerIsNo(
             f"{mission.name}: {len(mission.stops)} stops make {count} items, {vehicle.name} holds {most}; "
-            "settle by hold to save one per stop, or plan fewer stops at once"
+            "settle by hold (one less per stop), allow a larger max_lateral_m, or plan fewer stops at once"
         )
 
 
