@@ -31,6 +31,9 @@ STOPS, ROUTE, SEEN, UNSEEN = "SCAN_STOPS", "SCAN_ROUTE", "SCAN_COVERAGE", "SCAN_
 LAYERS = {STOPS: (6, 30), ROUTE: (5, 35), SEEN: (3, 50), UNSEEN: (1, 50)}
 """Colour (AutoCAD's index) and line weight (hundredths of a millimetre) of each layer."""
 
+BROKEN_DRAWING = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
+"""What ezdxf raises where a drawing it read does not hold what it trusts in."""
+
 DISC = 0.3
 """Radius of a stop's disc in metres."""
 TEXT = 0.22
@@ -47,7 +50,7 @@ def write(mission: Mission, supplements: Supplements) -> bytes:
             space.add_line(_at(a, size), _at(b, size), dxfattribs={"layer": layer})
     _draw_route(drawing, mission, size)
     _draw_stops(drawing, mission, size)
-    return _encoded(drawing)
+    return _written(drawing)[0]
 
 
 def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
@@ -70,10 +73,16 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
     """What the layers do without."""
-    alone = "no --floor: the layers stand alone, in metres, without the drawing"
-    blank = "no --coverage: layers SCAN_COVERAGE and SCAN_NOT_SEEN stay empty"
-    missing = (alone, supplements.floor is None), (blank, supplements.coverage is None)
-    return tuple(note for note, lacks in missing if lacks)
+    found = []
+    if supplements.floor is None:
+        found.append("no --floor: the layers stand alone, in metres, without the drawing")
+    elif faults := _written(supplements.floor.open())[1]:
+        found.append(
+            f"the floor's drawing had {faults} faults that had to be mended to write it; compare the two"
+        )
+    if supplements.coverage is None:
+        found.append("no --coverage: layers SCAN_COVERAGE and SCAN_NOT_SEEN stay empty")
+    return tuple(found)
 
 
 def _paper(supplements: Supplements) -> tuple[Drawing, float]:
@@ -212,8 +221,31 @@ def _free(name: str, table: object) -> str:
     return found
 
 
+def _written(drawing: Drawing) -> tuple[bytes, int]:
+    """The drawing as a file, and how many faults of it were mended because it could not be written before.
+
+    Raises
+    ------
+    InputError
+        When it cannot be written even then.
+    """
+    try:
+        return _encoded(drawing), 0
+    except BROKEN_DRAWING:
+        pass
+    try:
+        mended = _amiss(drawing)
+        return _encoded(drawing), mended
+    except BROKEN_DRAWING as error:
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(
+            f"the floor's drawing cannot be written again ({why}); "
+            "leave --floor out: the layers then stand alone, at the same coordinates"
+        ) from None
+
+
 def _encoded(drawing: Drawing) -> bytes:
-    """The drawing as text in its own encoding; letters that has not are escaped as DXF does."""
+    """The drawing as text in its own encoding; letters that it lacks are escaped as DXF does."""
     buffer = io.BytesIO()
     stream = io.TextIOWrapper(buffer, encoding=drawing.output_encoding, errors="dxfreplace", newline="\r\n")
     drawing.write(stream)

@@ -1,4 +1,4 @@
-"""Mission items -> track: waypoints at which something is waited for or triggered are stops, others corners.
+"""Mission items of a file -> track: waypoints where something is waited for or triggered are stops.
 
 Only what a robot of stopgo would do in the same way is read; every other command is refused by its number,
 for a mission that leaves out half of a plan is worse than none.
@@ -7,26 +7,28 @@ for a mission that leaves out half of a plan is worse than none.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
-from mission.document import Point, SiteOrigin
+from mission.document import SiteOrigin
 from mission.errors import InputError
-from mission.files.imports.track import Track, Visit
-from mission.geodesy import Geodetic, from_geodetic, heading_of
-from mission.mavlink.autopilots import Autopilot, autopilot_named
-from mission.mavlink.items import NAMES, Command
+from mission.files.imports import track
+from mission.files.imports.track import Track
+from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.autopilots import autopilot_named
+from mission.mavlink.back import GLOBAL_FRAMES, PLACES, TRIGGERS, WAITS, recognise
+from mission.mavlink.items import NAMES, Command, Item, Placed
+from mission.mavlink.rounds import Round, Visit, round_of
 from mission.mavlink.writing import SCAN_MESSAGE
 
 MOST = 65_535
 """Items a mission may have by the protocol."""
+LONGEST = 1e6
+"""Seconds; no wait is longer."""
+BRAKING = 1.0
+"""Seconds of hold by which ArduPilot is made to stop at a corner."""
 FARTHEST = 10_000.0
 """Metres from the origin beyond which a place is not of this site."""
-GLOBAL_FRAMES = (0, 3, 5, 6, 10, 11)
-"""MAV_FRAMEs in which a waypoint is a latitude and a longitude; heights are not used."""
-
-TRIGGERS = (Command.DO_SET_RELAY, Command.DO_SET_SERVO, 203, Command.DO_SEND_SCRIPT_MESSAGE, 2000)
-"""Commands that start a scan: relay, servo, DO_DIGICAM_CONTROL, message to a script, IMAGE_START_CAPTURE."""
 
 
 @dataclass(frozen=True)
@@ -45,25 +47,6 @@ class Listed:
         return f"item {self.number} ({NAMES.get(self.command, 'command')} {self.command})"
 
 
-@dataclass
-class _Place:
-    """A waypoint and what follows it until the next."""
-
-    waypoint: Listed
-    xy: Point
-    followers: list[Listed] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class _Reading:
-    source: str
-    origin: SiteOrigin
-    autopilot: Autopilot
-
-    def refused(self, item: Listed, why: str) -> InputError:
-        return InputError(f"{self.source}: {item} {why}")
-
-
 def track_of(items: Sequence[Listed], *, origin: SiteOrigin, autopilot: str, source: str) -> Track:
     """The track of a list of items.
 
@@ -72,197 +55,160 @@ def track_of(items: Sequence[Listed], *, origin: SiteOrigin, autopilot: str, sou
     InputError
         Naming the item and its command, when it means something that a mission cannot say.
     """
-    reading = _Reading(source, origin, autopilot_named(autopilot))
     if len(items) > MOST:
         raise InputError(f"{source}: has {len(items)} items; a mission has at most {MOST}")
-    speed, places = _places(items, reading)
-    visited = _are_visited(places)
-    if not any(visited):
-        raise InputError(
-            f"{source}: no waypoint has a hold, a delay or a trigger, so nothing says where to scan; "
-            "give the waypoints to scan from a hold in seconds"
-        )
-    last = max(number for number, is_visit in enumerate(visited) if is_visit)
-    visits = _numbered(list(_visits(places[: last + 1], visited, reading)))
-    back = tuple(place.xy for place in places[last + 1 :])
-    return Track(visits, back=back, origin=origin, speed=speed)
+    _check_items(items, source)
+    told = [_item(item) for item in items]
+    try:
+        placed = recognise(told)
+        _check_pauses(placed, items)
+        round_ = round_of(placed, origin, autopilot)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+    for visit in round_.visits:
+        if math.hypot(*visit.at) > FARTHEST:
+            raise InputError(
+                f"{source}: {items[visit.index]} is {math.hypot(*visit.at) / 1000:.0f} km from the site's "
+                "origin; give the site's own with --origin"
+            )
+    names = _names(round_, items)
+    visits = [_visit(visit, name, items, autopilot) for visit, name in zip(round_.visits, names, strict=True)]
+    return Track(tuple(visits), back=round_.back, origin=origin, speed=round_.speed)
 
 
 def autopilot_for(given: str | None, firmware: int | None = None) -> str:
-    """By whose rule to read degrees: as given, or by the MAV_AUTOPILOT a plan was made for."""
+    """By whose rule to read degrees: as given, else of the plan's MAV_AUTOPILOT, else ArduPilot's."""
     if given is not None:
         return autopilot_named(given).name
-    return {3: "ardupilot", 12: "px4"}.get(firmware, "generic") if firmware is not None else "ardupilot"
+    return "ardupilot" if firmware is None else {3: "ardupilot", 12: "px4"}.get(firmware, "generic")
 
 
-def _places(items: Sequence[Listed], reading: _Reading) -> tuple[float | None, list[_Place]]:
-    """Speed and waypoints; each waypoint with the waits and triggers after it."""
-    speed, places = None, list[_Place]()
+def _check_items(items: Sequence[Listed], source: str) -> None:
+    driven = False
     for item in items:
-        if item.command == Command.NAV_WAYPOINT:
-            places.append(_Place(item, _xy(item, reading)))
-        elif item.command == Command.DO_CHANGE_SPEED and not places:
-            speed = _speed(item, reading)
-        elif item.command in _FOLLOWERS:
-            if not places:
-                raise reading.refused(item, "stands before any waypoint; there is no place to do it at")
-            _FOLLOWERS[item.command](item, reading)
-            places[-1].followers.append(item)
-        else:
-            raise reading.refused(item, _why(item))
-    if not places:
-        raise InputError(f"{reading.source}: has no waypoint (NAV_WAYPOINT {Command.NAV_WAYPOINT})")
-    return speed, places
+        why = "changes the speed on the way; a mission has one speed, set it before the first waypoint"
+        if not (driven and item.command == Command.DO_CHANGE_SPEED):
+            why = _CHECKS.get(item.command, _stranger)(item)
+        if why:
+            raise InputError(f"{source}: {item} {why}")
+        driven = driven or item.command in PLACES
 
 
-def _why(item: Listed) -> str:
-    if item.command == Command.DO_CHANGE_SPEED:
-        return "changes the speed on the way; a mission has one speed, set it before the first waypoint"
+def _stranger(item: Listed) -> str:
     if item.command == 20:
         return "leaves the way back to the vehicle; draw it as waypoints"
-    return "is nothing that a robot with a scanner does here; only waypoints, delays and triggers are read"
+    return "is nothing that a scanning robot does; only waypoints, delays and triggers are read"
 
 
-def _xy(item: Listed, reading: _Reading) -> Point:
-    if item.frame not in GLOBAL_FRAMES:
-        raise reading.refused(item, f"is in frame {item.frame}, which is no latitude and longitude")
+def _place(item: Listed) -> str:
     lat, lon = item.params[4:6]
-    if not (abs(lat) <= 90 and abs(lon) <= 180):
-        raise reading.refused(item, f"is at latitude {lat:g}, longitude {lon:g}, which is no place")
-    if lat == lon == 0:
-        raise reading.refused(item, "is at latitude 0, longitude 0, which autopilots take for no place")
-    point = from_geodetic(reading.origin, Geodetic(lat=lat, lon=lon), reading.autopilot.rule)
-    if not math.hypot(*point) <= FARTHEST:
-        raise reading.refused(
-            item, f"is more than {FARTHEST / 1000:g} km from the origin; give the site's with --origin"
-        )
-    _seconds(item, reading, "a hold")
-    return point
+    if item.frame not in GLOBAL_FRAMES:
+        return f"is in frame {item.frame}, which is no latitude and longitude"
+    if not (abs(lat) <= 90 and abs(lon) <= 180) or lat == lon == 0:
+        return f"is at latitude {lat:g}, longitude {lon:g}, which is no place"
+    return _seconds(item)
 
 
-def _seconds(item: Listed, reading: _Reading, what: str) -> None:
-    if not 0 <= item.params[0] < 1e6:
-        raise reading.refused(item, f"is {what} of {item.params[0]:g} s; it must be 0 or more, below 1e6")
+def _seconds(item: Listed) -> str:
+    held = item.params[0]
+    return "" if 0 <= held < LONGEST else f"waits {held:g} s; it must be 0 or more, below {LONGEST:g}"
 
 
-def _speed(item: Listed, reading: _Reading) -> float:
-    if item.params[0] not in (0.0, 1.0) or not 0 < item.params[1] < 1e3:
-        raise reading.refused(
-            item, f"sets speed {item.params[1]:g} of kind {item.params[0]:g}; need one in m/s"
-        )
-    return item.params[1]
-
-
-def _check_delay(item: Listed, reading: _Reading) -> None:
+def _delay(item: Listed) -> str:
+    """A delay of 0 or less counts until a time of day, if one is given."""
     if item.params[0] <= 0 and any(part >= 0 for part in item.params[1:4]):
-        raise reading.refused(item, "waits for a time of day; a mission waits for seconds")
-    _seconds(item, reading, "a delay")
+        return "waits for a time of day; a mission waits for seconds"
+    return _seconds(item)
 
 
-def _check_script(item: Listed, reading: _Reading) -> None:
-    if not 0 <= item.params[1] < 1e6:
-        raise reading.refused(item, f"waits at most {item.params[1]:g} s; it must be 0 or more, below 1e6")
+def _speed(item: Listed) -> str:
+    kind, speed = item.params[:2]
+    if kind in (0.0, 1.0) and 0 < speed < 1e3:
+        return ""
+    return f"sets speed {speed:g} of kind {kind:g}; a mission needs metres per second"
 
 
-def _check_capture(item: Listed, reading: _Reading) -> None:
-    if item.params[2] != 1:
-        raise reading.refused(item, f"takes {item.params[2]:g} pictures; a stop has one scan (param3 = 1)")
+def _capture(item: Listed) -> str:
+    pictures = item.params[2]
+    return "" if pictures == 1 else f"takes {pictures:g} pictures; a stop has one scan (param3 = 1)"
 
 
-def _anything(item: Listed, reading: _Reading) -> None:
-    """Whatever a trigger's numbers are, it is a trigger."""
+def _whatever(item: Listed) -> str:
+    """A trigger is one, whatever its numbers are."""
+    return ""
 
 
-_FOLLOWERS: dict[int, Callable[[Listed, _Reading], None]] = {
-    **dict.fromkeys(TRIGGERS, _anything),
-    Command.IMAGE_START_CAPTURE: _check_capture,
-    Command.NAV_DELAY: _check_delay,
-    Command.NAV_SCRIPT_TIME: _check_script,
+_CHECKS: dict[int, Callable[[Listed], str]] = {
+    **dict.fromkeys(PLACES, _place),
+    **dict.fromkeys(WAITS | TRIGGERS, _whatever),
+    Command.NAV_DELAY: _delay,
+    Command.IMAGE_START_CAPTURE: _capture,
+    Command.DO_CHANGE_SPEED: _speed,
 }
-"""What may follow a waypoint, and what is asked of it."""
+"""What is wrong with an item of each command that is read; empty if nothing is."""
 
 
-def _are_visited(places: Sequence[_Place]) -> list[bool]:
-    """Stops are where something follows; where nothing does in the whole list, where the vehicle holds.
-
-    Beside waits and triggers a hold means only that the vehicle brakes, as at the corners for ArduPilot.
-    """
-    followed = [bool(place.followers) for place in places]
-    return followed if any(followed) else [place.waypoint.params[0] > 0 for place in places]
-
-
-def _visits(
-    places: Sequence[_Place], visited: Sequence[bool], reading: _Reading
-) -> Iterator[tuple[Visit, int]]:
-    """Each visit with the number that its trigger carries, or 0."""
-    via: list[Point] = []
-    for place, is_visit in zip(places, visited, strict=False):
-        if is_visit:
-            yield replace(_visit(place, reading), via=tuple(via)), _carried(place)
-            via = []
-        else:
-            via.append(place.xy)
+def _check_pauses(placed: Sequence[Placed], items: Sequence[Listed]) -> None:
+    """At a corner a vehicle may hold to brake, as ArduPilot must; a robot of stopgo waits only to scan."""
+    for one, item in zip(placed, items, strict=True):
+        if one.role in ("corner", "return") and item.params[0] > BRAKING:
+            raise InputError(
+                f"{item} waits {item.params[0]:g} s and scans nothing there, while others do; "
+                "take the wait out, or have it followed by a trigger"
+            )
 
 
-def _visit(place: _Place, reading: _Reading) -> Visit:
-    hold, radius, _, yaw = place.waypoint.params[:4]
-    settle, scan = _waits(place, reading)
-    known = reading.autopilot.keeps_arrival  # elsewhere the vehicle has neither radius nor yaw
-    message = next((item for item in place.followers if _is_ours(item)), None)
-    return Visit(
-        place.xy,
-        id=place.waypoint.id,
-        heading=heading_of(reading.origin, yaw) if known and math.isfinite(yaw) else None,
-        tolerance_m=radius if known and 0 < radius < math.inf else None,
-        settle_s=settle if settle is not None else hold or None,
-        scan_s=scan if scan is not None else (None if place.followers else hold),
-        timeout_s=None if message is None else _positive(message.params[3]),
+def _item(item: Listed) -> Item:
+    """As it would go over the wire."""
+    p1, p2, p3, p4, x, y, z = item.params
+    steps = STEPS_PER_DEGREE if item.command in PLACES else 1
+    whole = [round(value * steps) if abs(value) < 2**31 else 0 for value in (x, y)]  # NaN is not below it
+    return Item(item.command, item.frame, params=(p1, p2, p3, p4), x=whole[0], y=whole[1], z=z)
+
+
+def _names(round_: Round, items: Sequence[Listed]) -> list[str]:
+    """Ids that the file names, else those that stopgo gives to the numbers the triggers carry."""
+    named = [name for visit in round_.visits if (name := items[visit.index].id) is not None]
+    if len(set(named)) == len(round_.visits):
+        return named
+    numbers = [visit.number for visit in round_.visits if visit.number]
+    if len(set(numbers)) < len(round_.visits):
+        numbers = list(range(1, len(round_.visits) + 1))
+    width = max(2, len(str(max(numbers))))
+    return [f"s{number:0{width}d}" for number in numbers]
+
+
+def _visit(visit: Visit, name: str, items: Sequence[Listed], autopilot: str) -> track.Visit:
+    done = _done_at(visit, items)
+    radius = items[visit.index].params[1]
+    kept = autopilot_named(autopilot).keeps_arrival and 0 < radius < math.inf
+    message = next((item.params for item in done if _is_ours(item)), None)
+    return track.Visit(
+        visit.at,
+        via=visit.through,
+        id=name,
+        heading=visit.heading,
+        settle_s=visit.settle_s if done else None,
+        scan_s=visit.scan_s if visit.scan_s is not None or message is None else _seconds_in(message[2]),
+        timeout_s=None if message is None else _seconds_in(message[3]),
+        tolerance_m=radius if kept else None,
     )
 
 
-def _waits(place: _Place, reading: _Reading) -> tuple[float | None, float | None]:
-    """Seconds before and after the trigger; without one the last wait is the scan."""
-    started = [number for number, item in enumerate(place.followers) if item.command in TRIGGERS]
-    if len(started) > 1:
-        raise reading.refused(
-            place.followers[started[1]], "is a second trigger at one waypoint; a stop has one scan"
-        )
-    split = started[0] if started else len(place.followers) - 1
-    before, after = place.followers[:split], place.followers[split:]
-    message = next((item for item in after if _is_ours(item)), None)
-    told = None if message is None else _positive(message.params[2])
-    return _delays(before), told if told is not None else _delays(after)
-
-
-def _delays(items: Sequence[Listed]) -> float | None:
-    waits = [item.params[0] for item in items if item.command == Command.NAV_DELAY]
-    return sum(waits) if waits else None
+def _done_at(visit: Visit, items: Sequence[Listed]) -> list[Listed]:
+    """The items between a stop's waypoint and the next."""
+    done = []
+    for item in items[visit.index + 1 :]:
+        if item.command in PLACES:
+            break
+        done.append(item)
+    return done
 
 
 def _is_ours(item: Listed) -> bool:
+    """The message by which stopgo has a script scan: it carries duration and timeout."""
     return item.command == Command.DO_SEND_SCRIPT_MESSAGE and item.params[0] == SCAN_MESSAGE
 
 
-def _positive(value: float) -> float | None:
-    return value if 0 < value < 1e6 else None
-
-
-def _carried(place: _Place) -> int:
-    """The stop's number that stopgo writes into what starts a scan."""
-    for item in place.followers:
-        number = item.params[1] if _is_ours(item) else item.params[3] if item.command == 2000 else 0.0
-        if 0 < number < MOST and number == round(number):
-            return int(number)
-    return 0
-
-
-def _numbered(visits: Sequence[tuple[Visit, int]]) -> tuple[Visit, ...]:
-    """Visits with the ids that the file names, else by the numbers it carries, else by their places."""
-    numbers = [number for _, number in visits]
-    if 0 in numbers or len(set(numbers)) < len(numbers):
-        numbers = list(range(1, len(visits) + 1))
-    width = max(2, len(str(max(numbers))))
-    named = [visit.id for visit, _ in visits]
-    if None in named or len(set(named)) < len(named):
-        named = [f"s{number:0{width}d}" for number in numbers]
-    return tuple(replace(visit, id=name) for (visit, _), name in zip(visits, named, strict=True))
+def _seconds_in(value: float) -> float | None:
+    return value if 0 < value < LONGEST else None

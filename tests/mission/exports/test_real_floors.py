@@ -1,0 +1,85 @@
+"""Every format of missions planned on floors that nobody on this project drew."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from pathlib import Path
+
+import ezdxf
+import pytest
+
+from mission.document import Mission
+from mission.errors import InputError
+from mission.files.coverage_json import coverage_json
+from mission.files.exports import FORMATS, exported
+from mission.files.exports.format import FloorDrawing, Supplements
+from mission.files.exports.stops_dxf import LAYERS
+from mission.files.exports.stretches import read_stretches
+from mission.settings import Settings
+from planner import plan
+from planner.floors import read_floor
+from planner.floors.drawing import open_drawing
+from planner.floors.dxf import metres_in
+from tests.mission.exports.test_dxf import opened, stops_in, unchanged
+from tests.mission.exports.worlds import laboratory
+
+LAYERED = Path(__file__).parents[4] / "shared" / "data" / "layered"
+WILD = sorted((LAYERED.parent / "dxf").glob("*.dxf"))
+FLOORS = ("office-l1", "duplex-l1", "fzk-haus-eg")
+
+pytestmark = pytest.mark.skipif(not LAYERED.is_dir(), reason=f"the real inputs are not in {LAYERED}")
+
+
+@cache
+def planned(name: str) -> tuple[Mission, bytes]:
+    """The mission of a floor and its coverage.json, planned once."""
+    nouns: dict[str, object] = {}
+    floor = read_floor(LAYERED / f"{name}.dxf", d_dis=0.05)
+    settings = Settings(origin=(47.3769, 8.5417, 408.0, 30.0))
+    mission = plan(floor, settings, observe=lambda noun: nouns.update({type(noun).__name__: noun}))
+    return mission, coverage_json(nouns["Route"], mission)
+
+
+def supplements(name: str, folder: Path) -> Supplements:
+    mission, coverage = planned(name)
+    (folder / "coverage.json").write_bytes(coverage)
+    data, source = (LAYERED / f"{name}.dxf").read_bytes(), LAYERED / f"{name}.dxf"
+    assert hashlib.sha256(data).hexdigest() == mission.origin.floor_digest
+    drawing, _ = open_drawing(data, source=source)
+    under = FloorDrawing(lambda: open_drawing(data, source=source)[0], metres_in(drawing, source=source))
+    return Supplements(floor=under, coverage=read_stretches(folder / "coverage.json", mission))
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_real_mission_reads_back(floor: str, name: str, tmp_path: Path) -> None:
+    mission, _ = planned(floor)
+    assert exported(mission, name, supplements(floor, tmp_path))
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+def test_layers_over_a_real_drawing_change_nothing_in_it(floor: str, tmp_path: Path) -> None:
+    mission, _ = planned(floor)
+    drawing = opened(exported(mission, "dxf", supplements(floor, tmp_path)))
+    auditor = drawing.audit()
+    assert not auditor.errors
+    assert not auditor.fixes
+    assert len(stops_in(drawing)) == len(mission.stops)
+    unchanged(ezdxf.readfile(LAYERED / f"{floor}.dxf"), drawing)
+
+
+@pytest.mark.parametrize("path", WILD, ids=[path.stem for path in WILD])
+def test_a_drawing_from_the_wild_keeps_its_entities_or_is_one_line(path: Path) -> None:
+    data = path.read_bytes()
+    under = FloorDrawing(lambda: open_drawing(data, source=path)[0], 1.0)
+    try:
+        made = opened(exported(laboratory(), "dxf", Supplements(floor=under)))
+    except InputError as error:
+        assert "leave --floor out" in str(error)
+        assert "\n" not in str(error)
+        return
+    drawn = [entity.dxftype() for entity in under.open().modelspace()]
+    kept = [entity.dxftype() for entity in made.modelspace() if entity.dxf.layer not in LAYERS]
+    assert kept == drawn
+    assert len(stops_in(made)) == 3

@@ -1,0 +1,65 @@
+"""coverage.json as stretches, and files that are none."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from mission.document import Mission, sealed
+from mission.errors import InputError
+from mission.files.coverage_json import write_coverage
+from mission.files.exports.stretches import read_stretches
+from tests.mission.worlds import room_mission, room_route, square_tour
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> tuple[Path, Mission]:
+    """The coverage of the room, and its mission."""
+    write_coverage(room_route(), room_mission(), tmp_path / "coverage.json")
+    return tmp_path / "coverage.json", room_mission()
+
+
+def lengths(stretches: np.ndarray) -> float:
+    return float(np.hypot(*(stretches[:, 1] - stretches[:, 0]).T).sum())
+
+
+def test_seen_and_unseen_make_the_whole_boundary(written: tuple[Path, Mission]) -> None:
+    stretches = read_stretches(*written)
+    targets = room_route().selection.visibility.targets
+    whole = float(np.hypot(*(targets.b - targets.a).T).sum())
+    assert lengths(stretches.seen) + lengths(stretches.unseen) == pytest.approx(whole, abs=1e-4)
+    assert lengths(stretches.seen) > 0
+
+
+def test_what_lies_between_two_seen_pieces_is_not_seen(tmp_path: Path) -> None:
+    mission = square_tour()
+    segment = {"a": [0, 0], "b": [10, 0], "seen": [[0.1, 0.3], [0.5, 1.0]]}
+    coverage = {
+        **{"schema": "stopgo/coverage", "version": 1, "elements": [{"segments": [segment]}]},
+        "mission": {"id": mission.id, "digest": mission.digest},
+    }
+    (tmp_path / "c.json").write_text(json.dumps(coverage))
+    stretches = read_stretches(tmp_path / "c.json", mission)
+    assert stretches.seen[:, :, 0] == pytest.approx(np.array([[1.0, 3], [5, 10]]))
+    assert stretches.unseen[:, :, 0] == pytest.approx(np.array([[0.0, 1], [3, 5]]))
+
+
+def test_another_missions_coverage_is_refused(written: tuple[Path, Mission]) -> None:
+    path, mission = written
+    with pytest.raises(InputError, match=r"coverage\.json: is the coverage of mission 0123"):
+        read_stretches(path, msgspec.structs.replace(mission, id="f" * 32))
+    with pytest.raises(InputError, match="of another revision"):
+        read_stretches(path, sealed(msgspec.structs.replace(mission, revision=2)))
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"{", b"[]", b"\xff", b'{"schema": "stopgo/coverage", "version": 2}', b"[" * 100_000]
+)
+def test_what_is_no_coverage_is_refused(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "c.json").write_bytes(content)
+    with pytest.raises(InputError, match=r"c\.json: "):
+        read_stretches(tmp_path / "c.json", square_tour())
