@@ -67,8 +67,10 @@ def add_commands(app: typer.Typer) -> None:
 
 def robot(
     *,
-    name: Annotated[str, typer.Option("--name", help="Name of this robot.")],
-    state: Annotated[Path, typer.Option("--state", metavar="DIR", help="Its journal; one per robot.")],
+    name: Annotated[str | None, typer.Option("--name", help="Name of this robot.")] = None,
+    state: Annotated[
+        Path | None, typer.Option("--state", metavar="DIR", help="Its journal; one per robot.")
+    ] = None,
     listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where to listen.")] = DEFAULT_ENDPOINT,
     connect: Annotated[
         str | None, typer.Option(metavar="ENDPOINT", help="A router to connect to, instead of listening.")
@@ -98,14 +100,46 @@ def robot(
     ] = "next-stop",
     insecure: Insecure = False,
     keys: KeyFolder = None,
+    mavlink_vehicle: Annotated[
+        str | None,
+        typer.Option(
+            "--mavlink-vehicle", metavar="URL", help="Be a MAVLink vehicle there, and nothing else."
+        ),
+    ] = None,
+    profile: Annotated[
+        str | None,
+        typer.Option(metavar="strict|ardupilot|px4", help="The autopilot whose habits the vehicle has."),
+    ] = None,
+    origin: Annotated[
+        str | None,
+        typer.Option(metavar="LAT,LON,ALT[,HEADING]", help="The vehicle's global origin from the start."),
+    ] = None,
+    signing_key: Annotated[
+        Path | None, typer.Option("--signing-key", metavar="FILE", help="Sign what the vehicle says with it.")
+    ] = None,
 ) -> None:
     """Be a robot, with a simulated base and scanner, until SIGTERM.
 
     Example: stopgo robot --name r1 --listen tcp/127.0.0.1:7447 --state r1.state --speed-up 20
+
+    Example: stopgo robot --mavlink-vehicle udpin:127.0.0.1:14550 --profile ardupilot --origin 47.4,8.5,400
     """
     from bridge.robot import RobotOptions, run_robot
     from bridge.simulator import Faults, read_fault
 
+    if mavlink_vehicle is not None:
+        alone("--mavlink-vehicle", {
+            "--listen": listen != DEFAULT_ENDPOINT, "--connect": connect, "--site": site, "--map": map_,
+            "--keys": keys, "--revision": revision != "next-stop", "--endurance": endurance != 6.0,
+        })  # fmt: skip
+        return be_vehicle(
+            name, url=mavlink_vehicle, profile=profile or "strict", state=state, speed_up=speed_up,
+            signing_key=signing_key, insecure=insecure, origin=origin,
+            at=None if at is None else read_pose("--at", at), faults=tuple(fault or ()),
+        )  # fmt: skip
+    alone("a robot on zenoh", {"--profile": profile, "--origin": origin, "--signing-key": signing_key})
+    if name is None or state is None:
+        raise InputError("robot: give it a --name and a folder for its --state")
     options = RobotOptions(
         name=name, listen=listen, connect=connect, state=state, site=site, speed_up=speed_up,
         at=None if at is None else read_pose("--at", at),
@@ -115,6 +149,21 @@ def robot(
     )  # fmt: skip
     where = f"listens on {listen}" if connect is None else f"connects to {connect}"
     run_robot(options, ready=lambda: say(f"ready {name} {where}"))
+
+
+def be_vehicle(name: str | None, **options: Any) -> None:
+    """Be a MAVLink vehicle until SIGTERM."""
+    from bridge.mavlink.simulated.process import VehicleOptions, run_vehicle
+
+    called = f"{name or 'vehicle'} ({options['profile']})"
+    run_vehicle(VehicleOptions(**options), ready=lambda url: say(f"ready {called} at {url}"))
+
+
+def alone(what: str, given: dict[str, object]) -> None:
+    """Refuse options that have no meaning with `what`."""
+    for option, value in given.items():
+        if value:
+            raise InputError(f"robot: {option} has no meaning with {what}; leave it out")
 
 
 def read_revisions(text: str) -> RevisionPolicy:

@@ -1,0 +1,288 @@
+"""What the vehicle obeys: COMMAND_LONG and COMMAND_INT, and the messages that are orders themselves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from bridge.mavlink.simulated import telemetry
+from bridge.mavlink.simulated.profile import CUSTOM, ModeName
+from bridge.mavlink.simulated.rover import FAR_M
+from bridge.mavlink.wire import Message, Who
+from mission.document import SiteOrigin
+from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.items import Command
+
+if TYPE_CHECKING:
+    from bridge.mavlink.simulated.vehicle import Vehicle
+
+ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
+REJECTED, UNSUPPORTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED, dialect.MAV_RESULT_UNSUPPORTED
+FAILED = dialect.MAV_RESULT_FAILED
+IGNORE_X_Y, IGNORE_YAW = 0b11, 1 << 10
+LOCAL_NED, LOCAL_OFFSET_NED = dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_FRAME_LOCAL_OFFSET_NED
+CHANGE_MODE = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+
+
+@dataclass(frozen=True)
+class Order:
+    """A command with its numbers; `x` and `y` are steps of 1e-7 degrees where it has a place."""
+
+    command: int
+    params: tuple[float, float, float, float]
+    x: int
+    y: int
+    again: bool
+    """Sent again by a station that has heard no answer."""
+
+    def whole(self, index: int, default: int = -1) -> int:
+        """A param as a whole number; `default` if it is none."""
+        value = self.params[index]
+        return int(value) if math.isfinite(value) and abs(value) < 2**31 else default
+
+
+def handlers(vehicle: Vehicle) -> dict[str, Callable[[Who, Message], None]]:
+    """What to do with each message that is an order."""
+    return {
+        "COMMAND_LONG": lambda who, message: _answer(vehicle, who, _long(message)),
+        "COMMAND_INT": lambda who, message: _answer(vehicle, who, _int(message)),
+        "SET_MODE": lambda who, message: _set_mode_message(vehicle, who, message),
+        "MISSION_SET_CURRENT": lambda who, message: _set_current_message(vehicle, message),
+        "SET_GPS_GLOBAL_ORIGIN": lambda who, message: _set_origin(vehicle, message),
+        "SET_POSITION_TARGET_LOCAL_NED": lambda who, message: _target_local(vehicle, message),
+        "SET_POSITION_TARGET_GLOBAL_INT": lambda who, message: _target_global(vehicle, message),
+    }
+
+
+def _long(message: Message) -> Order:
+    params = (message.param1, message.param2, message.param3, message.param4)
+    x, y = (_steps(value) for value in (message.param5, message.param6))
+    return Order(message.command, params, x, y, again=message.confirmation > 0)
+
+
+def _int(message: Message) -> Order:
+    params = (message.param1, message.param2, message.param3, message.param4)
+    return Order(message.command, params, message.x, message.y, again=False)
+
+
+def _steps(degrees: float) -> int:
+    return round(degrees * STEPS_PER_DEGREE) if math.isfinite(degrees) and abs(degrees) < 200 else 2**31 - 1
+
+
+def _answer(vehicle: Vehicle, who: Who, order: Order) -> None:
+    """Obey and acknowledge; an order that makes the vehicle silent is acknowledged first."""
+    if order.command == dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN:
+        return _reboot(vehicle, who, order)
+    obey = OBEYED.get(order.command)
+    _acknowledge(vehicle, who, order.command, UNSUPPORTED if obey is None else obey(vehicle, order))
+    if order.command == dialect.MAV_CMD_REQUEST_MESSAGE:
+        vehicle.requested(order.whole(0))
+
+
+def _acknowledge(vehicle: Vehicle, who: Who, command: int, result: int) -> None:
+    vehicle.say(
+        dialect.MAVLink_command_ack_message(
+            command, result, target_system=who.system, target_component=who.component
+        )
+    )
+
+
+def _reboot(vehicle: Vehicle, who: Who, order: Order) -> None:
+    refused = vehicle.armed or order.whole(0) != 1
+    _acknowledge(vehicle, who, order.command, _no(vehicle) if refused else ACCEPTED)
+    if not refused:
+        vehicle.reboot()
+
+
+def _no(vehicle: Vehicle) -> int:
+    """How the autopilot says no to what it could do at other times."""
+    return int(FAILED if vehicle.profile.name == "ardupilot" else DENIED)
+
+
+def _arm(vehicle: Vehicle, order: Order) -> int:
+    wanted = order.params[0]
+    if wanted not in (0.0, 1.0):
+        return int(DENIED)
+    (vehicle.arm if wanted else vehicle.disarm)()
+    return int(ACCEPTED)
+
+
+def _set_mode(vehicle: Vehicle, order: Order) -> int:
+    main, sub = order.whole(1), order.whole(2)
+    custom = main if vehicle.profile.name == "ardupilot" else sub << 24 | main << 16
+    return _change_mode(vehicle, order.whole(0, 0), custom)
+
+
+def _change_mode(vehicle: Vehicle, flags: int, custom: int) -> int:
+    mode = _mode_of(vehicle, flags, custom)
+    if mode is None:
+        return _no(vehicle)
+    return int(ACCEPTED) if vehicle.set_mode(mode) else _no(vehicle)
+
+
+def _mode_of(vehicle: Vehicle, flags: int, custom: int) -> ModeName | None:
+    """By its custom number; without one by the flags alone, which only the specification's vehicle knows."""
+    if flags & CUSTOM:
+        modes = vehicle.profile.modes.items()
+        return next((name for name, mode in modes if mode.custom == custom), None)
+    if vehicle.profile.name != "strict":
+        return None
+    if flags & dialect.MAV_MODE_FLAG_AUTO_ENABLED:
+        return "auto"
+    return "guided" if flags & dialect.MAV_MODE_FLAG_GUIDED_ENABLED else "manual"
+
+
+def _set_mode_message(vehicle: Vehicle, who: Who, message: Message) -> None:
+    result = _change_mode(vehicle, message.base_mode, message.custom_mode)
+    if vehicle.profile.name == "ardupilot":
+        _acknowledge(vehicle, who, dialect.MAVLINK_MSG_ID_SET_MODE, result)
+
+
+def _set_current(vehicle: Vehicle, order: Order) -> int:
+    """-1 means: stay; param2 1 means: count everything anew."""
+    number = order.whole(0, -2)
+    if number == -1:
+        number = vehicle.course.current
+    return int(ACCEPTED if vehicle.course.jump(number, vehicle.now_ns) else DENIED)
+
+
+def _set_current_message(vehicle: Vehicle, message: Message) -> None:
+    if not vehicle.course.jump(message.seq, vehicle.now_ns):
+        vehicle.text(f"Item {message.seq}: not in the mission")
+
+
+def _start(vehicle: Vehicle, order: Order) -> int:
+    """ArduPilot takes no first item; PX4 arms as well (source)."""
+    first = order.whole(0, 0)
+    if first > 0 and (vehicle.profile.name == "ardupilot" or not vehicle.course.jump(first, vehicle.now_ns)):
+        return int(DENIED)
+    if not vehicle.set_mode("auto"):
+        return _no(vehicle)
+    if vehicle.profile.name == "px4":
+        vehicle.arm()
+    return int(ACCEPTED)
+
+
+def _pause(vehicle: Vehicle, order: Order) -> int:
+    if vehicle.profile.name != "strict":
+        return int(UNSUPPORTED)
+    return int(ACCEPTED) if vehicle.set_mode("auto" if order.params[0] == 1 else "hold") else int(DENIED)
+
+
+def _reposition(vehicle: Vehicle, order: Order) -> int:
+    point = vehicle.rover.point(order.x, order.y)
+    if point is None or not vehicle.armed:
+        return int(DENIED)
+    if vehicle.mode != "guided":
+        if not order.whole(1, 0) & CHANGE_MODE:
+            return int(DENIED)
+        vehicle.set_mode("guided")
+    vehicle.rover.set_speed(order.params[0])
+    vehicle.rover.drive(point, vehicle.now_ns)
+    return int(ACCEPTED)
+
+
+def _change_speed(vehicle: Vehicle, order: Order) -> int:
+    return int(ACCEPTED if vehicle.rover.set_speed(order.params[1]) else DENIED)
+
+
+def _interval(vehicle: Vehicle, order: Order) -> int:
+    return int(ACCEPTED) if vehicle.streams.set(order.whole(0), order.params[1]) else _no(vehicle)
+
+
+def _tell_interval(vehicle: Vehicle, order: Order) -> int:
+    number = order.whole(0)
+    if not 0 <= number < 2**16:
+        return int(DENIED)
+    vehicle.say(dialect.MAVLink_message_interval_message(number, vehicle.streams.interval_us(number)))
+    return int(ACCEPTED)
+
+
+def _request(vehicle: Vehicle, order: Order) -> int:
+    maker = telemetry.MAKERS.get(order.whole(0))
+    return int(UNSUPPORTED) if maker is None else int(DENIED if maker(vehicle) is None else ACCEPTED)
+
+
+def _tell_version(vehicle: Vehicle, order: Order) -> int:
+    vehicle.tell(dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+    return int(ACCEPTED)
+
+
+def _tell_home(vehicle: Vehicle, order: Order) -> int:
+    return int(ACCEPTED) if vehicle.tell(dialect.MAVLINK_MSG_ID_HOME_POSITION) else _no(vehicle)
+
+
+def _capture(vehicle: Vehicle, order: Order) -> int:
+    """IMAGE_START_CAPTURE: param4 is the number; param2, the interval, which one picture has not, seconds."""
+    return _scan(vehicle, order, order.whole(3, 0), order.params[1])
+
+
+def _script_message(vehicle: Vehicle, order: Order) -> int:
+    """DO_SEND_SCRIPT_MESSAGE: param2 is the number, param3 the seconds."""
+    if vehicle.profile.name != "ardupilot":
+        return int(UNSUPPORTED)
+    return _scan(vehicle, order, order.whole(1, 0), order.params[2])
+
+
+def _scan(vehicle: Vehicle, order: Order, number: int, seconds: float) -> int:
+    """A trigger that comes again for the scan it began does not begin another."""
+    under_way = vehicle.scanner.scan
+    if under_way is not None and number > 0 and number == under_way.number:
+        return int(ACCEPTED)
+    if order.again and number > 0 and number == vehicle.last_scan:
+        return int(ACCEPTED)
+    return int(ACCEPTED if vehicle.scan(max(0, number), seconds) else REJECTED)
+
+
+OBEYED: dict[int, Callable[[Vehicle, Order], int]] = {
+    dialect.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
+    dialect.MAV_CMD_DO_SET_MODE: _set_mode,
+    Command.DO_SET_MISSION_CURRENT: _set_current,
+    dialect.MAV_CMD_MISSION_START: _start,
+    dialect.MAV_CMD_DO_PAUSE_CONTINUE: _pause,
+    dialect.MAV_CMD_DO_REPOSITION: _reposition,
+    Command.DO_CHANGE_SPEED: _change_speed,
+    dialect.MAV_CMD_SET_MESSAGE_INTERVAL: _interval,
+    dialect.MAV_CMD_GET_MESSAGE_INTERVAL: _tell_interval,
+    dialect.MAV_CMD_REQUEST_MESSAGE: _request,
+    dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _tell_version,
+    dialect.MAV_CMD_GET_HOME_POSITION: _tell_home,
+    Command.IMAGE_START_CAPTURE: _capture,
+    Command.DO_SEND_SCRIPT_MESSAGE: _script_message,
+}
+"""Each gives the MAV_RESULT with which it is acknowledged."""
+
+
+def _set_origin(vehicle: Vehicle, message: Message) -> None:
+    """What is no place on the earth is ignored."""
+    lat, lon = message.latitude / STEPS_PER_DEGREE, message.longitude / STEPS_PER_DEGREE
+    if abs(lat) < 90 and abs(lon) <= 180:
+        vehicle.set_origin(SiteOrigin(lat=lat, lon=lon, alt=message.altitude / 1000, heading_deg=0.0))
+
+
+def _target_local(vehicle: Vehicle, message: Message) -> None:
+    east, north = message.y, message.x
+    here = vehicle.motion()[0]
+    if message.coordinate_frame == LOCAL_OFFSET_NED:
+        east, north = east + here.x, north + here.y
+    elif message.coordinate_frame != LOCAL_NED:
+        return
+    if math.isfinite(east) and math.isfinite(north) and math.hypot(east, north) <= FAR_M:
+        _guide(vehicle, message, (east, north))
+
+
+def _target_global(vehicle: Vehicle, message: Message) -> None:
+    point = vehicle.rover.point(message.lat_int, message.lon_int)
+    if point is not None:
+        _guide(vehicle, message, point)
+
+
+def _guide(vehicle: Vehicle, message: Message, point: tuple[float, float]) -> None:
+    if vehicle.mode != "guided" or not vehicle.armed or message.type_mask & IGNORE_X_Y:
+        return
+    turns = not message.type_mask & IGNORE_YAW and math.isfinite(message.yaw) and abs(message.yaw) < 100
+    vehicle.guide(point, math.pi / 2 - message.yaw if turns else None)

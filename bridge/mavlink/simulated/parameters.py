@@ -1,0 +1,85 @@
+"""The few parameters a ground station can read and set."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from bridge.mavlink.simulated.scanner import DEFAULT_S, LONGEST_S
+from bridge.mavlink.wire import Message, Who
+
+SCAN_TIME = "SIM_SCAN_TIME"
+"""Seconds that a scan takes if its trigger does not say."""
+SPEED = {"ardupilot": "WP_SPEED", "px4": "GND_SPEED_TRIM", "strict": "SPEED"}
+SYSTEM = {"ardupilot": "SYSID_THISMAV", "px4": "MAV_SYS_ID", "strict": "SYSTEM_ID"}
+REAL32 = dialect.MAV_PARAM_TYPE_REAL32
+
+
+class Parameters:
+    """Named numbers, float32 on the wire."""
+
+    def __init__(self, profile: str, *, speed: float, set_speed: Callable[[float], bool]) -> None:
+        self._speed, self._set_speed = SPEED[profile], set_speed
+        self._values = {SYSTEM[profile]: 1.0, self._speed: speed, "WP_RADIUS": 0.1, SCAN_TIME: DEFAULT_S}
+
+    @property
+    def scan_s(self) -> float:
+        return self._values[SCAN_TIME]
+
+    def all(self) -> list[Message]:
+        return [self._value(name) for name in self._values]
+
+    def read(self, message: Message) -> Message | None:
+        """The one asked for by index or, if that is -1, by name."""
+        names = list(self._values)
+        if message.param_index >= 0:
+            return self._value(names[message.param_index]) if message.param_index < len(names) else None
+        return self._value(name) if (name := _name(message.param_id)) in self._values else None
+
+    def set(self, message: Message) -> Message | None:
+        """What it is afterwards, changed or not."""
+        name, value = _name(message.param_id), message.param_value
+        if name not in self._values:
+            return None
+        if self._allowed(name, value):
+            self._values[name] = value
+        return self._value(name)
+
+    def _allowed(self, name: str, value: float) -> bool:
+        if name == self._speed:
+            return self._set_speed(value)
+        if name == SCAN_TIME:
+            return 0 < value <= LONGEST_S
+        return name == "WP_RADIUS" and math.isfinite(value) and 0 < value < 100
+
+    def _value(self, name: str) -> Message:
+        index = list(self._values).index(name)
+        value, count = self._values[name], len(self._values)
+        return dialect.MAVLink_param_value_message(name.encode(), value, REAL32, count, index)
+
+
+def _name(raw: str | bytes) -> str:
+    text = raw if isinstance(raw, str) else raw.decode("ascii", "replace")
+    return text.rstrip("\0")
+
+
+def answer(
+    parameters: Parameters, say: Callable[[Message], None]
+) -> dict[str, Callable[[Who, Message], None]]:
+    """What to do with each message about parameters."""
+
+    def told(value: Message | None) -> None:
+        if value is not None:
+            say(value)
+
+    def tell_all() -> None:
+        for value in parameters.all():
+            say(value)
+
+    return {
+        "PARAM_REQUEST_LIST": lambda who, message: tell_all(),
+        "PARAM_REQUEST_READ": lambda who, message: told(parameters.read(message)),
+        "PARAM_SET": lambda who, message: told(parameters.set(message)),
+    }

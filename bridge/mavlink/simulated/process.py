@@ -1,0 +1,133 @@
+"""The simulated vehicle on a wire: one thread that hears, lets time pass, and speaks."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bridge.clock import WallClock
+from bridge.mavlink.simulated.faults import VehicleFaults, on_line, read_vehicle_fault
+from bridge.mavlink.simulated.profile import profile_named
+from bridge.mavlink.simulated.rover import to_east
+from bridge.mavlink.simulated.vehicle import Setting, Vehicle
+from bridge.mavlink.transport import open_transport
+from bridge.mavlink.url import Url, check_guarded, read_url
+from bridge.mavlink.wire import Who, Wire, read_signing_key
+from mission.document import SiteOrigin
+from mission.errors import InputError
+from mission.events import Pose
+
+OPTION = "--mavlink-vehicle"
+VEHICLE = Who(1, 1)
+STEP_S = 0.02
+"""How often the time is looked at while nothing comes in."""
+
+
+@dataclass(frozen=True)
+class VehicleOptions:
+    """What the command line says."""
+
+    url: str
+    profile: str = "strict"
+    state: Path | None = None
+    speed_up: float = 1.0
+    signing_key: Path | None = None
+    insecure: bool = False
+    origin: str | None = None
+    at: Pose | None = None
+    """In the site's frame, whose +y bears what the origin says."""
+    faults: tuple[str, ...] = field(default=())
+
+
+def run_vehicle(options: VehicleOptions, ready: Callable[[Url], None]) -> None:
+    """Be a vehicle until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
+    signal.signal(signal.SIGTERM, _leave)
+    url = read_url(options.url, OPTION)
+    key = None if options.signing_key is None else read_signing_key(options.signing_key)
+    check_guarded(url, signed=key is not None, insecure=options.insecure, option=OPTION)
+    with vehicle_on(url, setting_of(options), speed_up=options.speed_up, signing_key=key) as stopped:
+        ready(url)
+        stopped.wait()
+
+
+@contextmanager
+def vehicle_on(
+    url: Url, setting: Setting, *, speed_up: float = 1.0, signing_key: bytes | None = None
+) -> Iterator[threading.Event]:
+    """A vehicle at `url` while the block runs; the event tells that it has stopped by itself.
+
+    Raises
+    ------
+    InputError
+        If it cannot be opened there.
+    """
+    key = None if setting.faults.any("unsigned") else signing_key
+    line = on_line(open_transport(url), setting.faults)
+    wire = Wire(line, me=VEHICLE, signing_key=key)
+    stop, stopped = threading.Event(), threading.Event()
+    vehicle = Vehicle(setting, clock=WallClock(speed_up=speed_up), wall=WallClock(), say=wire.send)
+    thread = threading.Thread(target=_live, args=(vehicle, wire, stop, stopped), daemon=True)
+    thread.start()
+    try:
+        yield stopped
+    finally:
+        stop.set()
+        thread.join()
+        wire.close()
+
+
+def _live(vehicle: Vehicle, wire: Wire, stop: threading.Event, stopped: threading.Event) -> None:
+    try:
+        with wire.box() as box:
+            while not stop.is_set():
+                message = box.get(STEP_S)
+                if message is None:
+                    vehicle.advance()
+                else:
+                    vehicle.receive(message)
+    finally:
+        stopped.set()
+
+
+def setting_of(options: VehicleOptions) -> Setting:
+    """What the options mean.
+
+    Raises
+    ------
+    InputError
+        Naming the option.
+    """
+    origin = None if options.origin is None else read_origin(options.origin)
+    heading = 0.0 if origin is None else origin.heading_deg
+    level = (
+        None if origin is None else SiteOrigin(lat=origin.lat, lon=origin.lon, alt=origin.alt, heading_deg=0)
+    )
+    return Setting(
+        profile=profile_named(options.profile),
+        state=options.state,
+        origin=level,
+        at=None if options.at is None else to_east(options.at, heading),
+        faults=VehicleFaults(tuple(read_vehicle_fault(text) for text in options.faults)),
+    )
+
+
+def read_origin(text: str) -> SiteOrigin:
+    """LAT,LON,ALT or LAT,LON,ALT,HEADING: degrees, metres, and the bearing of the site's +y."""
+    numbers = text.split(",")
+    try:
+        lat, lon, alt, heading = (float(number) for number in (*numbers, "0")[:4])
+    except ValueError:
+        lat = float("nan")
+    if not (len(numbers) in (3, 4) and abs(lat) < 90 and abs(lon) <= 180 and abs(alt) < 1e5):
+        raise InputError(
+            f"--origin {text}: write LAT,LON,ALT or LAT,LON,ALT,HEADING in degrees and metres, as 47,8,400"
+        )
+    return SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=heading)
+
+
+def _leave(signum: int, frame: object) -> None:
+    raise SystemExit(0)

@@ -1,0 +1,229 @@
+"""What the vehicle tells of itself: one function per message, and how often each is sent."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from bridge.clock import Clock
+from bridge.mavlink.simulated.profile import ARMED, CUSTOM
+from bridge.mavlink.simulated.rover import bearing
+from bridge.mavlink.wire import Message
+
+if TYPE_CHECKING:
+    from bridge.mavlink.simulated.vehicle import Vehicle
+
+Maker = Callable[["Vehicle"], Message | None]
+"""The message as it is now; None if there is nothing to tell."""
+
+LOWEST_INTERVAL_US = 10_000
+BATTERY_NS = 6 * 3600 * 10**9
+"""A full battery lasts six hours."""
+CAPABILITIES = (
+    dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | dialect.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+    | dialect.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+    | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+)
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
+def heartbeat(vehicle: Vehicle) -> Message:
+    mode = vehicle.profile.modes[vehicle.mode]
+    flags = mode.flags | (ARMED if vehicle.armed else 0)
+    status = dialect.MAV_STATE_ACTIVE if vehicle.armed else dialect.MAV_STATE_STANDBY
+    rover = dialect.MAV_TYPE_GROUND_ROVER
+    return dialect.MAVLink_heartbeat_message(
+        rover, vehicle.profile.firmware, flags | CUSTOM, mode.custom, status, 3
+    )
+
+
+def sys_status(vehicle: Vehicle) -> Message:
+    sensors = dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO | dialect.MAV_SYS_STATUS_SENSOR_GPS
+    left = round(100 * vehicle.battery)
+    return dialect.MAVLink_sys_status_message(
+        sensors, sensors, sensors, 100, 24_000, 150, left, 0, 0, 0, 0, 0, 0
+    )
+
+
+def battery_status(vehicle: Vehicle) -> Message:
+    cells = [4000] * 6 + [65_535] * 4
+    left = round(100 * vehicle.battery)
+    return dialect.MAVLink_battery_status_message(
+        0, dialect.MAV_BATTERY_FUNCTION_ALL, dialect.MAV_BATTERY_TYPE_LIPO, 2500, cells, 150, -1, -1, left
+    )
+
+
+def attitude(vehicle: Vehicle) -> Message:
+    pose, _ = vehicle.motion()
+    return dialect.MAVLink_attitude_message(vehicle.boot_ms, 0.0, 0.0, bearing(pose.heading), 0.0, 0.0, 0.0)
+
+
+def global_position(vehicle: Vehicle) -> Message:
+    """All zeros before there is an origin, as autopilots do."""
+    pose, speed = vehicle.motion()
+    lat, lon = vehicle.rover.place((pose.x, pose.y))
+    north, east = _velocity(pose.heading, 100 * speed)
+    heading = round(math.degrees(bearing(pose.heading)) % 360 * 100) % 36_000
+    return dialect.MAVLink_global_position_int_message(
+        vehicle.boot_ms, lat, lon, vehicle.alt_mm, 0, round(north), round(east), 0, heading
+    )
+
+
+def local_position(vehicle: Vehicle) -> Message:
+    pose, speed = vehicle.motion()
+    north, east = _velocity(pose.heading, speed)
+    return dialect.MAVLink_local_position_ned_message(vehicle.boot_ms, pose.y, pose.x, 0.0, north, east, 0.0)
+
+
+def gps_raw(vehicle: Vehicle) -> Message:
+    pose, speed = vehicle.motion()
+    lat, lon = vehicle.rover.place((pose.x, pose.y))
+    fix = dialect.GPS_FIX_TYPE_3D_FIX if vehicle.rover.origin else dialect.GPS_FIX_TYPE_NO_FIX
+    course = round(math.degrees(bearing(pose.heading)) % 360 * 100) % 36_000
+    return dialect.MAVLink_gps_raw_int_message(
+        vehicle.boot_ms * 1000, fix, lat, lon, vehicle.alt_mm, 50, 50, round(100 * speed), course, 12
+    )
+
+
+def vfr_hud(vehicle: Vehicle) -> Message:
+    pose, speed = vehicle.motion()
+    course = round(math.degrees(bearing(pose.heading))) % 360
+    return dialect.MAVLink_vfr_hud_message(speed, speed, course, 0, vehicle.alt_mm / 1000, 0.0)
+
+
+def origin(vehicle: Vehicle) -> Message | None:
+    if vehicle.rover.origin is None:
+        return None
+    lat, lon = vehicle.rover.place((0.0, 0.0))
+    return dialect.MAVLink_gps_global_origin_message(lat, lon, vehicle.alt_mm, vehicle.boot_ms * 1000)
+
+
+def home(vehicle: Vehicle) -> Message | None:
+    """Home is the origin."""
+    if vehicle.rover.origin is None:
+        return None
+    lat, lon = vehicle.rover.place((0.0, 0.0))
+    return dialect.MAVLink_home_position_message(
+        lat, lon, vehicle.alt_mm, 0.0, 0.0, 0.0, UPRIGHT, 0.0, 0.0, 0.0, vehicle.boot_ms * 1000
+    )
+
+
+def extended_state(vehicle: Vehicle) -> Message:
+    return dialect.MAVLink_extended_sys_state_message(
+        dialect.MAV_VTOL_STATE_UNDEFINED, dialect.MAV_LANDED_STATE_ON_GROUND
+    )
+
+
+def mission_current(vehicle: Vehicle) -> Message:
+    course = vehicle.course
+    mode = 1 if vehicle.mode == "auto" else 2
+    return dialect.MAVLink_mission_current_message(course.current, course.total, mission_state(vehicle), mode)
+
+
+def mission_state(vehicle: Vehicle) -> int:
+    course = vehicle.course
+    if course.total == 0:
+        return int(dialect.MISSION_STATE_NO_MISSION)
+    if course.state == "active":
+        return int(dialect.MISSION_STATE_ACTIVE)
+    if course.state == "complete":
+        return int(dialect.MISSION_STATE_COMPLETE)
+    paused = vehicle.profile.pauses and course.current > 0
+    return int(dialect.MISSION_STATE_PAUSED if paused else dialect.MISSION_STATE_NOT_STARTED)
+
+
+def item_reached(vehicle: Vehicle) -> Message | None:
+    return None if vehicle.reached is None else dialect.MAVLink_mission_item_reached_message(vehicle.reached)
+
+
+def image_captured(vehicle: Vehicle) -> Message | None:
+    return vehicle.captured
+
+
+def autopilot_version(vehicle: Vehicle) -> Message:
+    release = (4 << 24) | (7 << 16) | dialect.FIRMWARE_VERSION_TYPE_OFFICIAL
+    empty = [0] * 8
+    return dialect.MAVLink_autopilot_version_message(
+        CAPABILITIES, release, 0, 0, 0, empty, empty, empty, 0, 0, 1
+    )
+
+
+MAKERS: dict[int, Maker] = {
+    dialect.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
+    dialect.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
+    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: gps_raw,
+    dialect.MAVLINK_MSG_ID_ATTITUDE: attitude,
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: local_position,
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: global_position,
+    dialect.MAVLINK_MSG_ID_MISSION_CURRENT: mission_current,
+    dialect.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: item_reached,
+    dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: origin,
+    dialect.MAVLINK_MSG_ID_VFR_HUD: vfr_hud,
+    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
+    dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
+    dialect.MAVLINK_MSG_ID_HOME_POSITION: home,
+    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_state,
+    dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED: image_captured,
+}
+DEFAULT_US: dict[int, int] = {
+    dialect.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
+    dialect.MAVLINK_MSG_ID_SYS_STATUS: 1_000_000,
+    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: 1_000_000,
+    dialect.MAVLINK_MSG_ID_ATTITUDE: 250_000,
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 250_000,
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 250_000,
+    dialect.MAVLINK_MSG_ID_MISSION_CURRENT: 1_000_000,
+    dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: 1_000_000,
+    dialect.MAVLINK_MSG_ID_VFR_HUD: 1_000_000,
+    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 2_000_000,
+    dialect.MAVLINK_MSG_ID_HOME_POSITION: 2_000_000,
+    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1_000_000,
+}
+"""How often each is sent unless a station asks otherwise; the others only when something happens."""
+
+
+class Streams:
+    """Which message is due when, on the wall's clock: stations look at their own, however time is sped up."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._every_us = dict(DEFAULT_US)
+        self._due_ns = dict.fromkeys(DEFAULT_US, clock.now_ns())
+
+    def interval_us(self, number: int) -> int:
+        """0: not known; -1: not sent."""
+        return self._every_us.get(number, -1) if number in MAKERS else 0
+
+    def set(self, number: int, interval_us: float) -> bool:
+        """0: as by default; negative: no more; false if the message is not known."""
+        if number not in MAKERS or not math.isfinite(interval_us):
+            return False
+        wanted = DEFAULT_US.get(number, -1) if interval_us == 0 else round(interval_us)
+        if wanted < 0:
+            self._every_us.pop(number, None)
+            self._due_ns.pop(number, None)
+        else:
+            self._every_us[number] = max(LOWEST_INTERVAL_US, wanted)
+            self._due_ns[number] = self._clock.now_ns()
+        return True
+
+    def due(self) -> list[int]:
+        """The messages that are due, each next time an interval from now."""
+        now = self._clock.now_ns()
+        found = [number for number, due in self._due_ns.items() if due <= now]
+        for number in found:
+            self._due_ns[number] = now + self._every_us[number] * 1000
+        return found
+
+
+def _velocity(heading: float, speed: float) -> tuple[float, float]:
+    """North and east."""
+    return speed * math.sin(heading), speed * math.cos(heading)

@@ -1,0 +1,329 @@
+"""The vehicle's end of the mission protocol: lists of items that come and go, by its profile's habits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from bridge.clock import Clock
+from bridge.mavlink.simulated.faults import VehicleFaults
+from bridge.mavlink.simulated.profile import Profile
+from bridge.mavlink.simulated.store import ALL, FENCE, MISSION, RALLY, Items, Store
+from bridge.mavlink.simulated.validate import ACCEPTED, verdict
+from bridge.mavlink.wire import Message, Who
+from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.items import Item
+from mission.mavlink.keeping import PLACED
+
+KINDS = (MISSION, FENCE, RALLY)
+STEPPED = PLACED | frozenset(range(5000, 5005)) | {5100}
+"""Commands whose x and y are degrees."""
+INT32 = 2**31 - 1
+
+
+@dataclass
+class Upload:
+    """A list that a station is sending."""
+
+    station: Who
+    kind: int
+    count: int
+    heard_ns: int
+    asked_ns: int = 0
+    items: list[Item] = field(default_factory=list)
+    marked: int | None = None
+    """The item that is to be the current one."""
+
+
+@dataclass
+class Download:
+    """A list that a station fetches in order."""
+
+    station: Who
+    kind: int
+    heard_ns: int
+    next: int = 0
+
+
+class Transfers:
+    """Every mission message of every station comes here.
+
+    Parameters
+    ----------
+    stored
+        Called with the kind and the item marked as current when a list was replaced or cleared.
+    running
+        Whether the mission is being driven.
+    event
+        Called with the number of an upload's item that has come, before anything else; false: it is lost.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        store: Store,
+        clock: Clock,
+        *,
+        say: Callable[[Message], None],
+        home: Callable[[], Item],
+        stored: Callable[[int, int | None], None],
+        running: Callable[[], bool],
+        event: Callable[[int], bool],
+        faults: VehicleFaults,
+    ) -> None:
+        self._profile, self._store, self._clock = profile, store, clock
+        self._say, self._home, self._stored, self._running = say, home, stored, running
+        self._event, self._faults = event, faults
+        self._upload: Upload | None = None
+        self._download: Download | None = None
+        self._done: tuple[Who, int, int] | None = None
+        """Station, kind and number of the last item that completed an upload."""
+        self._completed = 0
+        self._refused: set[int] = set()
+        self.handlers: dict[str, Callable[[Who, Message], None]] = {
+            "MISSION_COUNT": self._count,
+            "MISSION_ITEM_INT": self._item_int,
+            "MISSION_ITEM": self._item_float,
+            "MISSION_REQUEST_LIST": self._request_list,
+            "MISSION_REQUEST_INT": self._request,
+            "MISSION_REQUEST": self._request,
+            "MISSION_CLEAR_ALL": self._clear_all,
+            "MISSION_ACK": self._ack_came,
+            "MISSION_REQUEST_PARTIAL_LIST": self._partial,
+            "MISSION_WRITE_PARTIAL_LIST": self._partial,
+        }
+
+    def reset(self) -> None:
+        """Forget what is under way, as a reboot does."""
+        self._upload = self._download = self._done = None
+
+    def tick(self) -> None:
+        """Ask again, or give up."""
+        now, up, down, profile = self._clock.now_ns(), self._upload, self._download, self._profile
+        if up and now - up.heard_ns > profile.give_up_s * 1e9:
+            self._upload = None
+            if profile.tells_giving_up:
+                self._ack(up.station, dialect.MAV_MISSION_OPERATION_CANCELLED, up.kind)
+        elif up and now - up.asked_ns >= profile.ask_again_s * 1e9:
+            self._ask(up)
+        if down and now - down.heard_ns > profile.give_up_s * 1e9:
+            self._download = None
+
+    def items(self, kind: int) -> Items:
+        """The list as stations read it: with the vehicle's own home in front where it has one."""
+        items = self._store.items(kind)
+        if kind == MISSION and self._profile.autopilot.home_first and items:
+            return (self._home(), *items[1:])
+        return items
+
+    # What comes
+
+    def _count(self, who: Who, message: Message) -> None:
+        up, profile, kind = self._upload, self._profile, message.mission_type
+        if kind not in KINDS:
+            return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
+        if up and up.station != who:
+            return self._ack(who, profile.stranger, kind)
+        if up and up.items and not profile.begins_again:
+            return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
+        if self._download and self._download.station != who:
+            return self._ack(who, profile.stranger, kind)
+        if message.count > profile.autopilot.max_items:
+            self._upload = None
+            return self._ack(who, dialect.MAV_MISSION_NO_SPACE, kind)
+        self._begin(who, kind, message.count)
+
+    def _begin(self, who: Who, kind: int, count: int) -> None:
+        self._upload = self._download = self._done = None
+        if count == 0:
+            self._replace(kind, (), None)
+            return self._ack(who, ACCEPTED, kind)
+        if not self._profile.atomic:
+            self._store.put(kind, self._store.items(kind)[:count])
+            self._stored(kind, None)
+        self._upload = Upload(who, kind, count, heard_ns=self._clock.now_ns())
+        self._ask(self._upload)
+
+    def _item_int(self, who: Who, message: Message) -> None:
+        self._item(who, message, message.x, message.y)
+
+    def _item_float(self, who: Who, message: Message) -> None:
+        """The old message: degrees in float32, good to a metre."""
+        scale = STEPS_PER_DEGREE if message.command in STEPPED else 1
+        self._item(who, message, _whole(message.x * scale), _whole(message.y * scale))
+
+    def _item(self, who: Who, message: Message, x: int, y: int) -> None:
+        up = self._upload
+        if not self._event(message.seq):
+            return
+        if up is None or up.station != who:
+            return self._no_upload(who, message)
+        if message.mission_type != up.kind:
+            return self._ack(who, dialect.MAV_MISSION_ERROR, message.mission_type)
+        if message.seq != len(up.items):
+            return self._stray(up)
+        item = _item_of(message, x, y)
+        result = self._verdict(up, item)
+        if result != ACCEPTED:
+            self._upload = None
+            return self._ack(who, result, up.kind)
+        up.heard_ns = self._clock.now_ns()
+        self._take(up, item, marked=bool(message.current))
+
+    def _verdict(self, up: Upload, item: Item) -> int:
+        number = len(up.items)
+        fault = self._faults.due("nack", number)
+        if fault and number not in self._refused:
+            self._refused.add(number)
+            return int(fault.amount) or int(dialect.MAV_MISSION_ERROR)
+        if up.kind == MISSION and number == 0 and self._profile.autopilot.home_first:
+            return int(ACCEPTED)
+        return verdict(self._profile, up.kind, item)
+
+    def _take(self, up: Upload, item: Item, *, marked: bool) -> None:
+        number = len(up.items)
+        up.items.append(self._profile.autopilot.kept(item))
+        if marked:
+            up.marked = number
+        if not self._profile.atomic:
+            old = self._store.items(up.kind)
+            self._store.put(up.kind, (*old[:number], up.items[-1], *old[number + 1 :]))
+        if len(up.items) < up.count:
+            return self._ask(up)
+        self._upload, self._done = None, (up.station, up.kind, number)
+        self._replace(up.kind, tuple(up.items), up.marked)
+        self._completed += 1
+        if not self._faults.due("lostack", self._completed):
+            self._ack(up.station, ACCEPTED, up.kind)
+
+    def _stray(self, up: Upload) -> None:
+        """An item that was not asked for."""
+        if self._profile.strays == "tell":
+            self._ack(up.station, dialect.MAV_MISSION_INVALID_SEQUENCE, up.kind)
+        elif self._profile.strays == "ask":
+            self._ask(up)
+
+    def _no_upload(self, who: Who, message: Message) -> None:
+        again = (who, message.mission_type, message.seq) == self._done
+        self._ack(who, self._profile.last_again if again else dialect.MAV_MISSION_ERROR, message.mission_type)
+
+    def _request_list(self, who: Who, message: Message) -> None:
+        kind = message.mission_type
+        if kind not in KINDS:
+            return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
+        if self._upload:
+            return self._ack(who, self._profile.stranger, kind)
+        if self._profile.in_order:
+            if self._download and (self._download.station, self._download.kind) != (who, kind):
+                return  # source: ignored, with a text
+            self._download = Download(who, kind, heard_ns=self._clock.now_ns())
+        self._say_count(who, kind)
+
+    def _request(self, who: Who, message: Message) -> None:
+        kind, number = message.mission_type, message.seq
+        if kind not in KINDS:
+            return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
+        if self._upload:
+            return self._ack(who, self._profile.stranger, kind)
+        if self._profile.in_order and not self._in_order(who, kind, number):
+            return
+        items = self.items(kind)
+        if number < len(items):
+            whole = message.get_type() == "MISSION_REQUEST_INT"
+            return self._say((_item_message if whole else _float_message)(who, kind, number, items[number]))
+        if self._profile.name == "ardupilot":
+            self._say_count(who, kind)
+            return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
+        self._ack(who, dialect.MAV_MISSION_INVALID_SEQUENCE, kind)
+
+    def _in_order(self, who: Who, kind: int, number: int) -> bool:
+        """Whether the item is given: the next one, or the last one again; anything else ends it (source)."""
+        down = self._download
+        if down is None or (down.station, down.kind) != (who, kind):
+            return False
+        if number not in (down.next, down.next - 1):
+            self._download = None
+            self._ack(who, dialect.MAV_MISSION_ERROR, kind)
+            return False
+        down.heard_ns, down.next = self._clock.now_ns(), number + 1
+        return True
+
+    def _clear_all(self, who: Who, message: Message) -> None:
+        kind = message.mission_type
+        if kind not in (*KINDS, ALL):
+            return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
+        if self._upload:
+            return self._ack(who, self._profile.stranger, kind)
+        if kind in (MISSION, ALL) and self._running() and not self._profile.clears_in_auto:
+            return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
+        for one in KINDS if kind == ALL else (kind,):
+            self._replace(one, (), None)
+        self._ack(who, ACCEPTED, kind)
+
+    def _ack_came(self, who: Who, message: Message) -> None:
+        up, down = self._upload, self._download
+        if down and (down.station, down.kind) == (who, message.mission_type):
+            self._download = None
+        ends = message.type == dialect.MAV_MISSION_OPERATION_CANCELLED and self._profile.cancels
+        if up and ends and (up.station, up.kind) == (who, message.mission_type):
+            self._upload = None
+            if self._profile.name == "strict":  # "the vehicle ends the sequence": it says so
+                self._ack(who, dialect.MAV_MISSION_OPERATION_CANCELLED, up.kind)
+
+    def _partial(self, who: Who, message: Message) -> None:
+        self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
+
+    # What is said
+
+    def _replace(self, kind: int, items: Items, marked: int | None) -> None:
+        self._store.put(kind, items)
+        self._stored(kind, marked)
+
+    def _ask(self, up: Upload) -> None:
+        up.asked_ns = self._clock.now_ns()
+        asking = (
+            dialect.MAVLink_mission_request_int_message
+            if self._profile.asks_int
+            else dialect.MAVLink_mission_request_message
+        )
+        self._say(asking(up.station.system, up.station.component, len(up.items), up.kind))
+
+    def _ack(self, who: Who, result: int, kind: int) -> None:
+        self._say(dialect.MAVLink_mission_ack_message(who.system, who.component, result, kind))
+
+    def _say_count(self, who: Who, kind: int) -> None:
+        count = len(self.items(kind))
+        self._say(dialect.MAVLink_mission_count_message(who.system, who.component, count, kind))
+
+
+def _item_of(message: Message, x: int, y: int) -> Item:
+    return Item(
+        message.command, message.frame, (message.param1, message.param2, message.param3, message.param4),
+        x, y, message.z, autocontinue=bool(message.autocontinue),
+    )  # fmt: skip
+
+
+def _item_message(who: Who, kind: int, number: int, item: Item) -> Message:
+    return _message_of(dialect.MAVLink_mission_item_int_message, who, kind, number, item, item.x, item.y)
+
+
+def _float_message(who: Who, kind: int, number: int, item: Item) -> Message:
+    scale = STEPS_PER_DEGREE if item.command in STEPPED else 1
+    x, y = item.x / scale, item.y / scale
+    return _message_of(dialect.MAVLink_mission_item_message, who, kind, number, item, x, y)
+
+
+def _message_of(made: Any, who: Who, kind: int, number: int, item: Item, x: float, y: float) -> Message:
+    return made(
+        who.system, who.component, number, item.frame, item.command, 0, int(item.autocontinue), *item.params,
+        x, y, item.z, kind,
+    )  # fmt: skip
+
+
+def _whole(value: float) -> int:
+    """The nearest int32; what is no place is as far off the earth as it can be."""
+    return round(value) if math.isfinite(value) and abs(value) <= INT32 else INT32

@@ -1,0 +1,71 @@
+"""Whether a vehicle takes an item: the MAV_MISSION_RESULT with which it refuses one, else ACCEPTED."""
+
+from __future__ import annotations
+
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from bridge.mavlink.simulated.profile import Profile
+from bridge.mavlink.simulated.store import FENCE, MISSION
+from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.items import Frame, Item
+from mission.mavlink.keeping import PLACED
+
+ACCEPTED = dialect.MAV_MISSION_ACCEPTED
+FENCE_COMMANDS = range(5000, 5005)
+RALLY_COMMANDS = range(5100, 5101)
+GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})
+PX4_FRAMES = frozenset({0, 3, 5, 6})
+INVALID_PARAM = (
+    dialect.MAV_MISSION_INVALID_PARAM1, dialect.MAV_MISSION_INVALID_PARAM2,
+    dialect.MAV_MISSION_INVALID_PARAM3, dialect.MAV_MISSION_INVALID_PARAM4,
+)  # fmt: skip
+MAY_BE_NAN = {16: (3,), 17: (3,), 19: (3,), 21: (3,), 22: (3,), 2000: (1, 2, 3), 1000: (0, 1, 2, 3)}
+"""Params that may be NaN, "not said", in a mission's item; nowhere else."""
+
+
+def verdict(profile: Profile, kind: int, item: Item) -> int:
+    """The MAV_MISSION_RESULT for one item of a mission, fence or rally list."""
+    if kind != MISSION:
+        return _of_area(kind, item)
+    if item.command not in profile.commands:
+        return dialect.MAV_MISSION_UNSUPPORTED
+    placed = item.command in PLACED
+    if profile.name == "px4":
+        return _of_px4(item, placed)
+    if placed and item.frame not in GLOBAL_FRAMES | {Frame.MISSION}:
+        return dialect.MAV_MISSION_UNSUPPORTED_FRAME
+    return _of_numbers(item, MAY_BE_NAN.get(item.command, ())) or (_of_place(item) if placed else ACCEPTED)
+
+
+def _of_px4(item: Item, placed: bool) -> int:
+    """PX4 looks at the frame first, and hardly at numbers (source); places off the earth are refused here."""
+    if item.frame not in PX4_FRAMES | {Frame.MISSION}:
+        return dialect.MAV_MISSION_UNSUPPORTED_FRAME
+    if placed != (item.frame in PX4_FRAMES):
+        return dialect.MAV_MISSION_UNSUPPORTED
+    return _of_numbers(item, (0, 1, 2, 3)) or (_of_place(item) if placed else ACCEPTED)
+
+
+def _of_area(kind: int, item: Item) -> int:
+    if item.command not in (FENCE_COMMANDS if kind == FENCE else RALLY_COMMANDS):
+        return dialect.MAV_MISSION_UNSUPPORTED
+    if item.frame not in GLOBAL_FRAMES:
+        return dialect.MAV_MISSION_UNSUPPORTED_FRAME
+    return _of_numbers(item, (1, 2, 3)) or _of_place(item)
+
+
+def _of_numbers(item: Item, may_be_nan: tuple[int, ...]) -> int:
+    for index, value in enumerate(item.params):
+        if math.isinf(value) or (math.isnan(value) and index not in may_be_nan):
+            return int(INVALID_PARAM[index])
+    return ACCEPTED if math.isfinite(item.z) else int(dialect.MAV_MISSION_INVALID_PARAM7)
+
+
+def _of_place(item: Item) -> int:
+    if abs(item.x) > 90 * STEPS_PER_DEGREE:
+        return int(dialect.MAV_MISSION_INVALID_PARAM5_X)
+    if abs(item.y) > 180 * STEPS_PER_DEGREE:
+        return int(dialect.MAV_MISSION_INVALID_PARAM6_Y)
+    return int(ACCEPTED)
