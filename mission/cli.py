@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 
 MissionFile = Annotated[Path, typer.Argument(metavar="MISSION", help="A mission.json.")]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout and nothing else.")]
-Floor = Annotated[Path | None, typer.Option(help="The floor it was planned on; its digest is compared.")]
+Floor = Annotated[
+    Path | None, typer.Option(help="The floor it was planned on: its digest, and whether the mission fits.")
+]
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -55,9 +57,10 @@ def show(mission: MissionFile, as_json: AsJson = False) -> None:
 def check(mission: MissionFile, floor: Floor = None, as_json: AsJson = False) -> None:
     """Check that a mission makes sense.
 
-    Schema, digest, numbers, legs that join up; and with --floor, that it was planned on that floor.
+    Schema, digest, numbers, legs that join up; and with --floor, that it was planned on that floor, and
+    that stops and legs keep every clearance there, measured anew by distance.
 
-    Exit code 0: in order; 1: readable but senseless, or of another floor; 2: not readable.
+    Exit code 0: in order; 1: readable but senseless, of another floor, or unfit for it; 2: not readable.
 
     Example: stopgo check out/mission.json --floor office.dxf
     """
@@ -74,6 +77,19 @@ def check(mission: MissionFile, floor: Floor = None, as_json: AsJson = False) ->
 
 
 def _floor_problems(mission: Mission, floor: Path) -> tuple[Problem, ...]:
+    """Whether it was planned on this very floor, and what of it does not fit there."""
+    from planner.fit import misfits
+
+    other = _other_floor(mission, floor)
+    try:
+        return (*other, *misfits(mission, floor))
+    except InputError:
+        if other:  # not the floor, and no floor either
+            return other
+        raise
+
+
+def _other_floor(mission: Mission, floor: Path) -> tuple[Problem, ...]:
     try:
         digest = hashlib.sha256(floor.read_bytes()).hexdigest()
     except OSError as error:

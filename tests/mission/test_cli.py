@@ -7,6 +7,7 @@ import json
 import math
 from pathlib import Path
 
+import ezdxf
 import msgspec
 import pytest
 
@@ -16,19 +17,28 @@ from mission.files.mission_json import write
 from mission.table import duration, table
 from tests.mission.worlds import square_tour
 
-FLOOR = b"a floor"
+
+@pytest.fixture
+def floor(tmp_path: Path) -> Path:
+    """A bare slab, 1 m larger all round than the tour."""
+    drawing = ezdxf.new()
+    drawing.header["$INSUNITS"] = 6
+    corners = [(-1, -1), (5, -1), (5, 4), (-1, 4)]
+    drawing.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": "FLOOR"})
+    drawing.saveas(tmp_path / "room.dxf")
+    return tmp_path / "room.dxf"
 
 
 @pytest.fixture
-def mission() -> Mission:
-    origin = msgspec.structs.replace(square_tour().origin, floor_digest=hashlib.sha256(FLOOR).hexdigest())
+def mission(floor: Path) -> Mission:
+    digest = hashlib.sha256(floor.read_bytes()).hexdigest()
+    origin = msgspec.structs.replace(square_tour().origin, floor_digest=digest)
     return msgspec.structs.replace(square_tour(), origin=origin)
 
 
 @pytest.fixture
 def path(tmp_path: Path, mission: Mission) -> str:
     write(mission, tmp_path / "mission.json")
-    (tmp_path / "room.dxf").write_bytes(FLOOR)
     return str(tmp_path / "mission.json")
 
 
@@ -65,8 +75,10 @@ def test_show_of_nonsense_says_what_is_wrong(broken: str, capsys: pytest.Capture
     assert "$.robot.speed: is 0.0" in captured.err
 
 
-def test_check_of_a_sound_mission_on_its_floor(path: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", path, "--floor", str(Path(path).with_name("room.dxf"))]) == 0
+def test_check_of_a_sound_mission_on_its_floor(
+    path: str, floor: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", path, "--floor", str(floor)]) == 0
     assert "in order; id 0123456789abcdef0123456789abcdef revision 1, 2 stops" in capsys.readouterr().out
 
 

@@ -1,0 +1,190 @@
+"""Mission + floor -> what does not fit: every clearance that planning keeps, measured anew.
+
+A mission may have been edited, or made elsewhere, or the drawing may have changed since it was planned.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from mission.document import Mission, Point, Stop
+from mission.errors import InputError
+from mission.floor import Element, FloorPlan
+from mission.geometry import FloatArray
+from mission.sense import Problem
+from mission.settings import Settings, read_settings
+from planner.assemble import CLEAR_SLACK
+from planner.floors import read_floor
+from planner.gaps import Walls
+from planner.ground import Ground
+from planner.shapes import HAIRLINE, SLACK, segments_of, to_shape
+from planner.targets import solid_of
+
+ALLOWED = SLACK + CLEAR_SLACK
+"""What a clearance may fall short by, in metres: as in planning, and rounded as in missions."""
+
+
+def misfits(mission: Mission, path: Path) -> tuple[Problem, ...]:
+    """What of a mission does not fit the floor in a file, in the order of the document.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read as a floor.
+    """
+    try:
+        settings = read_settings(None, mission.origin.parameters)
+    except InputError as error:
+        return (Problem("$.origin.parameters", f"are not those of a plan: {error}"),)
+    floor = read_floor(path, d_dis=settings.d_dis)
+    return (*_other_machine(mission, settings), *misfits_on(floor, mission, settings))
+
+
+def misfits_on(floor: FloorPlan, mission: Mission, settings: Settings) -> Iterator[Problem]:
+    """Stops and legs that come too near an element, a closed opening or a floor edge, or leave the floor."""
+    radius = max(settings.radius, mission.robot.radius)
+    fit = _Fit(floor, msgspec.structs.replace(settings, robot_radius=radius))
+    for index, stop in enumerate(mission.stops):
+        path = f"$.stops[{index}]"
+        yield from fit.stop(path, stop)
+        yield from fit.leg(f"{path}.approach", stop.approach)
+    yield from fit.leg("$.return", mission.return_ or ())
+
+
+def _other_machine(mission: Mission, settings: Settings) -> Iterator[Problem]:
+    """What the robot is sent of itself, where the plan was made with something else."""
+    pairs = (
+        ("$.robot.radius", mission.robot.radius, "robot_radius", settings.radius),
+        ("$.scanner.range", mission.scanner.range, "range", settings.range),
+        ("$.scanner.fov_deg", mission.scanner.fov_deg, "fov", settings.fov),
+    )
+    for path, sent, key, planned in pairs:
+        if not math.isclose(sent, planned, rel_tol=1e-9):
+            yield Problem(path, f"is {sent:g}, but $.origin.parameters.{key} planned with {planned:g}")
+
+
+@dataclass(frozen=True)
+class _Fault:
+    """Where a place or a way comes too near something."""
+
+    wall: int
+    at: Point
+    distance: float
+    clearance: float
+
+
+class _Fit:
+    """A floor, prepared for asking whether stops and legs keep their distances."""
+
+    def __init__(self, floor: FloorPlan, settings: Settings) -> None:
+        self.floor, self.settings = floor, settings
+        self.ground = Ground.of(floor, settings)
+        self.legs = self.ground.walls(settings)
+        self.stops = self._stop_walls()
+        self._trees = {walls: shapely.STRtree(walls.shapes()) for walls in (self.legs, self.stops)}
+        self._carries = self.ground.outline.buffer(ALLOWED, join_style="mitre")
+        self._doorways = [item.clear for item in self.ground.crossings if not item.closed_because]
+
+    def _stop_walls(self) -> Walls:
+        """What a stop keeps away from: elements by d_sec, and the edges of the floor layer."""
+        solid = segments_of(self.ground.obstacles)
+        edges = segments_of(to_shape(self.floor.outline, self.ground.origin))
+        keep = max(self.settings.d_sec, self.settings.radius)
+        clearance = np.repeat([keep, self.settings.edge], [len(solid), len(edges)])
+        return Walls(np.concatenate([solid, edges]), clearance)
+
+    def stop(self, path: str, stop: Stop) -> Iterator[Problem]:
+        """A stop's distance from elements and floor edges; the legs tell of stops in doorways."""
+        place = shapely.Point(np.array([stop.x, stop.y]) - self.ground.origin)
+        doorway = stop.doorway and any(place.distance(line) <= ALLOWED for line in self._doorways)
+        what = f"{stop.id} at {_told((stop.x, stop.y))}"
+        if (off := self._off(place)) is not None:
+            yield Problem(path, f"{what} {off}")
+        elif not doorway and (fault := self._worst(place, self.stops)) is not None:
+            yield Problem(path, f"{what} is {self._said(fault, self.stops)}")
+        for x, y, radius in self.settings.avoid:
+            if math.dist((x, y), (stop.x, stop.y)) < radius - ALLOWED:
+                yield Problem(path, f"{stop.id} is in the circle to avoid at {_told((x, y))}")
+
+    def leg(self, path: str, leg: tuple[Point, ...]) -> Iterator[Problem]:
+        """Every straight piece of a leg, told at the point where it ends."""
+        for index, (a, b) in enumerate(pairwise(leg if len(leg) > 1 else leg * 2), start=1):
+            ends = np.array([a, b]) - self.ground.origin
+            way = shapely.LineString(ends) if a != b else shapely.Point(ends[0])
+            what = f"the way from {_told(a)} to {_told(b)}"
+            place = f"{path}[{min(index, len(leg) - 1)}]"
+            if (off := self._off(way)) is not None:
+                yield Problem(place, f"{what} {off}")
+            elif (fault := self._worst(way, self.legs)) is not None:
+                yield Problem(place, f"{what} is {self._said(fault, self.legs)}")
+
+    def _off(self, shape: BaseGeometry) -> str | None:
+        """Whether a place or way leaves the floor or lies within an element, in words."""
+        if not self._carries.covers(shape):
+            out = shapely.get_coordinates(shape.difference(self._carries))
+            far = out[np.argmax(shapely.distance(shapely.points(out), self.ground.outline))]
+            away = self.ground.outline.distance(shapely.Point(far))
+            return f"is off the floor: {self._at(far)} lies {away:.3f} m beside it"
+        if self.ground.obstacles.contains(shape):
+            return f"lies within {self._element(shape).id}"
+        return None
+
+    def _worst(self, shape: BaseGeometry, walls: Walls) -> _Fault | None:
+        """Where the clearance falls short by most."""
+        if not len(walls.segments):
+            return None
+        tree = self._trees[walls]
+        near = tree.query(shape, predicate="dwithin", distance=float(walls.clearance.max()))
+        distance = shapely.distance(shape, tree.geometries[near])
+        short = walls.clearance[near] - distance
+        if not np.any(short > ALLOWED):
+            return None
+        worst = int(np.argmax(short))
+        wall = int(near[worst])
+        at = shapely.get_coordinates(shapely.shortest_line(tree.geometries[wall], shape))[0]
+        return _Fault(wall, tuple(at.tolist()), float(distance[worst]), float(walls.clearance[wall]))
+
+    def _said(self, fault: _Fault, walls: Walls) -> str:
+        """A distance, to what, where, and what it must be."""
+        return (
+            f"{fault.distance:.3f} m from {self._name(fault, walls)} at {self._at(np.array(fault.at))}, "
+            f"less than {fault.clearance:.3f} m"
+        )
+
+    def _name(self, fault: _Fault, walls: Walls) -> str:
+        """What a wall is of: an element, a closed opening, or the floor's edge."""
+        solid = len(segments_of(self.ground.obstacles))
+        if fault.wall < solid:
+            return self._element(shapely.Point(fault.at)).id
+        if walls is self.legs and fault.wall < solid + len(self.ground.barriers):
+            closed = [item for item in self.ground.crossings if item.closed_because]
+            item = closed[fault.wall - solid]
+            return f"{item.opening.kind} {item.opening.id} ({item.closed_because})"
+        return "the floor's edge"
+
+    def _element(self, shape: BaseGeometry) -> Element:
+        """The obstacle nearest a place or way."""
+        items, solids = self._obstacles
+        return items[int(np.argmin(shapely.distance(solids, shape)))]
+
+    @cached_property
+    def _obstacles(self) -> tuple[list[Element], list[BaseGeometry]]:
+        items = [item for item in self.floor.elements if item.obstacle]
+        return items, [solid_of(item, self.ground.origin, HAIRLINE) for item in items]
+
+    def _at(self, local: FloatArray) -> str:
+        return _told(tuple((local + self.ground.origin).tolist()))
+
+
+def _told(point: tuple[float, ...]) -> str:
+    return f"({point[0]:.3f}, {point[1]:.3f})"
