@@ -105,8 +105,6 @@ def _straight_on(
         there = spots[j]
         if there.along > last.along + 1:
             return
-        if there.along == here.along:
-            continue
         away = _away(leg[math.floor(here.along) + 1 : math.ceil(there.along)], here.at, there.at)
         if away <= within:
             last = there

@@ -101,8 +101,10 @@ def test_only_the_real_corner_is_a_waypoint(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_finer_limit_keeps_the_bend(name):
-    roles = [placed.role for placed in translate(corner_tour(), name, max_lateral_m=0.005).placed]
-    assert roles.count("corner") == 2
+    bent = changed(corner_tour(), return_=((4.0, 3.0), (4.0, 1.5), (4.03, 0.0)))
+    for limit, corners, back in ((0.02, 1, 1), (0.006, 2, 2)):
+        roles = [placed.role for placed in translate(bent, name, max_lateral_m=limit).placed]
+        assert (roles.count("corner"), roles.count("return")) == (corners, back)
 
 
 @pytest.mark.parametrize("name", NAMES)
