@@ -143,14 +143,26 @@ def plan_files(floor: Path, out: Path, settings: Settings, *, all_parts: bool = 
     watch.lap("read")
     folder = _folder(out)
     if not all_parts:
-        return [_plan_part(read, folder, settings, watch)]
+        report = _plan_part(read, folder, settings, watch)
+        _set_aside(folder, 1, read, settings)
+        return [report]
     parts = parts_to_plan(navigable(read, settings))
     reports = [
         _plan_part(read, folder, settings, Stopwatch(watch), found=found, number=number)
         for number, found in enumerate(parts)
     ]
+    _set_aside(folder, len(parts), read, settings)
     rooms = frozenset[int]().union(*(entered(found) for found in parts))
     return [replace(report, elsewhere=rooms) for report in reports]
+
+
+def _set_aside(folder: Path, parts: int, floor: FloorPlan, settings: Settings) -> None:
+    from planner.outputs import set_aside
+
+    moved = set_aside(folder, parts, floor.digest, settings)
+    if moved:
+        told = f"{folder}: of another plan, renamed so that nobody drives it: "
+        typer.echo(f"{told}{', '.join(path.name for path in moved)}", err=True)
 
 
 def _folder(out: Path) -> Path:
@@ -181,10 +193,11 @@ def _plan_part(
     from mission.planning import Route
     from mission.schedule import schedule
     from planner import plan, plan_part
+    from planner.outputs import names
     from planner.report import PlanReport
     from recordings.plan import PlanRecording
 
-    files = _names(folder, number)
+    files = names(folder, number)
     nouns: dict[type, Any] = {}
     with PlanRecording(
         files["recording"], recording_id=mission_id(floor.digest, settings, __version__, number)
@@ -206,18 +219,6 @@ def _plan_part(
     _write(files["mission"], encode(mission))
     watch.lap("files")
     return PlanReport(route=route, mission=mission, files=files, times_s=watch.times())
-
-
-def _names(folder: Path, number: int) -> dict[str, Path]:
-    suffix = "" if number == 0 else f"-{number + 1}"
-    names = {
-        "mission": "mission.json",
-        "recording": "plan.rrd",
-        "picture": "plan.svg",
-        "coverage": "coverage.json",
-    }
-    paths = {key: folder / name for key, name in names.items()}
-    return {key: path.with_name(f"{path.stem}{suffix}{path.suffix}") for key, path in paths.items()}
 
 
 def _write(path: Path, data: bytes) -> None:

@@ -179,14 +179,53 @@ def test_all_parts_are_planned_into_files_of_their_own(run: Callable[..., Run], 
     narrow = drawn(tmp_path / "narrow.dxf", door=0.6)
     code, out, _ = run("plan", narrow, "-o", tmp_path / "out", "--all-parts", "--json")
     assert code == 0
-    second = {"mission-2.json", "plan-2.rrd", "plan-2.svg", "coverage-2.json"}
-    assert left_in(tmp_path / "out") == FILES | second
+    assert left_in(tmp_path / "out") == FILES | SECOND
     assert len(json.loads(out)["parts"]) == 1
     sides = [
         {stop.x < 4 for stop in read(tmp_path / "out" / name).stops}
         for name in ("mission.json", "mission-2.json")
     ]
     assert sorted(map(sorted, sides)) == [[False], [True]]
+
+
+SECOND = {"mission-2.json", "plan-2.rrd", "plan-2.svg", "coverage-2.json"}
+
+
+def test_what_another_plan_left_of_a_second_part_is_renamed_and_told(
+    run: Callable[..., Run], tmp_path: Path
+) -> None:
+    narrow, out = drawn(tmp_path / "narrow.dxf", door=0.6), tmp_path / "out"
+    run("plan", narrow, "-o", out, "--all-parts")
+    before = (out / "mission-2.json").read_bytes()
+    code, _, error = run("plan", narrow, "-o", out, "--range", 4)
+    assert (code, len(error.splitlines())) == (0, 1)
+    assert left_in(out) == FILES | {f"{name}.old" for name in SECOND}
+    assert all(f"{name}.old" in error for name in SECOND)
+    assert (out / "mission-2.json.old").read_bytes() == before
+    run("plan", narrow, "-o", out, "--all-parts")
+    run("plan", narrow, "-o", out, "--range", 4)
+    assert {f"{name}.old2" for name in SECOND} <= left_in(out)
+
+
+def test_a_second_part_that_the_same_settings_give_again_stays(
+    run: Callable[..., Run], tmp_path: Path
+) -> None:
+    narrow, out = drawn(tmp_path / "narrow.dxf", door=0.6), tmp_path / "out"
+    run("plan", narrow, "-o", out, "--all-parts")
+    assert run("plan", narrow, "-o", out)[2] == ""
+    assert left_in(out) == FILES | SECOND
+
+
+def test_a_refusal_renames_nothing_and_what_is_no_mission_stays(
+    run: Callable[..., Run], tmp_path: Path
+) -> None:
+    narrow, out = drawn(tmp_path / "narrow.dxf", door=0.6), tmp_path / "out"
+    run("plan", narrow, "-o", out, "--all-parts")
+    (out / "mission-3.json").write_text("mine")
+    assert run("plan", narrow, "-o", out, "--d-sec", 3)[0] == 1
+    assert left_in(out) == FILES | SECOND | {"mission-3.json"}
+    run("plan", narrow, "-o", out, "--range", 4)
+    assert (out / "mission-3.json").read_text() == "mine"
 
 
 @pytest.mark.parametrize("name", ["layered/fzk-haus-eg.dxf"])
