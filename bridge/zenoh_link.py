@@ -49,6 +49,8 @@ COMMON: dict[str, Any] = {
     "adminspace/enabled": False,
 }
 RETRY = {"period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 1.5}
+RETRY_WITH_KEYS = {"period_init_ms": 1100, "period_max_ms": 1100, "period_increase_factor": 1.0}
+"""A certificate is still taken in the very second it ends in, and a link opened then is not closed again."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ def joining(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
     The robot is a router too: a router does not carry between two peers that it takes for neighbours.
     """
     check_endpoint(endpoint, guard, option="--connect")
-    with _opened({"mode": "router", **_reaching(endpoint)}, endpoint, guard) as link:
+    with _opened({"mode": "router", **_reaching(endpoint, guard)}, endpoint, guard) as link:
         yield link
 
 
@@ -92,12 +94,13 @@ def connecting(endpoint: str, guard: Guard = UNGUARDED, *, open_s: float = OPEN_
     """
     check_endpoint(endpoint, guard, option="--connect")
     opening = {"transport/unicast/open_timeout": round(max(LEAST_OPEN_S, open_s) * 1e3)}
-    with _opened({"mode": "peer", **_reaching(endpoint), **opening}, endpoint, guard) as link:
+    with _opened({"mode": "peer", **_reaching(endpoint, guard), **opening}, endpoint, guard) as link:
         yield link
 
 
-def _reaching(endpoint: str) -> dict[str, Any]:
-    return {"connect/endpoints": [endpoint], "listen/endpoints": [], "connect/retry": RETRY,
+def _reaching(endpoint: str, guard: Guard) -> dict[str, Any]:
+    retry = RETRY if guard.keys is None else RETRY_WITH_KEYS
+    return {"connect/endpoints": [endpoint], "listen/endpoints": [], "connect/retry": retry,
             "connect/exit_on_failure": False}  # fmt: skip
 
 

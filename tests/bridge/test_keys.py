@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime, timedelta
@@ -13,7 +14,7 @@ import pytest
 from bridge import keys as site_keys
 from bridge.agent import trusting
 from bridge.keys import Holder, Signature, Untrusted, holders, init_site, issue, now_utc, read_keys
-from bridge.link import Request
+from bridge.link import Link, Request
 from bridge.protocol import Command, Keys, Reply, encode
 from bridge.spawn import end_robot, free_port, start_robot
 from bridge.station import Station, connect
@@ -127,6 +128,24 @@ def test_an_endpoint_must_be_guarded_as_it_should(site: Path) -> None:
         check_endpoint("tls/10.0.0.1:7447", Guard(insecure=True), option="--connect")
 
 
+def issue_until(folder: Path, role: site_keys.Role, name: str, *, seconds: float) -> None:
+    """Keys that were issued for a day, which ends in so many seconds."""
+    issue(folder, role, name, now=now_utc() + timedelta(seconds=seconds, days=-1), days=1)
+
+
+class Presence:
+    """When a robot was seen to come and go on a link."""
+
+    def __init__(self, link: Link, robot: str) -> None:
+        self.changes: list[bool] = []
+        self.came, self.went = threading.Event(), threading.Event()
+        link.watch_presence(Keys(robot).alive, self.changed)
+
+    def changed(self, key: str, alive: bool) -> None:
+        self.changes.append(alive)
+        (self.came if alive else self.went).set()
+
+
 @contextmanager
 def guarded_robot(site: Path, state: Path) -> Iterator[str]:
     endpoint = f"tls/127.0.0.1:{free_port()}"
@@ -168,6 +187,43 @@ def test_strangers_and_plain_links_do_not_reach_the_robot(site: Path, tmp_path: 
             pass
         with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
             assert station.status().state == "IDLE"
+
+
+def test_a_link_is_closed_when_the_stations_certificate_ends(site: Path, tmp_path: Path) -> None:
+    with guarded_robot(site, tmp_path) as endpoint:
+        issue_until(site / "site", "station", "brief", seconds=5)
+        brief = read_keys(site / "site" / "brief", now=now_utc())
+        with connecting(endpoint, Guard(brief)) as link:
+            seen = Presence(link, "r1")
+            assert seen.came.wait(5)
+            assert seen.went.wait(20), "the link outlives the certificate"
+            # Another station is let in meanwhile, and what it does takes longer than a reconnect.
+            with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
+                station.push(corridor())
+                station.command("start")
+                assert len([1 for report in station.reports() if isinstance(report, Scanned)]) == 3
+            assert link.ask(Keys("r1").info, timeout_s=1) is None
+        assert seen.changes == [True, False]
+        with pytest.raises(InputError, match="issue new keys for brief"):
+            read_keys(site / "site" / "brief", now=now_utc())
+
+
+def test_a_link_is_closed_when_the_robots_certificate_ends(site: Path, tmp_path: Path) -> None:
+    issue_until(site / "site", "robot", "r9", seconds=8)
+    endpoint = f"tls/127.0.0.1:{free_port()}"
+    robot = start_robot("r9", tmp_path, listen=endpoint, extra=("--keys", str(site / "site" / "r9")))
+    try:
+        with connecting(endpoint, Guard(read_keys(site / "site" / "alice", now=NOW))) as link:
+            seen = Presence(link, "r9")
+            assert seen.came.wait(10)
+            assert seen.went.wait(20), "the link outlives the certificate"
+            late = connect(endpoint, robot="r9", keys=site / "site" / "alice", timeout_s=3)
+            with pytest.raises(RobotUnreachable), late:
+                pass
+        assert seen.changes == [True, False]
+        assert robot.poll() is None
+    finally:
+        end_robot(robot)
 
 
 def test_a_viewer_that_forges_is_not_heard_and_a_forged_name_is_not_believed(

@@ -22,12 +22,13 @@ from typing import TypeVar
 import pytest
 
 from bridge.journal import open_journal
+from bridge.keys import init_site, issue, now_utc
 from bridge.protocol import Command, encode
 from bridge.spawn import end_robot, free_port, start_robot
 from bridge.station import Station, connect
 from mission.document import Mission, Scan
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
-from mission.events import Finished, Paused, Scanned, Started
+from mission.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started
 from tests.bridge.world import corridor
 from tests.faults.sizes import size
 
@@ -37,8 +38,9 @@ ENTRIES = 45
 T = TypeVar("T")
 
 
-def mission() -> Mission:
-    return corridor(stops=3, settle_s=1.0, scan=Scan(profile="default", duration_s=5.0, timeout_s=60.0))
+def mission(*, stops: int = 3, revision: int = 1) -> Mission:
+    scan = Scan(profile="default", duration_s=5.0, timeout_s=60.0)
+    return corridor(stops=stops, revision=revision, settle_s=1.0, scan=scan)
 
 
 @dataclass
@@ -49,6 +51,7 @@ class Supervisor:
     faults: list[str]
     endpoint: str = field(default_factory=lambda: f"tcp/127.0.0.1:{free_port()}")
     extra: Sequence[str] = ()
+    speed_up: float = SPEED_UP
     kills: int = 0
     closing: bool = False
 
@@ -72,7 +75,9 @@ class Supervisor:
             fault = ["--fault", self.faults.pop()] if self.faults else []
             extra = ["--endurance", "0", *self.extra, *fault]
             try:
-                return start_robot("r1", self.state, listen=self.endpoint, speed_up=SPEED_UP, extra=extra)
+                return start_robot(
+                    "r1", self.state, listen=self.endpoint, speed_up=self.speed_up, extra=extra
+                )
             except RobotUnreachable:
                 self.kills += 1
                 assert fault, "a robot without a fault did not start"
@@ -123,12 +128,17 @@ def give(station: Station, order: Command, outcome: Outcome) -> bool:
 def drive(station: Station, chance: random.Random, outcome: Outcome) -> int:
     """Start, pause and resume until the run is finished; how many pauses were carried out."""
     give(station, stubbornly(lambda: station.order("start", valid_for_s=60.0), outcome), outcome)
+    return see_through(station, chance, outcome, pauses=0.15)
+
+
+def see_through(station: Station, chance: random.Random, outcome: Outcome, *, pauses: float) -> int:
+    """Resume, and now and then pause, until the run is finished; how many pauses were carried out."""
     paused = 0
     while True:
         state = stubbornly(station.status, outcome)
         if state.state == "FINISHED":
             return paused
-        if state.state == "RUNNING" and chance.random() < 0.15:
+        if state.state == "RUNNING" and chance.random() < pauses:
             order = stubbornly(lambda: station.order("pause", valid_for_s=60.0), outcome)
             paused += give(station, order, outcome)
         elif state.state == "PAUSED":
@@ -142,35 +152,84 @@ def faults_of(chance: random.Random) -> list[str]:
     return [f"{kind}@{chance.randint(1, ENTRIES)}" for kind in kinds]
 
 
-def trial(seed: int, folder: Path) -> Outcome:
+@dataclass(frozen=True)
+class Site:
+    """How robot and station reach one another: in the open, or by mTLS with signed orders."""
+
+    protocol: str = "tcp"
+    robot: tuple[str, ...] = ()
+    station: Path | None = None
+
+
+OPEN = Site()
+
+
+def guarded(folder: Path) -> Site:
+    """A site's keys for the robot and for the station that gives the orders."""
+    init_site(folder, now=now_utc())
+    robot = issue(folder, "robot", "r1", now=now_utc())
+    station = issue(folder, "station", "trial", now=now_utc())
+    return Site("tls", ("--keys", str(robot.folder)), station.folder)
+
+
+def trial(seed: int, folder: Path, site: Site = OPEN) -> Outcome:
     chance, outcome = random.Random(seed), Outcome()
-    with Supervisor(folder, faults_of(chance)) as supervisor:
+    endpoint = f"{site.protocol}/127.0.0.1:{free_port()}"
+    with Supervisor(folder, faults_of(chance), endpoint, extra=site.robot) as supervisor:
         timers = [
             threading.Timer(chance.uniform(0.1, 3.0), supervisor.kill) for _ in range(chance.randint(0, 2))
         ]
         for timer in timers:
             timer.start()
-        with connect(supervisor.endpoint, robot="r1", commander="trial", timeout_s=3.0) as station:
+        with connect(endpoint, robot="r1", commander="trial", keys=site.station, timeout_s=3.0) as station:
             stubbornly(lambda: station.push(mission()), outcome)
             paused = drive(station, chance, outcome)
         for timer in timers:
             timer.cancel()
         outcome.kills = supervisor.kills
-    check(folder, paused)
+    check(folder, mission(), paused)
     return outcome
 
 
-def check(folder: Path, paused: int) -> None:
+def trial_of_a_revision(seed: int, folder: Path) -> Outcome:
+    """A revision is pushed during the run; the robot is killed while it waits, or at a journal entry."""
+    chance, outcome = random.Random(seed), Outcome()
+    at_an_entry = seed % 2 == 1
+    faults = [f"{chance.choice(['crash', 'crashed'])}@{chance.randint(10, ENTRIES)}"] if at_an_entry else []
+    revised = mission(stops=4, revision=2)
+    with (
+        Supervisor(folder, faults, speed_up=SPEED_UP / 4) as supervisor,
+        connect(supervisor.endpoint, robot="r1", commander="trial", timeout_s=3.0) as station,
+    ):
+        stubbornly(lambda: station.push(mission()), outcome)
+        give(station, stubbornly(lambda: station.order("start", valid_for_s=60.0), outcome), outcome)
+        accepted = stubbornly(lambda: station.push(revised), outcome)
+        if not at_an_entry:
+            assert accepted.waits
+            supervisor.kill()
+        see_through(station, chance, outcome, pauses=0.0)
+        outcome.kills = supervisor.kills
+    check(folder, revised, paused=0)
+    with open_journal(folder, "r1") as journal:
+        events = journal.events()
+    for kind in (RevisionWaits, RevisionTaken):
+        assert sum(isinstance(event, kind) for event in events) == 1
+    assert {event.revision for event in events if isinstance(event, Finished)} == {2}
+    return outcome
+
+
+def check(folder: Path, ran: Mission, paused: int) -> None:
     """What the journal and the scanner's record must agree on."""
     with open_journal(folder, "r1") as journal:
         events = journal.events()
-        stored = journal.mission(mission().id, 1)
+        stored = journal.mission(ran.id, ran.revision)
+    stops = [stop.id for stop in ran.stops]
     assert stored is not None
-    assert stored[1] == encode(mission())
+    assert stored[1] == encode(ran)
     assert [event.number for event in events] == list(range(1, len(events) + 1))
     assert sum(isinstance(event, Started) for event in events) == 1
     assert sum(isinstance(event, Finished) for event in events) == 1
-    assert [event.stop for event in events if isinstance(event, Scanned)] == ["s1", "s2", "s3"]
+    assert [event.stop for event in events if isinstance(event, Scanned)] == stops
     ordered = [event for event in events if isinstance(event, Paused) and event.reason == "pause by trial"]
     assert len(ordered) == paused
     # A boot that died before it could say so leaves no event, but it has scanned nothing either.
@@ -178,17 +237,30 @@ def check(folder: Path, paused: int) -> None:
     scans = Counter(
         line.split("-")[1] for line in (folder / "scans.log").read_text().splitlines() if "end" in line
     )
-    assert set(scans) == {"s1", "s2", "s3"}
-    assert sum(scans.values()) - 3 <= reboots, "a stop was scanned twice without a reboot in between"
+    assert set(scans) == set(stops)
+    assert sum(scans.values()) - len(stops) <= reboots, "a stop was scanned twice without a reboot in between"
 
 
-def test_kills_of_the_robot_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
-    outcomes = [trial(seed, tmp_path / str(seed)) for seed in range(size(short=5, full=300))]
+def count(outcomes: list[Outcome]) -> None:
     kills, orders = sum(item.kills for item in outcomes), sum(item.orders for item in outcomes)
     unknown = sum(item.unknown for item in outcomes)
     print(f"{len(outcomes)} trials: {kills} kills, {orders} orders, each given twice; {unknown} unknown")
     assert kills >= len(outcomes) // 2
     assert orders >= len(outcomes)
+
+
+def test_kills_of_the_robot_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
+    count([trial(seed, tmp_path / str(seed)) for seed in range(size(short=5, full=300))])
+
+
+def test_kills_of_a_robot_with_keys_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
+    site = guarded(tmp_path / "keys")
+    count([trial(seed, tmp_path / str(seed), site) for seed in range(1000, 1000 + size(short=3, full=100))])
+
+
+def test_kills_while_a_revision_waits_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
+    seeds = range(size(short=4, full=100))
+    count([trial_of_a_revision(seed, tmp_path / str(seed)) for seed in seeds])
 
 
 @pytest.mark.parametrize("seed", range(size(short=2, full=40)))
