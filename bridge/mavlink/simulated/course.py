@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from bridge.mavlink.simulated.faults import VehicleFaults
+from bridge.mavlink.simulated.faults import Mishaps
 from bridge.mavlink.simulated.profile import Profile
 from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.scanner import Scanner
@@ -53,14 +53,14 @@ class Course:
         store: Store,
         rover: Rover,
         scanner: Scanner,
-        faults: VehicleFaults,
+        mishaps: Mishaps,
         tells: Tells,
     ) -> None:
         self._profile, self._store, self._rover = profile, store, rover
-        self._scanner, self._faults, self._tells = scanner, faults, tells
+        self._scanner, self._mishaps, self._tells = scanner, mishaps, tells
         self._first = 1 if profile.autopilot.home_first else 0
         self._phase: Phase = "lost"
-        self._rebooted = False
+        self._item: Item | None = None
         self.state: State = "idle"
         self.current = 0
         self.due_ns: int | None = None
@@ -117,7 +117,7 @@ class Course:
             self._tells.reboot()
         elif self._phase == "driving" and (hold_s := self._hold_s()) > 0:
             self._phase, self.due_ns = "holding", now_ns + _ns(hold_s)
-        elif self._phase == "driving" and self._item().command == 17:
+        elif self._phase == "driving" and self._item and self._item.command == 17:
             return  # stays there until told otherwise
         else:
             self._tells.reached(self.current)
@@ -134,7 +134,7 @@ class Course:
         self.state = "active"
         while number < len(items):
             if items[number].command in NAV:
-                self.current = number
+                self.current, self._item = number, items[number]
                 self._tells.current(number)
                 return self._begin(items[number], now_ns)
             self._act(items, number, now_ns)
@@ -159,7 +159,7 @@ class Course:
             self._phase = "script"
             self.due_ns = now_ns + _ns(item.params[1]) if item.params[1] else None
             if self._scanner.scan is None:
-                self._tells.trigger(item.x, item.params[2], now_ns)
+                self._tells.trigger(max(0, item.x), item.params[2], now_ns)
 
     def _drive(self, item: Item, now_ns: int) -> None:
         to = self._rover.point(item.x, item.y) if item.command in PLACES else (0.0, 0.0)
@@ -167,18 +167,15 @@ class Course:
             self._phase, self.due_ns = "lost", None
             why = "no global origin" if self._rover.origin is None else "too far away"
             return self._tells.text(f"Item {self.current}: {why}")
-        finish = self._faults.due("finish", self.current)
-        to_spare = (finish.amount or 1.0) if finish else 0.0
-        ends_ns = self._rover.drive(
-            self._beside(to, now_ns), now_ns, heading=self._heading(item), to_spare=to_spare
-        )
+        finish = self._mishaps.due("finish", self.current)
+        to_spare, heading = (finish.amount or 1.0, None) if finish else (0.0, self._heading(item))
+        ends_ns = self._rover.drive(self._beside(to, now_ns), now_ns, heading=heading, to_spare=to_spare)
         self._phase, self.due_ns = "driving", ends_ns
-        if self._faults.due("reboot-mission", self.current) and not self._rebooted:
-            self._rebooted = True
+        if self._mishaps.once("reboot-mission", self.current):
             self._phase, self.due_ns = "rebooting", (now_ns + ends_ns) // 2
 
     def _beside(self, to: Point, now_ns: int) -> Point:
-        fault = self._faults.due("beside", self.current)
+        fault = self._mishaps.due("beside", self.current)
         if not fault:
             return to
         here = self._rover.at(now_ns)[0]
@@ -192,16 +189,13 @@ class Course:
         return math.pi / 2 - math.radians(yaw) if keeps and math.isfinite(yaw) else None
 
     def _hold_s(self) -> float:
-        item = self._item()
-        if item.command not in (Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME):
+        item = self._item
+        if item is None or item.command not in (Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME):
             return 0.0
-        if self._faults.due("finish", self.current):
+        if self._mishaps.due("finish", self.current):
             return 0.0
         hold = item.params[0]
         return 0.0 if self._profile.name == "ardupilot" and hold > LONGEST_HOLD_S else hold
-
-    def _item(self) -> Item:
-        return self._store.kept.mission[self.current]
 
 
 def _scan_of(items: Items, number: int) -> tuple[int, float]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import heapq
+import itertools
 import random
+import threading
 import time
 from dataclasses import dataclass
 from typing import Literal
@@ -34,7 +36,7 @@ FAULTS: dict[FaultKind, str] = {
     "jitter": "frames are late by up to N ms, each way, and overtake each other; AMOUNT is the seed",
     "lostack": "the last ACK of upload N is not sent",
     "nack": "item N of an upload is refused once, with MAV_MISSION_RESULT AMOUNT (0: ERROR)",
-    "silent": "from item N of an upload on nothing is said or heard, for AMOUNT seconds (0: for good)",
+    "silent": "once, from item N of an upload on, nothing is said or heard, for AMOUNT seconds (0: for good)",
     "reboot-upload": "the vehicle reboots once, when item N of an upload has come",
     "reboot-mission": "the vehicle reboots once, on the way to item N",
     "beside": "the vehicle stands AMOUNT metres to the left of item N's waypoint, and says it is reached",
@@ -59,6 +61,26 @@ class VehicleFaults:
 NO_FAULTS = VehicleFaults()
 
 
+class Mishaps:
+    """The faults of one vehicle, and which of them have happened."""
+
+    def __init__(self, faults: VehicleFaults) -> None:
+        self._faults = faults
+        self._happened: set[VehicleFault] = set()
+
+    def due(self, kind: FaultKind, at: int) -> VehicleFault | None:
+        """A fault that happens whenever it is due."""
+        return self._faults.due(kind, at)
+
+    def once(self, kind: FaultKind, at: int) -> VehicleFault | None:
+        """A fault that happens the first time it is due."""
+        fault = self._faults.due(kind, at)
+        if fault is None or fault in self._happened:
+            return None
+        self._happened.add(fault)
+        return fault
+
+
 def read_vehicle_fault(text: str) -> VehicleFault:
     """A fault from KIND@N or KIND@N=AMOUNT, such as `beside@3=0.4`."""
     kind, _, rest = text.partition("@")
@@ -74,7 +96,10 @@ def read_vehicle_fault(text: str) -> VehicleFault:
 
 
 class RoughLine:
-    """A transport whose frames are lost, doubled and delayed by chance, in both directions."""
+    """A transport whose frames are lost, doubled and delayed by chance, in both directions.
+
+    Two threads use it: one reads, another writes.
+    """
 
     def __init__(self, transport: Transport, faults: VehicleFaults) -> None:
         self.datagrams, self.gone = transport.datagrams, transport.gone
@@ -82,17 +107,19 @@ class RoughLine:
         self._loss = _share(faults, "loss")
         self._twice = _share(faults, "duplicates")
         self._late_s = _share(faults, "jitter") / 10
-        self._chance = random.Random(sum(int(fault.amount) for fault in faults.all if fault.kind in LINE))
-        self._count = 0
+        seed = sum(int(fault.amount) for fault in faults.all if fault.kind in LINE)
+        self._coming, self._going = random.Random(2 * seed), random.Random(2 * seed + 1)
+        self._count = itertools.count()
         self._waiting: list[tuple[float, int, Address, bytes]] = []
         self._leaving: list[tuple[float, int, Address | None, bytes]] = []
+        self._lock = threading.Lock()
 
     def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
         """What has come and is due; what waits to leave is sent on the way."""
         pause = timeout_s if not self._late_s else min(timeout_s, 0.01)
         for address, data in self._transport.read(pause):
-            for due in self._times():
-                heapq.heappush(self._waiting, (due, self._next(), address, data))
+            for due in self._times(self._coming):
+                heapq.heappush(self._waiting, (due, next(self._count), address, data))
         self._send_due()
         self.gone = self._transport.gone
         came = []
@@ -102,28 +129,26 @@ class RoughLine:
         return came
 
     def write(self, data: bytes, to: Address | None = None) -> None:
-        for due in self._times():
-            heapq.heappush(self._leaving, (due, self._next(), to, data))
+        with self._lock:
+            for due in self._times(self._going):
+                heapq.heappush(self._leaving, (due, next(self._count), to, data))
         self._send_due()
 
     def close(self) -> None:
         self._transport.close()
 
     def _send_due(self) -> None:
-        while self._leaving and self._leaving[0][0] <= time.monotonic():
-            _, _, to, data = heapq.heappop(self._leaving)
-            self._transport.write(data, to)
+        with self._lock:
+            while self._leaving and self._leaving[0][0] <= time.monotonic():
+                _, _, to, data = heapq.heappop(self._leaving)
+                self._transport.write(data, to)
 
-    def _times(self) -> list[float]:
+    def _times(self, chance: random.Random) -> list[float]:
         """When each copy of a frame arrives; none if it is lost."""
-        if self._chance.random() < self._loss:
+        if chance.random() < self._loss:
             return []
-        copies = 2 if self._chance.random() < self._twice else 1
-        return [time.monotonic() + self._chance.uniform(0.0, self._late_s) for _ in range(copies)]
-
-    def _next(self) -> int:
-        self._count += 1
-        return self._count
+        copies = 2 if chance.random() < self._twice else 1
+        return [time.monotonic() + chance.uniform(0.0, self._late_s) for _ in range(copies)]
 
 
 LINE: frozenset[FaultKind] = frozenset({"loss", "duplicates", "jitter"})

@@ -25,6 +25,8 @@ REJECTED, UNSUPPORTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED, dialect.MAV_RES
 FAILED = dialect.MAV_RESULT_FAILED
 IGNORE_X_Y, IGNORE_YAW = 0b11, 1 << 10
 LOCAL_NED, LOCAL_OFFSET_NED = dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_FRAME_LOCAL_OFFSET_NED
+NORTHMOST = 89.0
+"""Degrees; at the poles there is no east."""
 CHANGE_MODE = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
 
 
@@ -36,6 +38,8 @@ class Order:
     params: tuple[float, float, float, float]
     x: int
     y: int
+    exact: bool
+    """Its place is good to a centimetre: it came in a COMMAND_INT."""
     again: bool
     """Sent again by a station that has heard no answer."""
 
@@ -61,12 +65,12 @@ def handlers(vehicle: Vehicle) -> dict[str, Callable[[Who, Message], None]]:
 def _long(message: Message) -> Order:
     params = (message.param1, message.param2, message.param3, message.param4)
     x, y = (_steps(value) for value in (message.param5, message.param6))
-    return Order(message.command, params, x, y, again=message.confirmation > 0)
+    return Order(message.command, params, x, y, exact=False, again=message.confirmation > 0)
 
 
 def _int(message: Message) -> Order:
     params = (message.param1, message.param2, message.param3, message.param4)
-    return Order(message.command, params, message.x, message.y, again=False)
+    return Order(message.command, params, message.x, message.y, exact=True, again=False)
 
 
 def _steps(degrees: float) -> int:
@@ -174,16 +178,24 @@ def _pause(vehicle: Vehicle, order: Order) -> int:
 
 
 def _reposition(vehicle: Vehicle, order: Order) -> int:
-    point = vehicle.rover.point(order.x, order.y)
-    if point is None or not vehicle.armed:
+    """param1 is a speed (-1: as it is), param2 1 allows the change of mode, param4 is radians from north."""
+    if not order.exact:
+        return int(dialect.MAV_RESULT_COMMAND_INT_ONLY)
+    point, mode = vehicle.rover.point(order.x, order.y), vehicle.profile.reposition_mode
+    allowed = vehicle.mode == mode or order.whole(1, 0) & CHANGE_MODE
+    if point is None or not vehicle.armed or not allowed:
         return int(DENIED)
-    if vehicle.mode != "guided":
-        if not order.whole(1, 0) & CHANGE_MODE:
-            return int(DENIED)
-        vehicle.set_mode("guided")
+    vehicle.set_mode(mode)
     vehicle.rover.set_speed(order.params[0])
-    vehicle.rover.drive(point, vehicle.now_ns)
+    vehicle.guide(point, _heading(vehicle, order.params[3]))
     return int(ACCEPTED)
+
+
+def _heading(vehicle: Vehicle, yaw: float) -> float | None:
+    """Counter-clockwise from east, of radians from north; None if it is none, or none that is kept."""
+    if not (vehicle.profile.autopilot.keeps_arrival and math.isfinite(yaw) and abs(yaw) < 100):
+        return None
+    return math.pi / 2 - yaw
 
 
 def _change_speed(vehicle: Vehicle, order: Order) -> int:
@@ -260,7 +272,7 @@ OBEYED: dict[int, Callable[[Vehicle, Order], int]] = {
 def _set_origin(vehicle: Vehicle, message: Message) -> None:
     """What is no place on the earth is ignored."""
     lat, lon = message.latitude / STEPS_PER_DEGREE, message.longitude / STEPS_PER_DEGREE
-    if abs(lat) < 90 and abs(lon) <= 180:
+    if abs(lat) <= NORTHMOST and abs(lon) <= 180:
         vehicle.set_origin(SiteOrigin(lat=lat, lon=lon, alt=message.altitude / 1000, heading_deg=0.0))
 
 
@@ -284,5 +296,4 @@ def _target_global(vehicle: Vehicle, message: Message) -> None:
 def _guide(vehicle: Vehicle, message: Message, point: tuple[float, float]) -> None:
     if vehicle.mode != "guided" or not vehicle.armed or message.type_mask & IGNORE_X_Y:
         return
-    turns = not message.type_mask & IGNORE_YAW and math.isfinite(message.yaw) and abs(message.yaw) < 100
-    vehicle.guide(point, math.pi / 2 - message.yaw if turns else None)
+    vehicle.guide(point, None if message.type_mask & IGNORE_YAW else _heading(vehicle, message.yaw))

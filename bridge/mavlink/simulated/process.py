@@ -11,6 +11,7 @@ from pathlib import Path
 
 from bridge.clock import WallClock
 from bridge.mavlink.simulated.faults import VehicleFaults, on_line, read_vehicle_fault
+from bridge.mavlink.simulated.orders import NORTHMOST
 from bridge.mavlink.simulated.profile import profile_named
 from bridge.mavlink.simulated.rover import to_east
 from bridge.mavlink.simulated.vehicle import Setting, Vehicle
@@ -52,6 +53,7 @@ def run_vehicle(options: VehicleOptions, ready: Callable[[Url], None]) -> None:
     with vehicle_on(url, setting_of(options), speed_up=options.speed_up, signing_key=key) as stopped:
         ready(url)
         stopped.wait()
+    raise SystemExit(1)  # its thread has told why
 
 
 @contextmanager
@@ -90,6 +92,7 @@ def _live(vehicle: Vehicle, wire: Wire, stop: threading.Event, stopped: threadin
                 else:
                     vehicle.receive(message)
     finally:
+        vehicle.rest()
         stopped.set()
 
 
@@ -122,7 +125,7 @@ def read_origin(text: str) -> SiteOrigin:
         lat, lon, alt, heading = (float(number) for number in (*numbers, "0")[:4])
     except ValueError:
         lat = float("nan")
-    if not (len(numbers) in (3, 4) and abs(lat) < 90 and abs(lon) <= 180 and abs(alt) < 1e5):
+    if not (len(numbers) in (3, 4) and abs(lat) <= NORTHMOST and abs(lon) <= 180 and abs(alt) < 1e5):
         raise InputError(
             f"--origin {text}: write LAT,LON,ALT or LAT,LON,ALT,HEADING in degrees and metres, as 47,8,400"
         )

@@ -14,7 +14,8 @@ LIMITS = RobotSpec(radius=0.35, speed=0.5, turn_rate=1.0, acceleration=0.5)
 FAR_M = 100_000.0
 """Beyond this from the origin it does not set out."""
 SLOWEST, FASTEST = 0.05, 5.0
-KEEP_NS = 1_000_000_000
+STEPS_PER_M = 90
+"""Steps of 1e-7 degrees of latitude in a metre, rounded up."""
 
 
 class Rover:
@@ -31,7 +32,6 @@ class Rover:
         self.speed = LIMITS.speed
         self._motion = Motion(at or store.kept.pose or Pose(x=0.0, y=0.0, heading=math.pi / 2))
         self._began_ns = 0
-        self._kept_ns = 0
 
     def at(self, now_ns: int) -> tuple[Pose, float]:
         """Pose and speed."""
@@ -59,10 +59,9 @@ class Rover:
         self._began_ns = now_ns
 
     def keep(self, now_ns: int) -> None:
-        """Write down where it stands, if it has moved and not too often."""
+        """Write down where it stands, if it has moved."""
         pose = self.at(now_ns)[0]
-        if now_ns >= self._kept_ns + KEEP_NS and pose != self._store.kept.pose:
-            self._kept_ns = now_ns
+        if pose != self._store.kept.pose:
             self._store.keep(pose=pose)
 
     def set_speed(self, speed: float) -> bool:
@@ -81,7 +80,7 @@ class Rover:
 
     def point(self, lat: int, lon: int) -> Point | None:
         """Metres east and north of the origin; None without one, or too far away."""
-        if self.origin is None:
+        if self.origin is None or abs(lat - self.origin.lat * STEPS_PER_DEGREE) > STEPS_PER_M * FAR_M:
             return None
         where = Geodetic(lat=lat / STEPS_PER_DEGREE, lon=lon / STEPS_PER_DEGREE)
         x, y = from_geodetic(self.origin, where, self._rule)

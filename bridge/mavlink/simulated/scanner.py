@@ -10,7 +10,7 @@ import hashlib
 import math
 from dataclasses import dataclass
 
-from bridge.mavlink.simulated.faults import VehicleFaults
+from bridge.mavlink.simulated.faults import Mishaps
 from mission.events import Pose
 
 DEFAULT_S = 3.0
@@ -49,8 +49,8 @@ class Captured:
 class Scanner:
     """One scan at a time."""
 
-    def __init__(self, faults: VehicleFaults) -> None:
-        self._faults = faults
+    def __init__(self, mishaps: Mishaps) -> None:
+        self._mishaps = mishaps
         self._begun = 0
         self.scan: Scan | None = None
 
@@ -69,7 +69,7 @@ class Scanner:
         assert scan is not None
         self.scan = None
         why = ""
-        if self._faults.due("scanner", self._begun):
+        if self._mishaps.due("scanner", self._begun):
             why = "the scanner reported an error"
         elif _moved(scan.began_at, pose):
             why = "the vehicle moved during the scan"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Maker = Callable[["Vehicle"], Message | None]
 """The message as it is now; None if there is nothing to tell."""
 
-LOWEST_INTERVAL_US = 10_000
+LOWEST_INTERVAL_US, HIGHEST_INTERVAL_US = 10_000, 2**31 - 1
 BATTERY_NS = 6 * 3600 * 10**9
 """A full battery lasts six hours."""
 CAPABILITIES = (
@@ -211,7 +211,7 @@ class Streams:
             self._every_us.pop(number, None)
             self._due_ns.pop(number, None)
         else:
-            self._every_us[number] = max(LOWEST_INTERVAL_US, wanted)
+            self._every_us[number] = min(max(LOWEST_INTERVAL_US, wanted), HIGHEST_INTERVAL_US)
             self._due_ns[number] = self._clock.now_ns()
         return True
 

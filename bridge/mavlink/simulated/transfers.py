@@ -7,10 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.clock import Clock
-from bridge.mavlink.simulated.faults import VehicleFaults
+from bridge.mavlink.simulated.faults import Mishaps
 from bridge.mavlink.simulated.profile import Profile
 from bridge.mavlink.simulated.store import ALL, FENCE, MISSION, RALLY, Items, Store
 from bridge.mavlink.simulated.validate import ACCEPTED, verdict
@@ -69,21 +70,21 @@ class Transfers:
         clock: Clock,
         *,
         say: Callable[[Message], None],
+        text: Callable[[str], None],
         home: Callable[[], Item],
         stored: Callable[[int, int | None], None],
         running: Callable[[], bool],
         event: Callable[[int], bool],
-        faults: VehicleFaults,
+        mishaps: Mishaps,
     ) -> None:
         self._profile, self._store, self._clock = profile, store, clock
-        self._say, self._home, self._stored, self._running = say, home, stored, running
-        self._event, self._faults = event, faults
+        self._say, self._text, self._home, self._stored = say, text, home, stored
+        self._running, self._event, self._mishaps = running, event, mishaps
         self._upload: Upload | None = None
         self._download: Download | None = None
         self._done: tuple[Who, int, int] | None = None
         """Station, kind and number of the last item that completed an upload."""
         self._completed = 0
-        self._refused: set[int] = set()
         self.handlers: dict[str, Callable[[Who, Message], None]] = {
             "MISSION_COUNT": self._count,
             "MISSION_ITEM_INT": self._item_int,
@@ -130,8 +131,8 @@ class Transfers:
             return self._ack(who, profile.stranger, kind)
         if up and up.items and not profile.begins_again:
             return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
-        if self._download and self._download.station != who:
-            return self._ack(who, profile.stranger, kind)
+        if self._download and profile.in_order:
+            return self._ack(who, dialect.MAV_MISSION_ERROR, kind)  # source: busy, until it is acknowledged
         if message.count > profile.autopilot.max_items:
             self._upload = None
             return self._ack(who, dialect.MAV_MISSION_NO_SPACE, kind)
@@ -144,7 +145,6 @@ class Transfers:
             return self._ack(who, ACCEPTED, kind)
         if not self._profile.atomic:
             self._store.put(kind, self._store.items(kind)[:count])
-            self._stored(kind, None)
         self._upload = Upload(who, kind, count, heard_ns=self._clock.now_ns())
         self._ask(self._upload)
 
@@ -160,7 +160,9 @@ class Transfers:
         up = self._upload
         if not self._event(message.seq):
             return
-        if up is None or up.station != who:
+        if up and up.station != who:
+            return self._busy(who, message.mission_type)
+        if up is None:
             return self._no_upload(who, message)
         if message.mission_type != up.kind:
             return self._ack(who, dialect.MAV_MISSION_ERROR, message.mission_type)
@@ -176,9 +178,8 @@ class Transfers:
 
     def _verdict(self, up: Upload, item: Item) -> int:
         number = len(up.items)
-        fault = self._faults.due("nack", number)
-        if fault and number not in self._refused:
-            self._refused.add(number)
+        fault = self._mishaps.once("nack", number)
+        if fault:
             return int(fault.amount) or int(dialect.MAV_MISSION_ERROR)
         if up.kind == MISSION and number == 0 and self._profile.autopilot.home_first:
             return int(ACCEPTED)
@@ -197,11 +198,13 @@ class Transfers:
         self._upload, self._done = None, (up.station, up.kind, number)
         self._replace(up.kind, tuple(up.items), up.marked)
         self._completed += 1
-        if not self._faults.due("lostack", self._completed):
+        if not self._mishaps.due("lostack", self._completed):
             self._ack(up.station, ACCEPTED, up.kind)
 
     def _stray(self, up: Upload) -> None:
-        """An item that was not asked for."""
+        """An item that was not asked for; the station is alive, though ArduPilot does not count it."""
+        if self._profile.strays != "tell":
+            up.heard_ns = self._clock.now_ns()
         if self._profile.strays == "tell":
             self._ack(up.station, dialect.MAV_MISSION_INVALID_SEQUENCE, up.kind)
         elif self._profile.strays == "ask":
@@ -216,10 +219,10 @@ class Transfers:
         if kind not in KINDS:
             return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
         if self._upload:
-            return self._ack(who, self._profile.stranger, kind)
+            return self._busy(who, kind)
         if self._profile.in_order:
             if self._download and (self._download.station, self._download.kind) != (who, kind):
-                return  # source: ignored, with a text
+                return self._busy(who, kind)
             self._download = Download(who, kind, heard_ns=self._clock.now_ns())
         self._say_count(who, kind)
 
@@ -228,7 +231,7 @@ class Transfers:
         if kind not in KINDS:
             return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
         if self._upload:
-            return self._ack(who, self._profile.stranger, kind)
+            return self._busy(who, kind)
         if self._profile.in_order and not self._in_order(who, kind, number):
             return
         items = self.items(kind)
@@ -256,9 +259,10 @@ class Transfers:
         kind = message.mission_type
         if kind not in (*KINDS, ALL):
             return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
-        if self._upload:
-            return self._ack(who, self._profile.stranger, kind)
-        if kind in (MISSION, ALL) and self._running() and not self._profile.clears_in_auto:
+        if (self._upload or self._download) and self._profile.in_order:
+            return self._busy(who, kind)
+        drives = kind in (MISSION, ALL) and self._running()
+        if self._upload or (drives and not self._profile.clears_in_auto):
             return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
         for one in KINDS if kind == ALL else (kind,):
             self._replace(one, (), None)
@@ -271,8 +275,13 @@ class Transfers:
         ends = message.type == dialect.MAV_MISSION_OPERATION_CANCELLED and self._profile.cancels
         if up and ends and (up.station, up.kind) == (who, message.mission_type):
             self._upload = None
-            if self._profile.name == "strict":  # "the vehicle ends the sequence": it says so
-                self._ack(who, dialect.MAV_MISSION_OPERATION_CANCELLED, up.kind)
+
+    def _busy(self, who: Who, kind: int) -> None:
+        """Somebody's upload is under way: PX4 says so to people only (source)."""
+        if self._profile.name == "px4":
+            self._text("Busy with a mission transfer")
+        else:
+            self._ack(who, self._profile.stranger, kind)
 
     def _partial(self, who: Who, message: Message) -> None:
         self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
@@ -280,8 +289,11 @@ class Transfers:
     # What is said
 
     def _replace(self, kind: int, items: Items, marked: int | None) -> None:
+        """The same list again changes nothing on PX4 (source: it compares a checksum)."""
+        same = _same(self._store.items(kind), items)
         self._store.put(kind, items)
-        self._stored(kind, marked)
+        if not (same and self._profile.name == "px4"):
+            self._stored(kind, marked)
 
     def _ask(self, up: Upload) -> None:
         up.asked_ns = self._clock.now_ns()
@@ -298,6 +310,11 @@ class Transfers:
     def _say_count(self, who: Who, kind: int) -> None:
         count = len(self.items(kind))
         self._say(dialect.MAVLink_mission_count_message(who.system, who.component, count, kind))
+
+
+def _same(one: Items, other: Items) -> bool:
+    """Bit by bit, for a NaN is not equal to itself."""
+    return msgspec.msgpack.encode(one) == msgspec.msgpack.encode(other)
 
 
 def _item_of(message: Message, x: int, y: int) -> Item:

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from bridge.clock import Clock
 from bridge.mavlink.simulated import orders, parameters, telemetry
 from bridge.mavlink.simulated.course import Course, Tells
-from bridge.mavlink.simulated.faults import NO_FAULTS, VehicleFaults
+from bridge.mavlink.simulated.faults import NO_FAULTS, Mishaps, VehicleFaults
 from bridge.mavlink.simulated.parameters import Parameters
 from bridge.mavlink.simulated.profile import ModeName, Profile
 from bridge.mavlink.simulated.rover import Rover
@@ -25,7 +25,7 @@ from mission.events import Pose
 from mission.mavlink.autopilots import home_item
 from mission.mavlink.items import Command, Frame, Item
 
-BOOT_NS = 1_000_000_000
+BOOT_NS = KEEP_NS = 1_000_000_000
 FOREVER_NS = 2**63
 NOWHERE = Item(Command.NAV_WAYPOINT, Frame.GLOBAL)
 
@@ -61,10 +61,9 @@ class Vehicle:
     ) -> None:
         self.profile = setting.profile
         self._setting, self._clock, self._wall, self._say_out = setting, clock, wall, say
-        self._faults = setting.faults
+        self._mishaps = Mishaps(setting.faults)
         self._booted_ns = clock.now_ns()
-        self._quiet_until_ns = 0
-        self._upload_reboots = True
+        self._quiet_until_ns = self._kept_ns = 0
         self._guided: tuple[Point, float | None] | None = None
         self.now_ns = self._booted_ns
         """The time of what is happening."""
@@ -79,20 +78,21 @@ class Vehicle:
         self.store = Store(setting.state)
         rule = self.profile.autopilot.rule
         self.rover = Rover(self.store, rule=rule, origin=setting.origin, at=setting.at)
-        self.scanner = Scanner(self._faults)
+        self.scanner = Scanner(self._mishaps)
         tells = Tells(
             current=self._went_on,
             reached=self._reach, trigger=self._triggered, finished=self._finish, reboot=self.reboot,
             text=self.text,
         )  # fmt: skip
-        self.course = Course(self.profile, self.store, self.rover, self.scanner, self._faults, tells)
+        self.course = Course(self.profile, self.store, self.rover, self.scanner, self._mishaps, tells)
         self.streams = telemetry.Streams(wall)
         self.parameters = Parameters(
             self.profile.name, speed=self.rover.speed, set_speed=self.rover.set_speed
         )
         self.transfers = Transfers(
-            self.profile, self.store, wall, say=self.say, home=self._home, stored=self._stored,
-            running=lambda: self.course.state == "active", event=self._item_came, faults=self._faults,
+            self.profile, self.store, wall, say=self.say, text=self.text, home=self._home,
+            stored=self._stored, running=lambda: self.course.state == "active", event=self._item_came,
+            mishaps=self._mishaps,
         )  # fmt: skip
         self._handlers = {
             **self.transfers.handlers,
@@ -119,12 +119,16 @@ class Vehicle:
             else:
                 self.course.step()
         self.now_ns = max(self.now_ns, until_ns)
-        self.rover.keep(self.now_ns)
+        self._keep()
         if self._quiet():
             return
         self.transfers.tick()
         for number in self.streams.due():
             self.tell(number)
+
+    def rest(self) -> None:
+        """Write down where it stands, before it is switched off."""
+        self.rover.keep(self.now_ns)
 
     # What it tells
 
@@ -184,7 +188,7 @@ class Vehicle:
 
     def disarm(self) -> None:
         """Stand still; the mission begins anew next time."""
-        self.armed = False
+        self.armed, self._guided = False, None
         self.course.stand(self.now_ns)
         self.rover.brake(self.now_ns)
         self.course.reset()
@@ -242,6 +246,13 @@ class Vehicle:
             return course_ns if scan is None else scan.ends_ns
         return min(scan.ends_ns, course_ns)
 
+    def _keep(self) -> None:
+        """Write down where it stands, by the wall's clock, for the disk's sake."""
+        wall_ns = self._wall.now_ns()
+        if wall_ns >= self._kept_ns + KEEP_NS:
+            self._kept_ns = wall_ns
+            self.rover.keep(self.now_ns)
+
     def _quiet(self) -> bool:
         return self._wall.now_ns() < self._quiet_until_ns
 
@@ -292,11 +303,10 @@ class Vehicle:
 
     def _item_came(self, number: int) -> bool:
         """Whether an upload's item gets through what the faults have in store for it."""
-        silent = self._faults.due("silent", number)
+        silent = self._mishaps.once("silent", number)
         if silent:
             lasts_ns = round(silent.amount * 1e9) or FOREVER_NS
             self._quiet_until_ns = self._wall.now_ns() + lasts_ns
-        if self._faults.due("reboot-upload", number) and self._upload_reboots:
-            self._upload_reboots = False
+        if self._mishaps.once("reboot-upload", number):
             self.reboot()
         return not self._quiet()
