@@ -285,7 +285,7 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
         raise InputError(
             f"--floor {path}: layers are drawn over a .dxf only; leave --floor out to have them alone"
         )
-    for problem in _floor_problems(mission, path):
+    for problem in _other_floor(mission, path):
         raise InputError(f"--floor {path}: is not the floor of this mission: its digest {problem.message}")
     data = path.read_bytes()
     drawing, _ = open_drawing(data, source=path)
@@ -369,7 +369,9 @@ def import_command(
     _say_import(read(out), out, (*track.notes, UNASKED), as_json)
 
 
-UNASKED = "legs are straight between the file's places; no floor was asked whether they are free"
+UNASKED = (
+    "legs are straight between the file's places; stopgo check --floor FLOOR.dxf says whether they are free"
+)
 
 
 def _say_import(mission: Mission, out: Path, notes: tuple[str, ...], as_json: bool) -> None:
