@@ -45,7 +45,7 @@ from bridge.protocol import (
     decode,
     encode,
 )
-from mission.document import Mission
+from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from mission.events import AnyEvent, StateReport
 from mission.files.mission_json import parse
@@ -198,6 +198,8 @@ class Station:
             If the robot stopped answering; pushing again goes on where this ended.
         """
         self._may_order("push")
+        # A file may have 0 for 0.0, and the digest of that; the robot reads numbers, and so is told theirs.
+        mission = sealed(mission)
         document = msgspec.json.encode(mission)
         manifest = Manifest(
             mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),

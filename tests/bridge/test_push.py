@@ -9,8 +9,9 @@ import pytest
 
 from bridge.link import Request
 from bridge.protocol import CHUNK_BYTES, Accepted, Malformed, Manifest, Ready, Rejected, encode
-from mission.document import Mission, sealed
+from mission.document import Mission, canonical, sealed
 from mission.errors import AnswerIsNo, OutcomeUnknown
+from mission.files.mission_json import parse
 from tests.bridge.world import Field, corridor
 
 
@@ -31,6 +32,16 @@ def test_a_pushed_mission_is_read_back_the_same() -> None:
     assert not station.push(mission).already
     assert station.status().state == "READY"
     assert station.mission(mission.id, 1) == mission
+
+
+def test_a_file_in_which_another_program_wrote_0_for_0_is_taken() -> None:
+    document = msgspec.to_builtins(corridor(stops=1))
+    document["start"]["x"] = 0
+    del document["digest"]
+    document["digest"] = hashlib.sha256(canonical(document)).hexdigest()
+    mission = parse(canonical(document), "mission.json")
+    assert mission.digest == document["digest"] != corridor(stops=1).digest
+    assert Field().station().push(mission).digest == corridor(stops=1).digest
 
 
 def test_a_mission_of_many_chunks_arrives_whole() -> None:
