@@ -85,10 +85,11 @@ def _placed(mission: Mission, numbers: Sequence[int], manner: Manner) -> Iterato
     yield Placed(speed_change(mission.robot.speed), "speed")
     for stop, number in zip(mission.stops, numbers, strict=True):
         for point in corners(stop.approach, within=manner.max_lateral_m)[1:-1]:
-            yield Placed(corner_waypoint(point, manner), "corner", stop.id)
+            yield Placed(corner_waypoint(point, stop.tolerance_m, manner), "corner", stop.id)
         yield from _visited(stop, number, manner)
+    tolerance_m = mission.stops[-1].tolerance_m
     for point in corners(mission.return_ or (), within=manner.max_lateral_m)[1:]:
-        yield Placed(corner_waypoint(point, manner), "return")
+        yield Placed(corner_waypoint(point, tolerance_m, manner), "return")
 
 
 def _visited(stop: Stop, number: int, manner: Manner) -> Iterator[Placed]:

@@ -26,10 +26,16 @@ def stop_waypoint(stop: Stop, manner: Manner) -> Item:
     return _waypoint((stop.x, stop.y), manner, hold=held, radius=stop.tolerance_m, yaw=bearing)
 
 
-def corner_waypoint(point: Point, manner: Manner) -> Item:
-    """A place to drive through; where a vehicle stops only if told to, it is told to, or it would cut it."""
-    yaw = NAN if manner.vehicle.keeps_arrival else 0.0
-    return _waypoint(point, manner, hold=manner.vehicle.brake_hold_s, yaw=yaw)
+def corner_waypoint(point: Point, tolerance_m: float, manner: Manner) -> Item:
+    """A place to drive through, told so that the vehicle does not cut it.
+
+    ArduPilot is told to stop there. PX4 is told a radius: without one it goes on to the next waypoint within
+    NAV_ACC_RAD of this one, 10 m unless set (source).
+    """
+    hold = manner.vehicle.brake_hold_s
+    if not manner.vehicle.keeps_arrival:
+        return _waypoint(point, manner, hold=hold)
+    return _waypoint(point, manner, hold=hold, radius=tolerance_m, yaw=NAN)
 
 
 def delay(seconds: float) -> Item:

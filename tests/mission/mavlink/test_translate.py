@@ -149,6 +149,15 @@ def test_px4_gets_the_tolerance_and_the_bearing():
     assert north.params == (0.0, 0.05, 0.0, 0.0)
 
 
+@pytest.mark.parametrize("name", ["px4", "generic"])
+def test_a_corner_has_a_radius_for_who_would_take_ten_metres(name):
+    placed = translate(corner_tour(), name).placed
+    corners = [one.item for one in placed if one.role in ("corner", "return")]
+    assert len(corners) == 3
+    for item in corners:
+        assert item.params == (0.0, 0.05, 0.0, pytest.approx(math.nan, nan_ok=True))
+
+
 def test_the_stops_number_goes_with_the_trigger():
     mission = mission_of(
         stop("S7", (0.0, 0.0), (1.0, 0.0)), stop("S12", (1.0, 0.0), (2.0, 0.0)), begin=(0.0, 0.0)
