@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
-from itertools import islice
 from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
@@ -22,22 +21,18 @@ from bridge.inbox import Inbox
 from bridge.journal import Journal
 from bridge.keys import Untrusted, verified_holder
 from bridge.link import Link, Request
+from bridge.pages import events_page, poses_page
 from bridge.protocol import (
     CHUNK_BYTES,
-    LOG_PAGE,
     MAX_DOCUMENT_BYTES,
-    POSE_PAGE,
     VERSION,
     Command,
     Commit,
     Info,
     Keys,
-    LogPage,
     Malformed,
     Message,
-    PosePage,
     Rejected,
-    count_of,
     decode,
     encode,
 )
@@ -227,24 +222,12 @@ class Agent:
 
     def _log(self, request: Request) -> bytes:
         self._contact()
-        try:
-            since = count_of(request.parameters.get("since", "0"))
-        except ValueError as error:
-            return encode(Malformed(message=f"since: {error}"))
-        run_id = request.parameters.get("run")
-        events = self._journal.events(since=since, run_id=run_id, limit=LOG_PAGE)
-        return encode(LogPage(events=events, newest=self._journal.newest))
+        return encode(events_page(self._journal, request))
 
     def _past_poses(self, request: Request) -> bytes:
         self._contact()
-        try:
-            since = count_of(request.parameters.get("since", "0"))
-        except ValueError as error:
-            return encode(Malformed(message=f"since: {error}"))
-        run_id = request.parameters.get("run")
         # A copy: meanwhile the robot goes on writing.
-        later = (pose for pose in self._poses.copy() if pose.seq > since and run_id in (None, pose.run_id))
-        return encode(PosePage(boot_id=self._controller.boot_id, poses=tuple(islice(later, POSE_PAGE))))
+        return encode(poses_page(self._poses.copy(), self._controller.boot_id, request))
 
     def _tell_news(self) -> None:
         """State on every change and every second; each event once, in order."""

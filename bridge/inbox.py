@@ -12,8 +12,8 @@ import msgspec
 from bridge.controller import Controller
 from bridge.journal import Journal
 from bridge.link import Request
+from bridge.pages import address_of, mission_part
 from bridge.protocol import (
-    CHUNK_BYTES,
     MAX_CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
     Accepted,
@@ -22,7 +22,6 @@ from bridge.protocol import (
     Malformed,
     Manifest,
     Message,
-    MissionPart,
     Ready,
     Reason,
     Rejected,
@@ -45,7 +44,7 @@ class Inbox:
 
     def receive(self, request: Request) -> Message:
         """Answer one question on `…/mission/<id>/<step>`."""
-        mission_id, step = _address(request.key)
+        mission_id, step = address_of(request.key)
         try:
             return self._step(mission_id, step, request)
         except (msgspec.DecodeError, ValueError) as error:
@@ -63,7 +62,7 @@ class Inbox:
                 return self._commit(mission_id, decode(request.payload, Commit))
             case ["part", number]:
                 revision = count_of(request.parameters.get("revision", ""))
-                return self._part(mission_id, count_of(number), revision)
+                return mission_part(self._journal, mission_id, count_of(number), revision)
         return Malformed(message=f"no such step: {'/'.join(step)}")
 
     def _begin(self, mission_id: str, manifest: Manifest) -> Message:
@@ -164,14 +163,6 @@ class Inbox:
         wrong = tuple(what_is_wrong(mission, self._profiles))
         return Rejected(reason="infeasible", messages=wrong) if wrong else mission
 
-    def _part(self, mission_id: str, number: int, revision: int) -> Message:
-        stored = self._journal.mission(mission_id, revision)
-        if stored is None:
-            return _no("no_mission", f"mission {mission_id} revision {revision} is not on this robot")
-        manifest, document = stored
-        data = document[number * CHUNK_BYTES : (number + 1) * CHUNK_BYTES]
-        return MissionPart(manifest=manifest, index=number, data=data)
-
 
 def what_is_wrong(mission: Mission, profiles: tuple[str, ...] | None) -> Iterator[str]:
     """Why this robot cannot run the mission; nothing if it can."""
@@ -202,13 +193,6 @@ def what_is_wrong(mission: Mission, profiles: tuple[str, ...] | None) -> Iterato
     robot = mission.robot
     if min(robot.speed, robot.turn_rate, robot.acceleration) <= 0:
         yield "speed, turn rate and acceleration must be greater than 0"
-
-
-def _address(key: str) -> tuple[str, list[str]]:
-    """Mission id and step of `…/mission/<id>/<step…>`."""
-    parts = key.split("/")
-    at = len(parts) - 1 - parts[::-1].index("mission")
-    return parts[at + 1], parts[at + 2 :]
 
 
 def _no(reason: Reason, message: str) -> Rejected:
