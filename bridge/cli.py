@@ -16,6 +16,7 @@ import typer
 from mission.errors import InputError
 
 if TYPE_CHECKING:
+    from bridge.mavlink.scanner import Trigger
     from bridge.protocol import Answer, Verb
     from bridge.revision import RevisionPolicy
     from bridge.station import Station
@@ -115,37 +116,62 @@ def robot(
         typer.Option(metavar="LAT,LON,ALT[,HEADING]", help="The vehicle's global origin from the start."),
     ] = None,
     signing_key: Annotated[
-        Path | None, typer.Option("--signing-key", metavar="FILE", help="Sign what the vehicle says with it.")
+        Path | None, typer.Option("--signing-key", metavar="FILE", help="Sign what is said over MAVLink.")
+    ] = None,
+    controller: Annotated[
+        str, typer.Option(metavar="sim|mavlink:URL", help="What carries the scanner: an autopilot at URL.")
+    ] = "sim",
+    arm: Annotated[bool, typer.Option("--arm", help="Arm the autopilot when a run needs it.")] = False,
+    trigger: Annotated[
+        str, typer.Option(metavar="camera|script", help="What makes the autopilot's scanner scan.")
+    ] = "camera",
+    vehicle: Annotated[
+        int | None, typer.Option(metavar="ID", help="The autopilot's system id, if several are heard.")
     ] = None,
 ) -> None:
-    """Be a robot, with a simulated base and scanner, until SIGTERM.
+    """Be a robot, with a simulated base and scanner or those of an autopilot, until SIGTERM.
 
     Example: stopgo robot --name r1 --listen tcp/127.0.0.1:7447 --state r1.state --speed-up 20
 
+    Example: stopgo robot --name r1 --state r1.state --controller mavlink:serial:/dev/ttyAMA0:921600
+
     Example: stopgo robot --mavlink-vehicle udpin:127.0.0.1:14550 --profile ardupilot --origin 47.4,8.5,400
     """
+    from bridge.bodies import AutopilotBody, Incarnate, SimulatedBody, autopilot_url
     from bridge.robot import RobotOptions, run_robot
     from bridge.simulator import Faults, read_fault
 
+    driven = {"--arm": arm, "--trigger": trigger != "camera", "--vehicle": vehicle}
     if mavlink_vehicle is not None:
         alone("--mavlink-vehicle", {
             "--listen": listen != DEFAULT_ENDPOINT, "--connect": connect, "--site": site, "--map": map_,
             "--keys": keys, "--revision": revision != "next-stop", "--endurance": endurance != 6.0,
+            "--controller": controller != "sim", **driven,
         })  # fmt: skip
         return be_vehicle(
             name, url=mavlink_vehicle, profile=profile or "strict", state=state, speed_up=speed_up,
             signing_key=signing_key, insecure=insecure, origin=origin,
             at=None if at is None else read_pose("--at", at), faults=tuple(fault or ()),
         )  # fmt: skip
-    alone("a robot on zenoh", {"--profile": profile, "--origin": origin, "--signing-key": signing_key})
+    alone("a robot on zenoh", {"--profile": profile, "--origin": origin})
     if name is None or state is None:
         raise InputError("robot: give it a --name and a folder for its --state")
+    faults, to_map = Faults(tuple(read_fault(text) for text in fault or ())), read_map(map_)
+    url = autopilot_url(controller)
+    if url is None:
+        alone("a simulated robot", {"--signing-key": signing_key, **driven})
+        body: Incarnate = SimulatedBody(
+            state, None if at is None else read_pose("--at", at), to_map, 3600 * endurance, faults
+        )
+    else:
+        alone("an autopilot", {
+            "--at": at, "--map": map_, "--fault": fault, "--speed-up": speed_up != 1.0,
+            "--endurance": endurance != 6.0,
+        })  # fmt: skip
+        body = AutopilotBody(url, arm, read_trigger(trigger), signing_key, vehicle, insecure)
     options = RobotOptions(
-        name=name, listen=listen, connect=connect, state=state, site=site, speed_up=speed_up,
-        at=None if at is None else read_pose("--at", at),
-        to_map=None if map_ is None else read_transform("--map", map_),
-        insecure=insecure, revisions=read_revisions(revision), endurance_s=3600 * endurance,
-        keys=keys, faults=Faults(tuple(read_fault(text) for text in fault or ())),
+        name=name, listen=listen, connect=connect, state=state, body=body, site=site, speed_up=speed_up,
+        to_map=to_map, insecure=insecure, revisions=read_revisions(revision), keys=keys, faults=faults,
     )  # fmt: skip
     where = f"listens on {listen}" if connect is None else f"connects to {connect}"
     run_robot(options, ready=lambda: say(f"ready {name} {where}"))
@@ -173,6 +199,16 @@ def read_revisions(text: str) -> RevisionPolicy:
     if text not in POLICIES:
         raise InputError(f"--revision {text}: one of {', '.join(POLICIES)}")
     return POLICIES[text]
+
+
+def read_trigger(text: str) -> Trigger:
+    """What makes an autopilot's scanner scan."""
+    from bridge.mavlink.scanner import TRIGGERS
+
+    known = next((trigger for trigger in TRIGGERS if trigger == text), None)
+    if known is None:
+        raise InputError(f"--trigger {text}: one of {', '.join(TRIGGERS)}")
+    return known
 
 
 def push(
@@ -506,6 +542,11 @@ def state_line(report: StateReport) -> str:
         f"{report.robot}: {report.state}{stop}; {mission}; {len(report.done)} done{skipped};"
         f" battery {report.battery:.0%}"
     )
+
+
+def read_map(text: str | None) -> Transform | None:
+    """Site to map, if it was told."""
+    return None if text is None else read_transform("--map", text)
 
 
 def read_transform(option: str, text: str) -> Transform:

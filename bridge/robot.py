@@ -1,4 +1,4 @@
-"""The robot's process: journal, simulated robot, controller and agent put together on one link."""
+"""The robot's process: journal, body, controller and agent put together on one link."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from pathlib import Path
 from bridge import keys as key_files
 from bridge.access import access_control
 from bridge.agent import Agent, on_link, trusting
+from bridge.bodies import Incarnate
 from bridge.clock import Clock, WallClock
 from bridge.controller import Controller
-from bridge.frames import OnMap, turned
 from bridge.journal import Journal, open_journal
 from bridge.link import Link
 from bridge.protocol import Keys
 from bridge.revision import RevisionPolicy
-from bridge.simulator import ENDURANCE_S, NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
-from mission.document import Mission, Start, Transform
+from bridge.simulator import NO_FAULTS, Faults
+from mission.document import Transform
 from mission.errors import InputError
-from mission.events import Pose
 
 
 @dataclass(frozen=True)
@@ -33,12 +32,12 @@ class RobotOptions:
     name: str
     listen: str
     state: Path
+    body: Incarnate
+    """What it drives."""
     connect: str | None = None
     """A zenoh router to connect to, instead of listening."""
     site: str | None = None
     speed_up: float = 1.0
-    at: Pose | None = None
-    """Where the simulated robot stands on its map; else where it last stood, or its first mission's start."""
     to_map: Transform | None = None
     """Site to map, if the robot knows it; else as each mission says."""
     insecure: bool = False
@@ -47,9 +46,7 @@ class RobotOptions:
     revisions: RevisionPolicy = "next-stop"
     """What becomes of a new revision that is pushed during a run."""
     faults: Faults = NO_FAULTS
-    """What the simulated robot is to get wrong."""
-    endurance_s: float = ENDURANCE_S
-    """How long the simulated robot's battery lasts; 0 if it does not run down."""
+    """When its program is to crash; what else goes wrong is its body's."""
 
 
 def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
@@ -70,39 +67,23 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
 def robot_on(
     link: Link, keys: Keys, options: RobotOptions, held: key_files.Keys | None = None
 ) -> Iterator[Agent]:
-    """A simulated robot on `link`; with keys of its own it obeys only what stations have signed."""
+    """A robot on `link`; with keys of its own it obeys only what stations have signed."""
     with open_journal(options.state, options.name) as journal:
         clock, wall = clocks(journal, speed_up=options.speed_up)
-        wear = Wear(battery_per_s=1.0 / options.endurance_s if options.endurance_s else 0.0)
-        simulated = SimulatedBase(
-            clock=clock, keep=options.state / "world.json", faults=options.faults, wear=wear
-        )
-        base = OnMap(simulated, options.to_map)
-        scanner = SimulatedScanner(clock=clock, record=options.state / "scans.log", faults=options.faults)
         journal.edge = crashing(options.faults)
-        if options.at is not None:
-            simulated.stand_at(options.at)
-
-        def mission_taken(mission: Mission) -> None:
-            base.take(mission)
-            simulated.stand_at_start(turned(pose_of(mission.start), base.to_map))
-
-        controller = Controller(
-            robot=options.name, journal=journal, base=base, scanner=scanner, clock=clock, command_clock=wall,
-            mission_taken=mission_taken, revisions=options.revisions,
-        )  # fmt: skip
-        agent = Agent(
-            keys=keys, link=link, journal=journal, controller=controller, base=base, scanner=scanner,
-            clock=clock, command_clock=wall, speed_up=options.speed_up,
-            to_map=options.to_map,
-            trust=None if held is None else trusting(held.authority, key_files.now_utc),
-        )  # fmt: skip
-        with on_link(agent):
-            yield agent
-
-
-def pose_of(start: Start) -> Pose:
-    return Pose(x=start.x, y=start.y, heading=start.heading)
+        with options.body(clock) as body:
+            controller = Controller(
+                robot=options.name, journal=journal, base=body.base, scanner=body.scanner, clock=clock,
+                command_clock=wall, mission_taken=body.take, revisions=options.revisions,
+            )  # fmt: skip
+            agent = Agent(
+                keys=keys, link=link, journal=journal, controller=controller, base=body.base,
+                scanner=body.scanner, clock=clock, command_clock=wall, speed_up=options.speed_up,
+                to_map=options.to_map,
+                trust=None if held is None else trusting(held.authority, key_files.now_utc),
+            )  # fmt: skip
+            with on_link(agent):
+                yield agent
 
 
 def clocks(journal: Journal, *, speed_up: float, now_ns: int | None = None) -> tuple[Clock, Clock]:

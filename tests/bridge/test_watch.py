@@ -10,13 +10,13 @@ import pytest
 
 from bridge import agent as agents
 from bridge.agent import Agent
+from bridge.bodies import pose_of
 from bridge.clock import WallClock
 from bridge.controller import Controller
 from bridge.follow import Report, Silence
 from bridge.journal import memory_journal
 from bridge.link import Switchboard
 from bridge.protocol import Keys
-from bridge.robot import pose_of
 from bridge.simulator import SimulatedBase, SimulatedScanner
 from bridge.station import Station
 from bridge.watch import Lines, Table, clock, remaining_s, table_lines

@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from bridge.agent import Agent
+from bridge.bodies import pose_of
 from bridge.clock import SimulatedClock
 from bridge.controller import Controller
 from bridge.inbox import Inbox
@@ -18,7 +19,6 @@ from bridge.journal import Journal, memory_journal
 from bridge.link import MemoryLink, Switchboard
 from bridge.protocol import Answer, Command, Commit, Keys, Manifest, Verb
 from bridge.revision import RevisionPolicy
-from bridge.robot import pose_of
 from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
 from bridge.station import Station
 from mission.document import (

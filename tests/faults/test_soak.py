@@ -14,9 +14,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from bridge.bodies import pose_of
 from bridge.clock import SimulatedClock
 from bridge.journal import Journal, open_journal
-from bridge.robot import clocks, pose_of
+from bridge.robot import clocks
 from bridge.simulator import Fault, Faults
 from mission.events import Aborted, Finished, Scanned, Skipped, Started
 from tests.bridge.world import Field, corridor

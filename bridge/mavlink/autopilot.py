@@ -1,0 +1,299 @@
+"""An autopilot as seen from the computer on its robot: what it tells, and the few words that drive it.
+
+A thread keeps it telling, and keeps ordering a stop until a heartbeat shows that it was obeyed: a stop waits
+behind no other command, and outlives a line that is cut.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from bridge.mavlink.driving import Driving, Mode, driving_of
+from bridge.mavlink.peer import Origin, Peer, found
+from bridge.mavlink.url import Url
+from bridge.mavlink.wire import Box, Message, Who, dialect, wire
+from mission.document import Point
+from mission.errors import OutcomeUnknown, RobotUnreachable
+from mission.geodesy import STEPS_PER_DEGREE
+
+ON_BOARD = Who(253, dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
+"""Ourselves: neither QGroundControl (255) nor a station of ours (254)."""
+KEEP_S = 0.1
+LOST_S = 3.0
+"""Silence of the autopilot after which nobody knows what it does."""
+STALE_S = 1.5
+"""Age of a pose by which nothing can be driven any more."""
+ORDER_S = 3.0
+"""How long one order waits for its answer."""
+STOP_S = 2.5
+"""How long `stop` waits to see itself obeyed; it goes on being ordered after that."""
+STILL_M_S = 0.03
+STILL_RAD_S = 0.03
+ASK_ORIGIN_S = 4.0
+ORIGIN_S = 15.0
+"""An origin that was not confirmed for so long is gone: the vehicle was started again and has none."""
+POSE_HZ = 20
+POSE = ("LOCAL_POSITION_NED", "ATTITUDE")
+STREAMS = {
+    "LOCAL_POSITION_NED": (dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED, POSE_HZ),
+    "ATTITUDE": (dialect.MAVLINK_MSG_ID_ATTITUDE, POSE_HZ),
+    "BATTERY_STATUS": (dialect.MAVLINK_MSG_ID_BATTERY_STATUS, 1),
+    "SYS_STATUS": (dialect.MAVLINK_MSG_ID_SYS_STATUS, 1),
+}
+"""What we want to be told, by name: number of the message, times a second."""
+POSITION_ONLY = 0x0DF8
+"""Type mask of a setpoint that is a place: speeds, accelerations and yaw are ignored."""
+YAW_ONLY = 0x09FF
+
+
+class Heard(Box):
+    """The newest message of each type from the vehicle, and when it came."""
+
+    def __init__(self, of: Who) -> None:
+        super().__init__(of=of)
+        self._newest: dict[str, tuple[float, Message]] = {}
+
+    def put(self, message: Message) -> None:
+        self._newest[message.get_type()] = (time.monotonic(), message)
+
+    def newest(self, name: str, within_s: float = math.inf) -> Message | None:
+        """The newest of a type, unless it is older than that."""
+        return self.since(name, time.monotonic() - within_s)
+
+    def since(self, name: str, at_s: float) -> Message | None:
+        """The newest of a type, if it came after a moment of the monotonic clock."""
+        at, message = self._newest.get(name, (-math.inf, None))
+        return message if at >= at_s else None
+
+
+@contextmanager
+def on_board(
+    url: Url, *, signing_key: bytes | None = None, vehicle: int | None = None, timeout_s: float = 30.0
+) -> Iterator[Autopilot]:
+    """The autopilot at `url`, once it tells where it is.
+
+    Raises
+    ------
+    RobotUnreachable
+        If no vehicle is heard, or it does not tell its position.
+    InputError
+        If several are heard and none was named, or it is of a kind that cannot be driven.
+    """
+    with (
+        wire(url, me=ON_BOARD, signing_key=signing_key) as opened,
+        found(opened, vehicle, timeout_s=timeout_s, beat=on_board_beat) as peer,
+        opened.filling(Heard(peer.who)) as heard,
+    ):
+        autopilot = Autopilot(peer, heard, driving_of(peer.autopilot, peer.heartbeat.type))
+        try:
+            autopilot.await_pose(timeout_s)
+            yield autopilot
+        finally:
+            autopilot.close()
+
+
+def on_board_beat() -> Message:
+    """The heartbeat of a computer on the robot."""
+    return dialect.MAVLink_heartbeat_message(
+        dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
+    )
+
+
+class Autopilot:
+    """A vehicle that was found. Places are metres north and east of its origin, yaws clockwise from north."""
+
+    def __init__(self, peer: Peer, heard: Heard, driving: Driving) -> None:
+        self.peer = peer
+        self.driving = driving
+        self.left: Mode | None = None
+        """The mode in which we know it: any other was chosen by somebody else."""
+        self._heard = heard
+        self._stop_owed = threading.Event()
+        self._stop_asked_s = 0.0
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._keep, name="autopilot", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread; the vehicle stays as it is."""
+        self._closing.set()
+        self._thread.join()
+
+    def await_pose(self, timeout_s: float) -> None:
+        """Wait until the vehicle has told where it is.
+
+        Raises
+        ------
+        RobotUnreachable
+            If it does not.
+        """
+        until = time.monotonic() + timeout_s
+        while any(self._heard.newest(name) is None for name in POSE):
+            if time.monotonic() > until:
+                raise RobotUnreachable(
+                    f"{self.peer} tells no position ({', '.join(POSE)}) within {timeout_s:g} s:"
+                    " has it an origin, and GNSS or external navigation?"
+                )
+            self._closing.wait(KEEP_S)
+
+    # What it tells
+
+    def place(self) -> Point:
+        told = self._told("LOCAL_POSITION_NED")
+        return (told.x, told.y)
+
+    def yaw(self) -> float:
+        return float(self._told("ATTITUDE").yaw)
+
+    def speed(self) -> float:
+        """Metres per second; 0 when it is not known any more."""
+        told = self._heard.newest("LOCAL_POSITION_NED", STALE_S)
+        return 0.0 if told is None else math.hypot(told.vx, told.vy)
+
+    def still(self) -> bool:
+        return self.speed() < STILL_M_S and abs(self._told("ATTITUDE").yawspeed) < STILL_RAD_S
+
+    def battery(self) -> float | None:
+        """0 to 1, as it last told, however old; `None` if it never did."""
+        for name in ("BATTERY_STATUS", "SYS_STATUS"):
+            told = self._heard.newest(name)
+            if told is not None and 0 <= told.battery_remaining <= 100:
+                return float(told.battery_remaining) / 100
+        return None
+
+    def origin(self) -> Origin | None:
+        """What its metres count from; `None` if it has none, or not yet again since it was started."""
+        told = self._heard.newest("GPS_GLOBAL_ORIGIN", ORIGIN_S)
+        if told is None:
+            return None
+        steps = STEPS_PER_DEGREE
+        return Origin(lat=told.latitude / steps, lon=told.longitude / steps, alt=told.altitude / 1000)
+
+    def mode(self) -> Mode:
+        return self.driving.mode_of(self.peer.heartbeat.custom_mode)
+
+    def out_of_reach(self) -> str:
+        """Why nobody knows where it is or what it does; empty if all is well."""
+        if self.peer.silent_s > LOST_S:
+            gone = f" ({self.peer.wire.gone})" if self.peer.wire.gone else ""
+            return f"the autopilot has not been heard for {self.peer.silent_s:.0f} s{gone}"
+        lost = [name for name in POSE if self._heard.newest(name, STALE_S) is None]
+        return f"the autopilot tells no {lost[0]}: has it lost its position?" if lost else ""
+
+    def in_other_hands(self) -> str:
+        """Who has it, if it is in a mode that is neither ours nor to hold; empty if it is not."""
+        mode = self.mode()
+        if mode in (self.driving.guided, self.driving.hold):
+            return ""
+        name = self.driving.name_of(mode)
+        return f"the autopilot is in {name}: somebody else drives it; to hand it over, switch it to HOLD"
+
+    def changed_hands(self) -> str:
+        """What somebody else has switched it to since we left or drove it; empty if nobody did."""
+        mode = self.mode()
+        if self.left in (None, mode):
+            return ""
+        return f"somebody switched the autopilot to {self.driving.name_of(mode)}"
+
+    def _told(self, name: str) -> Message:
+        told = self._heard.newest(name)
+        assert told is not None  # `await_pose`
+        return told
+
+    # What it is told
+
+    def aim(self, place: Point) -> None:
+        """Drive to a place, in a straight line."""
+        self._setpoint(POSITION_ONLY, place, 0.0)
+
+    def aim_yaw(self, yaw: float) -> None:
+        """Turn where it stands."""
+        self._setpoint(YAW_ONLY, (0.0, 0.0), yaw)
+
+    def order(self, command: int, *params: float, what: str) -> str:
+        """Why an order was not obeyed; empty if it was."""
+        try:
+            ack = self.peer.command(command, *params, patience_s=ORDER_S)
+        except OutcomeUnknown:
+            return f"the autopilot did not answer {what}"
+        if ack.accepted:
+            return ""
+        text = self._heard.newest("STATUSTEXT", ORDER_S)
+        said = f' (it said "{text.text}")' if text is not None else ""
+        return f"the autopilot answered {what} with {ack.name}{said}"
+
+    def arm(self) -> str:
+        """Why it cannot be armed; empty once it is."""
+        return self.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, what="arming")
+
+    def limit_speed(self, speed: float) -> str:
+        """Why it does not keep to a speed (m/s); empty if it does."""
+        return self.order(dialect.MAV_CMD_DO_CHANGE_SPEED, 1.0, speed, -1.0, what=f"a speed of {speed:g} m/s")
+
+    def guide(self) -> str:
+        """Why it does not go into the mode in which we drive it; empty if it may (`is_guided`)."""
+        self._stop_owed.clear()
+        self.left = guided = self.driving.guided
+        name = self.driving.name_of(guided)
+        return self.order(dialect.MAV_CMD_DO_SET_MODE, *guided.params, what=f"the mode {name}")
+
+    def is_guided(self) -> bool:
+        return self.mode() == self.driving.guided
+
+    def stop(self) -> None:
+        """Order to hold, and wait a moment to see it obeyed; it is ordered on until it is.
+
+        Somebody who drives the vehicle in another mode is left alone.
+        """
+        self._stop_asked_s = time.monotonic()
+        self._stop_owed.set()
+        until = self._stop_asked_s + STOP_S
+        while self._stop_owed.is_set() and time.monotonic() < until and not self._closing.is_set():
+            self._hold()
+            self._closing.wait(KEEP_S)
+
+    def _hold(self) -> None:
+        """Order what is still owed, or see that it is no longer."""
+        beat = self._heard.since("HEARTBEAT", self._stop_asked_s)
+        mode = self.mode()
+        if beat is not None and mode != self.driving.guided:
+            self.left = mode
+            self._stop_owed.clear()
+        elif mode in (self.driving.guided, self.driving.hold):
+            self._say(dialect.MAV_CMD_DO_SET_MODE, *self.driving.hold.params)
+
+    def _keep(self) -> None:
+        """Until closed: ask for what should be told and is not, and order the stop that is owed."""
+        asked_s = -math.inf
+        while not self._closing.wait(KEEP_S):
+            if self._stop_owed.is_set():
+                self._hold()
+            if time.monotonic() - asked_s >= 1.0:
+                asked_s = time.monotonic()
+                self._ask_for_streams()
+
+    def _ask_for_streams(self) -> None:
+        for name, (number, hertz) in STREAMS.items():
+            if self._heard.newest(name, 3.0 / hertz + 1.0) is None:
+                self._say(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / hertz)
+        if self._heard.newest("GPS_GLOBAL_ORIGIN", ASK_ORIGIN_S) is None:
+            self._say(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
+
+    def _say(self, command: int, *params: float) -> None:
+        """A command whose answer is what it leads to."""
+        who, filled = self.peer.who, (*params, *(0.0,) * 7)[:7]
+        self.peer.send(dialect.MAVLink_command_long_message(who.system, who.component, command, 0, *filled))
+
+    def _setpoint(self, mask: int, place: Point, yaw: float) -> None:
+        who, now_ms = self.peer.who, int(time.monotonic() * 1000) & 0xFFFFFFFF
+        down = self._told("LOCAL_POSITION_NED").z
+        self.peer.send(
+            dialect.MAVLink_set_position_target_local_ned_message(
+                now_ms, who.system, who.component, dialect.MAV_FRAME_LOCAL_NED, mask,
+                *place, down, *(0.0,) * 6, yaw, 0.0,
+            )
+        )  # fmt: skip
