@@ -37,6 +37,10 @@ class Autopilot:
     """Hold (whole seconds) without which it does not stop at a waypoint."""
     keeps_arrival: bool
     """Keeps a waypoint's acceptance radius and heading."""
+    reached: str
+    """Where it counts a waypoint as reached, in words."""
+    unturned: str
+    """Why a robot does not turn to a stop's heading, in words; empty if it does."""
     max_delay_s: float
 
     def kept(self, item: Item) -> Item:
@@ -56,11 +60,13 @@ class Autopilot:
 # reached when the moving target passes it ("fast waypoint"), the robot being behind or cutting the corner.
 # With a hold of a second or more it stops there first. Delays are milliseconds in uint32 (mode_auto.cpp).
 # PX4, source: navigation.h allows 500 items on flight controllers (2 000 in older releases, 50 on the
-# smallest boards, 65 534 on Linux); only multicopters brake for a hold (Mission::setActiveMissionItems).
+# smallest boards, 65 534 on Linux); only multicopters brake for a hold (Mission::setActiveMissionItems),
+# wait for a heading, and take a waypoint's own radius (MissionBlock::is_mission_item_reached).
 AUTOPILOTS: dict[str, Autopilot] = {
     "ardupilot": Autopilot(
         name="ardupilot", rule="ardupilot", frame=Frame.GLOBAL_RELATIVE_ALT_INT, max_items=655,
         home_first=True, keep=ardupilot_keeps, brake_hold_s=1, keeps_arrival=False, max_delay_s=4_294_967.0,
+        reached="within its parameter WP_RADIUS, or once past it", unturned="ardupilot drops it",
         commands=frozenset({
             Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.NAV_SCRIPT_TIME,
             Command.DO_SEND_SCRIPT_MESSAGE, Command.IMAGE_START_CAPTURE,
@@ -69,6 +75,8 @@ AUTOPILOTS: dict[str, Autopilot] = {
     "px4": Autopilot(
         name="px4", rule="px4", frame=Frame.GLOBAL_RELATIVE_ALT_INT, max_items=500,
         home_first=False, keep=px4_keeps, brake_hold_s=0, keeps_arrival=True, max_delay_s=4_294_967.0,
+        reached="within its parameter NAV_ACC_RAD, 10 m unless set",
+        unturned="px4 keeps it but turns no rover to it",
         commands=frozenset({
             Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.IMAGE_START_CAPTURE,
         }),
@@ -76,6 +84,7 @@ AUTOPILOTS: dict[str, Autopilot] = {
     "generic": Autopilot(
         name="generic", rule="wgs84", frame=Frame.GLOBAL_RELATIVE_ALT_INT, max_items=UINT16_MAX,
         home_first=False, keep=as_sent, brake_hold_s=0, keeps_arrival=True, max_delay_s=4_294_967.0,
+        reached="within the acceptance radius that is sent", unturned="",
         commands=frozenset({
             Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.IMAGE_START_CAPTURE,
         }),

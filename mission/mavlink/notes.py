@@ -24,11 +24,8 @@ def _failures(mission: Mission) -> Iterator[str]:
 
 
 def _arrival(mission: Mission, manner: Manner) -> Iterator[str]:
-    name = manner.vehicle.name
-    if manner.vehicle.keeps_arrival:
-        yield "tolerance_m is sent as acceptance radius; the station still checks the pose before a scan"
-    else:
-        yield f"tolerance_m is not checked by {name}: the station checks the pose before a scan"
+    name, reached = manner.vehicle.name, manner.vehicle.reached
+    yield f"{name} counts a stop as reached {reached}: the station checks tolerance_m before a scan"
     if mission.scanner.fov_deg < 360:
         yield f"headings are sent, but not every {name} rover turns to them: the station checks them"
     if manner.trigger == "none":

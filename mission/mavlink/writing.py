@@ -29,8 +29,8 @@ def stop_waypoint(stop: Stop, manner: Manner) -> Item:
 def corner_waypoint(point: Point, tolerance_m: float, manner: Manner) -> Item:
     """A place to drive through, told so that the vehicle does not cut it.
 
-    ArduPilot is told to stop there. PX4 is told a radius: without one it goes on to the next waypoint within
-    NAV_ACC_RAD of this one, 10 m unless set (source).
+    ArduPilot is told to stop there, others a radius: without one they go on to the next waypoint within
+    a radius of their own, PX4 within 10 m unless set (source).
     """
     hold = manner.vehicle.brake_hold_s
     if not manner.vehicle.keeps_arrival:

@@ -225,14 +225,21 @@ def test_without_a_georeference_nothing_is_written(name):
         translate(changed(square_tour(), georeference=None), name)
 
 
-def test_ardupilot_refuses_a_scanner_that_needs_its_heading():
-    with pytest.raises(AnswerIsNo, match=r"stop S1: heading 0\.0°.*fov_deg is 90.*--fov 360"):
-        translate(narrow_view())
+@pytest.mark.parametrize(
+    ("name", "why"), [("ardupilot", "ardupilot drops it"), ("px4", "px4 keeps it but turns no rover to it")]
+)
+def test_a_scanner_that_needs_its_heading_is_refused_where_nothing_turns_to_it(name, why):
+    with pytest.raises(AnswerIsNo, match=rf"stop S1: heading 0\.0°.*fov_deg is 90.*{why}.*--fov 360"):
+        translate(narrow_view(), name)
 
 
-@pytest.mark.parametrize("name", ["px4", "generic"])
-def test_who_keeps_the_heading_gets_it_with_a_note(name):
-    assert any("headings are sent" in note for note in translate(narrow_view(), name).notes)
+def test_who_may_turn_to_the_heading_gets_it_with_a_note():
+    assert any("headings are sent" in note for note in translate(narrow_view(), "generic").notes)
+
+
+@pytest.mark.parametrize(("name", "within"), [("ardupilot", "WP_RADIUS"), ("px4", "NAV_ACC_RAD, 10 m")])
+def test_what_counts_as_reached_is_noted_by_parameter(name, within):
+    assert any(within in note for note in translate(square_tour(), name).notes)
 
 
 @pytest.mark.parametrize(
