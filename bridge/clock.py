@@ -53,6 +53,10 @@ class SimulatedClock:
         """Let `happens` be called `seconds` from now, by whoever waits then."""
         heapq.heappush(self._due, (self._now_ns + round(seconds * 1e9), len(self._due), happens))
 
+    def jump(self, seconds: float) -> None:
+        """Somebody sets the date, forward or back; nobody waits for that."""
+        self._now_ns += round(seconds * 1e9)
+
     def wait(self, seconds: float, until: Event | None = None) -> bool:
         if until is not None and until.is_set():
             return True

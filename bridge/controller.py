@@ -21,7 +21,7 @@ from bridge.battery import what_is_missing
 from bridge.clock import Clock
 from bridge.commands import Decision, Refused, Situation, decide, handed_over
 from bridge.journal import Journal
-from bridge.lease import Denied, claimed
+from bridge.lease import Denied, claimed, lasting_ns
 from bridge.protocol import Answer, Command, Commit, Lease, Rejected, encode
 from bridge.revision import RevisionPolicy
 from bridge.robots import Base, Scanner
@@ -89,6 +89,7 @@ class Controller:
     def _recover(self) -> None:
         """Stand still, and wait where the journal says the run was."""
         self._base.stop()
+        self._mend_lease()
         kept = self._journal.fact("run", Run)
         if kept is None:
             return
@@ -97,6 +98,13 @@ class Controller:
         change = runs.rebooted(kept)
         if change.events:
             self._keep(change)
+
+    def _mend_lease(self) -> None:
+        """A lease from a time when the date was far ahead would last until then."""
+        lease = self.lease
+        until_ns = self._command_clock.now_ns() + lasting_ns()
+        if lease is not None and lease.until_ns > until_ns:
+            self._store_lease(msgspec.structs.replace(lease, until_ns=until_ns))
 
     def _hold(self, mission: Mission | None) -> None:
         self._mission = mission

@@ -1,0 +1,192 @@
+"""The date is set forward, at the robot or at the station, while they run and over a reboot.
+
+While a program runs, its clock counts on from where it began, so that a new date moves nothing. Over a
+reboot the robot takes the new date: what was meant for an earlier time is refused, and nothing else is lost.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from datetime import timedelta
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from bridge import agent as agents
+from bridge import keys as site_keys
+from bridge.agent import Agent, trusting
+from bridge.bodies import pose_of
+from bridge.clock import WallClock
+from bridge.controller import Controller
+from bridge.journal import memory_journal
+from bridge.keys import init_site, issue, now_utc, read_keys
+from bridge.lease import lasting_ns
+from bridge.link import Switchboard
+from bridge.protocol import Answer, Keys, Rejected, Verb
+from bridge.simulator import SimulatedBase, SimulatedScanner
+from bridge.station import Station
+from mission.document import Mission
+from mission.errors import AnswerIsNo, InputError
+from mission.events import AnyEvent, Finished, PoseReport, Scanned, StateReport
+from tests.bridge.test_push import manifest_of
+from tests.bridge.world import Field, corridor
+from tests.faults.sizes import size
+from tests.faults.test_crashes import ENTRIES, Mains, Trial, check
+
+HOUR, YEAR = 3600.0, 365 * 86400.0
+LONGEST_LEG_S = 100.0
+"""Between two events of the corridor's run; the way back is the longest."""
+
+
+def set_forward(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
+    """The date of this machine, for all that runs in this process."""
+    date_ns, date = time.time_ns, now_utc
+    monkeypatch.setattr(time, "time_ns", lambda: date_ns() + round(seconds * 1e9))
+    monkeypatch.setattr(time, "time", lambda: time.time_ns() / 1e9)
+    monkeypatch.setattr(site_keys, "now_utc", lambda: date() + timedelta(seconds=seconds))
+
+
+@pytest.mark.parametrize("seconds", [HOUR, YEAR, 10 * YEAR])
+def test_a_date_that_is_set_forward_at_both_ends_during_a_run_moves_nothing(
+    monkeypatch: pytest.MonkeyPatch, seconds: float
+) -> None:
+    board, journal, clock = Switchboard(), memory_journal(), WallClock(speed_up=50)
+    base, scanner = SimulatedBase(clock=clock), SimulatedScanner(clock=clock)
+    controller = Controller(
+        robot="r1", journal=journal, base=base, scanner=scanner, clock=clock, command_clock=WallClock(),
+        mission_taken=lambda mission: base.stand_at_start(pose_of(mission.start)),
+    )  # fmt: skip
+    agent = Agent(
+        keys=Keys("r1"), link=board.link(), journal=journal, controller=controller, base=base,
+        scanner=scanner, clock=clock, command_clock=WallClock(), speed_up=50,
+    )  # fmt: skip
+    with agents.on_link(agent):
+        alice, bob = (Station(board.link(), Keys("r1"), commander=who) for who in ("alice", "bob"))
+        alice.push(corridor())
+        alice.command("start")
+        fence = alice.info().lease
+        events: list[AnyEvent] = []
+        for report in alice.reports():
+            if isinstance(report, StateReport | PoseReport) or not hasattr(report, "number"):
+                continue
+            events.append(report)
+            if isinstance(report, Scanned) and report.stop == "s1":
+                set_forward(monkeypatch, seconds)
+                alice.command("pause")
+                with pytest.raises(AnswerIsNo, match="not_the_commander"):
+                    bob.command("resume")
+                assert alice.command("resume").outcome == "ok"
+    assert fence is not None
+    assert controller.lease is not None
+    assert controller.lease.fence == fence.fence
+    assert isinstance(events[-1], Finished)
+    times = [event.robot_ns / 1e9 for event in events]
+    assert all(0 <= after - before < LONGEST_LEG_S for before, after in pairwise(times))
+
+
+class Jumping(Trial):
+    """Whenever the robot boots, the date has been set forward, by a second to ten years."""
+
+    def __init__(self, mains: Mains, record: Path, chance: random.Random) -> None:
+        super().__init__(mains, record)
+        self.chance = chance
+        self.expired = 0
+
+    def boot(self) -> None:
+        self.field.base.stop()
+        self.field.clock.jump(10 ** self.chance.uniform(0.0, 8.5))
+        super().boot()
+
+    def order(self, verb: Verb) -> Answer:
+        """A new order when the old one has expired, as a station would write it."""
+        while (answer := super().order(verb)).reason == "expired":
+            self.expired += 1
+        return answer
+
+    def push(self, mission: Mission) -> None:
+        while self.field.journal.mission(mission.id, mission.revision) is None:
+            super().push(mission)
+
+
+def test_a_date_that_is_set_forward_over_reboots_loses_nothing_and_repeats_nothing(tmp_path: Path) -> None:
+    trials, jumps, expired = size(short=100, full=2000), 0, 0
+    for seed in range(trials):
+        chance = random.Random(seed)
+        moments = [chance.choice(["commit", "committed"]) for _ in range(chance.randint(1, 6))]
+        mains = Mains(*((moment, chance.randint(1, 2 * ENTRIES)) for moment in moments))
+        trial = Jumping(mains, tmp_path / f"{seed}.log", chance)
+        trial.push(corridor())
+        assert trial.order("start").outcome == "ok"
+        trial.finish()
+        check(trial)
+        times = [event.robot_ns for event in trial.field.journal.events()]
+        assert times == sorted(times)
+        jumps, expired = jumps + trial.mains.failures, expired + trial.expired
+    print(f"{trials} runs: {jumps} reboots with a later date, {expired} orders expired and were given anew")
+    assert jumps > trials
+    assert expired > 0
+
+
+def test_what_was_meant_for_an_earlier_date_comes_to_nothing() -> None:
+    """An order, a commit and a lease from before; what had been carried out is answered as it was."""
+    field = Field()
+    station = field.station()
+    station.push(corridor())
+    start, pause = field.command("start"), field.command("pause")
+    assert field.controller.obey(start).outcome == "ok"
+    old = field.commit(manifest_of(corridor(stops=2, revision=2), b""))
+    field.base.stop()
+    field.clock.jump(YEAR)
+    field.boot()
+    assert field.controller.obey(start).outcome == "ok"
+    assert field.controller.obey(pause).reason == "expired"
+    late = field.controller.take(old, corridor(stops=2, revision=2))
+    assert isinstance(late, Rejected)
+    assert late.reason == "expired"
+    assert field.order("resume", commander="bob").outcome == "ok"
+    field.work()
+    assert [event.stop for event in field.journal.events() if isinstance(event, Scanned)] == [
+        "s1",
+        "s2",
+        "s3",
+    ]
+
+
+def test_a_lease_from_a_date_far_ahead_ends_within_its_minute_once_the_date_is_right_again() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.clock.jump(YEAR)
+    assert field.order("start").outcome == "ok"
+    field.base.stop()
+    field.clock.jump(-YEAR)
+    field.boot()
+    assert field.order("resume", commander="bob").reason == "not_the_commander"
+    field.clock.wait(lasting_ns() / 1e9)
+    assert field.order("resume", commander="bob").outcome == "ok"
+
+
+def test_a_robot_whose_date_is_beyond_a_certificates_end_obeys_it_no_more_and_runs_on(tmp_path: Path) -> None:
+    """And a station whose date is beyond it sends nothing."""
+    init_site(tmp_path, now=now_utc())
+    folder = issue(tmp_path, "station", "alice", now=now_utc()).folder
+    held = read_keys(folder, now=now_utc())
+    date = now_utc()
+    field = Field()
+    agent = Agent(
+        keys=field.keys, link=field.board.link(), journal=field.journal, controller=field.controller,
+        base=field.base, scanner=field.scanner, clock=field.clock, command_clock=field.clock,
+        trust=trusting(held.authority, lambda: date),
+    )  # fmt: skip
+    agent.serve()
+    station = Station(field.board.link(), field.keys, commander="alice", held=held)
+    station.push(corridor())
+    assert station.command("start").outcome == "ok"
+    date += timedelta(days=91)
+    with pytest.raises(AnswerIsNo, match="untrusted: the certificate of alice ends"):
+        station.command("pause")
+    field.work()
+    assert field.controller.run.state == "FINISHED"
+    with pytest.raises(InputError, match="issue new keys for alice"):
+        read_keys(folder, now=date)
