@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 import typer
 
-from mission.document import Frame, Mission, SiteOrigin, Stop, Transform, sealed
+from mission.document import Mission, Stop, sealed
 from mission.errors import AnswerIsNo, InputError
-from mission.files.atomic import write_atomic
+from mission.files.atomic import write_checked
 from mission.files.mission_json import encode, next_revision, read
 from mission.geometry import frozen, polyline_length
 from mission.planning import Schedule
@@ -200,13 +200,20 @@ def _json(document: dict[str, Any]) -> str:
 OriginOption = Annotated[
     str | None, typer.Option(metavar="LAT,LON,ALT,HEADING", help="Where on earth the drawing's origin is.")
 ]
+FORMAT_NAMES = "plan, waypoints, dxf, csv, geojson, nav2, mcap or vda5050, whatever the suffix."
 AutopilotOption = Annotated[str | None, typer.Option(help="ardupilot, px4 or generic")]
 
 
 def export(
     mission: MissionFile,
     out: Annotated[Path, typer.Option("-o", "--out", help="The file; its suffix names the format.")],
-    to: Annotated[str | None, typer.Option(metavar="FORMAT", help="The format, whatever the suffix.")] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FORMAT",
+            help=FORMAT_NAMES,
+        ),
+    ] = None,
     floor: Annotated[Path | None, typer.Option(help="The floor's .dxf, to draw over.")] = None,
     coverage: Annotated[Path | None, typer.Option(help="coverage.json, to draw what is seen.")] = None,
     autopilot: AutopilotOption = None,
@@ -224,40 +231,24 @@ def export(
 
     Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
     """
-    from mission.files.exports import FORMATS, exported, format_named
+    from mission.files.exports import FORMATS, check_uses, exported, format_named
+    from mission.files.exports.placing import placed
 
     document = read(mission)
     for problem in problems_of(document)[:1]:
         raise AnswerIsNo(f"{mission}: {problem} (stopgo check {mission} lists all)")
     name = format_named(to, out)
-    given: dict[str, object] = {
-        "floor": floor,
-        "coverage": coverage,
-        "autopilot": autopilot,
-        "origin": origin,
-        "map": map_,
-    }
-    _refuse_unused(name, given)
+    drawn = {"floor": floor, "coverage": coverage}
+    check_uses(name, {**drawn, "autopilot": autopilot, "origin": origin, "map": map_})
     if out.exists() and out.samefile(mission):
         raise InputError(f"{out}: is the mission itself; choose another file for the export")
     supplements = _supplements(document, floor, coverage, autopilot)
-    placed = _placed(document, origin, map_)
-    data = exported(placed, name, supplements)
-    _write_checked(out, data)
-    notes = FORMATS[name].notes(placed, supplements)
-    _say_export({"mission": str(mission), "file": str(out), "format": name, "bytes": len(data),
-                 "stops": len(placed.stops), "notes": notes}, as_json)  # fmt: skip
-
-
-def _refuse_unused(name: str, given: dict[str, object]) -> None:
-    from mission.files.exports import FORMATS
-
-    for option, value in given.items():
-        if value is not None and option not in FORMATS[name].uses:
-            fitting = [form.suffix for form in FORMATS.values() if option in form.uses]
-            raise InputError(
-                f"--{option}: {FORMATS[name].title} has no use for it; it is for {', '.join(fitting)}"
-            )
+    there = placed(document, origin=origin, to_map=map_)
+    data = exported(there, name, supplements)
+    write_checked(out, data)
+    notes = FORMATS[name].notes(there, supplements)
+    report = {"mission": str(mission), "file": str(out), "format": name, "stops": len(there.stops)}
+    _say_export({**report, "bytes": len(data), "notes": notes}, FORMATS[name].title, as_json)
 
 
 def _supplements(
@@ -292,46 +283,10 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
     return FloorDrawing(lambda: open_drawing(data, source=path)[0], metres_in(drawing, source=path))
 
 
-def _placed(mission: Mission, origin: str | None, map_: str | None) -> Mission:
-    """The mission with the georeference and the frame that the options give; its file stays as it is."""
-    if origin is not None:
-        place = read_settings(None, {"origin": _numbers(origin, "origin", HOW["origin"])}).origin
-        assert place is not None
-        lat, lon, alt, heading = place
-        known = SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=heading)
-        mission = msgspec.structs.replace(mission, georeference=known)
-    if map_ is not None:
-        frame = Frame(name=mission.frame.name, to_map=_transform(map_))
-        mission = msgspec.structs.replace(mission, frame=frame)
-    return mission
-
-
-def _transform(text: str) -> Transform:
-    how = "write X,Y,HEADING in metres and degrees, such as 1.5,2,90"
-    numbers = _numbers(text, "map", how)
-    if len(numbers) != 3 or not all(abs(number) < 1e8 for number in numbers):
-        raise InputError(f"--map {text}: {how}")
-    return Transform(x=numbers[0], y=numbers[1], heading=math.radians(numbers[2]))
-
-
-def _numbers(text: str, option: str, how: str) -> tuple[float, ...]:
-    try:
-        return tuple(map(float, text.split(",")))
-    except ValueError:
-        raise InputError(f"--{option} {text}: {how}") from None
-
-
-def _write_checked(path: Path, data: bytes) -> None:
-    """Write whole or not at all, and see that the file holds what was checked."""
-    write_atomic(path, data)
-    if path.read_bytes() != data:
-        raise InputError(f"{path}: does not hold what was written; is another program writing to it?")
-
-
-def _say_export(report: dict[str, Any], as_json: bool) -> None:
+def _say_export(report: dict[str, Any], title: str, as_json: bool) -> None:
     for note in report["notes"]:
         typer.echo(f"stopgo: {note}", err=True)
-    line = "{file}: {format}, {stops} stops, {bytes} bytes, read back".format(**report)
+    line = f"{report['file']}: {title}, {report['stops']} stops, read back"
     typer.echo(_json(report) if as_json else line)
 
 
@@ -358,14 +313,15 @@ def import_command(
 
     Example: stopgo import site.plan -o mission.json --origin 47.3769,8.5417,408,0
     """
+    from mission.files.exports.placing import numbers
     from mission.files.imports import read_mission
 
     given = {"origin": origin, "start": start}
-    numbers = {key: _numbers(text, key, HOW[key]) for key, text in given.items() if text is not None}
-    settings = read_settings(parameters, numbers)
+    told = {key: numbers(text, key, HOW[key]) for key, text in given.items() if text is not None}
+    settings = read_settings(parameters, told)
     made, track = read_mission(file, settings, kind=kind, autopilot=autopilot)
     mission = sealed(msgspec.structs.replace(made, revision=next_revision(out, made)))
-    _write_checked(out, encode(mission))
+    write_checked(out, encode(mission))
     _say_import(read(out), out, (*track.notes, UNASKED), as_json)
 
 

@@ -37,6 +37,13 @@ def write_atomic(path: Path | str, data: bytes) -> None:
             temporary.unlink(missing_ok=True)
 
 
+def write_checked(path: Path | str, data: bytes) -> None:
+    """Write as `write_atomic`, and see that the file holds what was written."""
+    write_atomic(path, data)
+    if Path(path).read_bytes() != data:
+        raise InputError(f"{path}: does not hold what was written; is another program writing to it?")
+
+
 def _check_target(target: Path, shown: Path | str) -> None:
     if not target.parent.is_dir():
         raise InputError(f"{shown}: the folder {target.parent} does not exist; create it first")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 from mission.document import Mission
@@ -76,6 +77,14 @@ def format_named(name: str | None, path: Path) -> str:
         known = ", ".join(form.suffix for form in FORMATS.values())
         raise InputError(f"{path}: no format has this suffix; known: {known} (or name one with --to)")
     return fitting[0]
+
+
+def check_uses(name: str, given: Mapping[str, object]) -> None:
+    """Refuse an option that a format has no use for, rather than leave it out in silence."""
+    for option, value in given.items():
+        if value is not None and option not in FORMATS[name].uses:
+            fitting = ", ".join(form.suffix for form in FORMATS.values() if option in form.uses)
+            raise InputError(f"--{option}: {FORMATS[name].title} has no use for it; it is for {fitting}")
 
 
 def exported(mission: Mission, name: str, supplements: Supplements) -> bytes:

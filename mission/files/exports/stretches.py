@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,6 +13,7 @@ import numpy as np
 from mission.document import Mission
 from mission.errors import InputError
 from mission.geometry import FloatArray, frozen
+from mission.sense import FAR
 
 Fraction = tuple[float, float]
 
@@ -63,6 +64,7 @@ def read_stretches(path: Path, mission: Mission) -> Stretches:
         raise InputError(f"{path}: not a coverage.json of this version ({error}); plan again") from None
     _check_mission(coverage.mission, mission, path)
     segments = [segment for element in coverage.elements for segment in element.segments]
+    _check_segments(segments, path)
     seen = [piece for segment in segments for piece in _pieces(segment, segment.seen)]
     unseen = [piece for segment in segments for piece in _pieces(segment, _between(segment.seen))]
     return Stretches(*(frozen(pieces).reshape(-1, 2, 2) for pieces in (seen, unseen)))
@@ -79,6 +81,16 @@ def _check_mission(of: _Of, mission: Mission, path: Path) -> None:
             f"{path}: is the coverage of another revision (digest {of.digest[:12]}…, the mission has "
             f"{mission.digest[:12]}…); give the file that was written with the mission"
         )
+
+
+def _check_segments(segments: Sequence[_Segment], path: Path) -> None:
+    for segment in segments:
+        near = all(abs(value) <= FAR for value in (*segment.a, *segment.b))
+        if not near or not all(0 <= first <= last <= 1 for first, last in segment.seen):
+            raise InputError(
+                f"{path}: a segment from {segment.a} to {segment.b} makes no sense; give the file that was "
+                "written with the mission"
+            )
 
 
 def _between(seen: tuple[Fraction, ...]) -> Iterator[Fraction]:

@@ -63,3 +63,20 @@ def test_what_is_no_coverage_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "c.json").write_bytes(content)
     with pytest.raises(InputError, match=r"c\.json: "):
         read_stretches(tmp_path / "c.json", square_tour())
+
+
+@pytest.mark.parametrize("seen", [[[0.5, 0.2]], [[-1.0, 0.5]], [[0.0, 1.5]]])
+@pytest.mark.parametrize("end", [10.0, 1e300])
+def test_segments_that_make_no_sense_are_refused(seen: list, end: float, tmp_path: Path) -> None:
+    mission = square_tour()
+    coverage = {
+        **{
+            "schema": "stopgo/coverage",
+            "version": 1,
+            "mission": {"id": mission.id, "digest": mission.digest},
+        },
+        "elements": [{"segments": [{"a": [0, 0], "b": [end, 0], "seen": seen}]}],
+    }
+    (tmp_path / "c.json").write_text(json.dumps(coverage))
+    with pytest.raises(InputError, match=r"c\.json: a segment from"):
+        read_stretches(tmp_path / "c.json", mission)
