@@ -39,6 +39,8 @@ OLDEST_STEPS = 6_000_000
 MAX_PARSERS = 64
 SIGNATURE = "wrong or no signature"
 """Reason by which `dropped` counts what was not signed with our key, or is a replay."""
+SLOW_BAUD = 57_600
+"""At this rate eight mission items take 70 ms; telemetry radios are not faster."""
 UNSIGNED_ALLOWED = (dialect.MAVLINK_MSG_ID_RADIO_STATUS,)
 """Radios cannot sign."""
 
@@ -96,10 +98,13 @@ class Wire:
         me: Who = GROUND_STATION,
         signing_key: bytes | None = None,
         name: str = "the link",
+        slow: bool = False,
     ) -> None:
         self.me = me
         self.name = name
         """What errors call it."""
+        self.slow = slow
+        """Whether a few messages fill it for a noticeable time."""
         self.dropped: Counter[str] = Counter()
         """What was not for us or no message at all, by reason."""
         self._transport = transport
@@ -268,7 +273,8 @@ def signing_time() -> int:
 @contextmanager
 def wire(url: Url, *, me: Who = GROUND_STATION, signing_key: bytes | None = None) -> Iterator[Wire]:
     """An open wire at `url`; raises as `open_transport` does."""
-    opened = Wire(open_transport(url), me=me, signing_key=signing_key, name=str(url))
+    slow = url.kind == "serial" and url.number <= SLOW_BAUD
+    opened = Wire(open_transport(url), me=me, signing_key=signing_key, name=str(url), slow=slow)
     try:
         yield opened
     finally:

@@ -49,6 +49,7 @@ class Scripted:
         self.url = Url("udpout", "127.0.0.1", self._port)
         self.receiving: list[Message | None] | None = None
         self._source: Who | None = None
+        self._asked_s = 0.0
         self._closing = threading.Event()
 
     def __enter__(self) -> Any:
@@ -74,6 +75,7 @@ class Scripted:
                 if time.monotonic() >= beat_at:
                     beat_at = time.monotonic() + 0.1
                     self.beat()
+                self.ask_again()
                 message = box.get(0.02)
                 if message is not None and not self.silent:
                     self.take(message)
@@ -156,7 +158,17 @@ class Scripted:
         assert self.receiving is not None
         return self.receiving.index(None)
 
+    def ask_again(self) -> None:
+        """As the book says, 250 ms after the last request."""
+        if (
+            self.receiving is not None
+            and self._source is not None
+            and time.monotonic() > self._asked_s + 0.25
+        ):
+            self.request(self.awaited, self._source)
+
     def request(self, seq: int, to: Who) -> None:
+        self._asked_s = time.monotonic()
         self.send(dialect.MAVLink_mission_request_int_message(to.system, to.component, seq, 0))
 
     def ack(self, result: int, to: Who, mission_type: int = 0) -> None:

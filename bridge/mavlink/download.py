@@ -1,0 +1,149 @@
+"""What a vehicle holds: its mission's items, read one by one until every one has come.
+
+Several are asked for at once where the vehicle answers in any order; each is asked for again until it came.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from bridge.mavlink.messages import ack_message, item_of, item_request, list_request, of_mission, result_name
+from bridge.mavlink.pace import Pace, Silence, window_for
+from bridge.mavlink.peer import Peer
+from bridge.mavlink.wire import Message, dialect
+from mission.errors import AnswerIsNo, RobotUnreachable
+from mission.mavlink.items import Item
+
+Progress = Callable[[int, int], None]
+"""Called with what is done and what there is to do."""
+
+ONE_BY_ONE = frozenset({"px4"})
+"""Source: PX4 ends a transfer when an item is asked for that is neither the next nor the last."""
+REFUSALS = 3
+"""So many in a row are meant; fewer may be late answers to something else."""
+LAST_WORDS = 3
+"""The end of a transfer is not answered, so it is said so often: until it hears, PX4 takes no other."""
+
+
+def download(
+    peer: Peer, *, patience_s: float | None = None, progress: Progress | None = None
+) -> tuple[Item, ...]:
+    """All that the vehicle holds, its home included where it keeps one.
+
+    Raises
+    ------
+    RobotUnreachable
+        If it falls silent.
+    AnswerIsNo
+        If it refuses, which it does while another station uploads.
+    """
+    window = 1 if peer.autopilot in ONE_BY_ONE else window_for(peer)
+    reading = _Reading(peer, window, patience_s or peer.patience_s, progress)
+    refused = reading.run()
+    if refused is not None and window > 1:
+        reading = _Reading(peer, 1, patience_s or peer.patience_s, progress)
+        refused = reading.run()
+    if refused is not None:
+        raise AnswerIsNo(
+            f"{peer}: reading its mission was answered {result_name(refused)}; "
+            "another station may be at work on it: try again"
+        )
+    return tuple(reading.items[seq] for seq in sorted(reading.items))
+
+
+class _Reading:
+    """One transfer from the vehicle."""
+
+    def __init__(self, peer: Peer, window: int, patience_s: float, progress: Progress | None) -> None:
+        self.items: dict[int, Item] = {}
+        self._peer = peer
+        self._pace = Pace(window)
+        self._silence = Silence(patience_s)
+        self._progress = progress
+        self._count: int | None = None
+        self._next = 0
+        self._asked_s: dict[int, float] = {}
+        """When each item that is under way was asked for last."""
+        self._asked_again: set[int] = set()
+        self._refusals = 0
+
+    def run(self) -> int | None:
+        """Read everything; what the vehicle refuses with, or `None`."""
+        with self._peer.box("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK") as box:
+            self._ask_count()
+            while self._count is None or len(self.items) < self._count:
+                if self._silence.over:
+                    raise RobotUnreachable(f"{self._peer} did not tell its mission{self._peer.why_silent()}")
+                message = box.get(self._pace.again_s if self._count is None else self._due_s())
+                if message is None:
+                    self._again()
+                elif of_mission(message) and (refused := self._take(message)) is not None:
+                    return refused
+        for _ in range(LAST_WORDS):
+            self._peer.send(ack_message(dialect.MAV_MISSION_ACCEPTED, self._peer.who))
+        return None
+
+    def _take(self, message: Message) -> int | None:
+        name = message.get_type()
+        if name == "MISSION_ACK":
+            return self._take_refusal(message.type)
+        self._refusals = 0
+        if name == "MISSION_COUNT":
+            self._take_count(message.count)
+        elif self._count is not None and message.seq < self._count:
+            self._take_item(message)
+        return None
+
+    def _take_refusal(self, result: int) -> int | None:
+        self._silence.heard(went_on=False)
+        self._refusals += result != dialect.MAV_MISSION_ACCEPTED
+        return result if self._refusals >= REFUSALS else None
+
+    def _take_count(self, count: int) -> None:
+        if self._count == count:
+            return
+        self._silence.heard(went_on=True)
+        self._count = count
+        self.items.clear()
+        self._asked_s.clear()
+        self._next = 0
+        self._ask_more()
+
+    def _take_item(self, message: Message) -> None:
+        self._silence.heard(went_on=message.seq not in self.items)
+        asked_s = self._asked_s.pop(message.seq, None)
+        if asked_s is not None and message.seq not in self._asked_again:
+            self._pace.saw(time.monotonic() - asked_s)
+        self.items[message.seq] = item_of(message)
+        self._pace.went_on()
+        if self._progress is not None and self._count:
+            self._progress(len(self.items), self._count)
+        self._ask_more()
+
+    def _ask_count(self) -> None:
+        self._peer.send(list_request(self._peer.who))
+
+    def _ask_more(self) -> None:
+        """Fill the window with the next items that were not asked for."""
+        while len(self._asked_s) < self._pace.window and self._next < (self._count or 0):
+            self._next += 1
+            if self._next - 1 not in self.items:
+                self._ask(self._next - 1)
+
+    def _ask(self, seq: int) -> None:
+        self._asked_s[seq] = time.monotonic()
+        self._peer.send(item_request(seq, self._peer.who))
+
+    def _due_s(self) -> float:
+        """Seconds until the first item has to be asked for again."""
+        return min(self._asked_s.values()) + self._pace.again_s - time.monotonic()
+
+    def _again(self) -> None:
+        if self._count is None:
+            self._pace.waited()
+            return self._ask_count()
+        late_s = time.monotonic() - self._pace.again_s
+        for seq in [seq for seq, asked_s in self._asked_s.items() if asked_s <= late_s]:
+            self._asked_again.add(seq)
+            self._ask(seq)

@@ -1,0 +1,54 @@
+"""Whether a vehicle's metres count from the mission's georeference."""
+
+from __future__ import annotations
+
+import math
+
+from bridge.mavlink.peer import Origin, Peer
+from mission.document import SiteOrigin
+from mission.errors import AnswerIsNo
+from mission.geodesy import Geodetic, from_geodetic
+
+NEAR_M = 0.1
+"""Two origins that are so close are the same."""
+
+
+def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> Origin:
+    """The vehicle's origin, which is the site's; with `set_it` one that has none is given it.
+
+    A vehicle takes one origin per boot and ignores a second silently; without one it accepts a mission,
+    arms, and drives as if it stood at 0, 0.
+
+    Raises
+    ------
+    AnswerIsNo
+        If it has another one, or none, or does not tell.
+    """
+    held = peer.origin()
+    wanted = Origin(lat=site.lat, lon=site.lon, alt=site.alt)
+    if held is None and set_it:
+        held = peer.set_origin(wanted)
+    if held is None:
+        tried = (
+            "and takes none (does its navigation run?)" if set_it else "or does not tell: add --set-origin"
+        )
+        raise AnswerIsNo(
+            f"{peer} has no origin, {tried}, or --any-origin if it finds its place by satellites; "
+            "nothing was sent"
+        )
+    away_m = _distance_m(site, held)
+    if away_m > NEAR_M:
+        raise AnswerIsNo(
+            f"{peer}: its origin {_told(held)} is {away_m:.2f} m from the mission's {_told(wanted)}, "
+            "and so would every stop be; an origin is taken once per boot: restart it and push with "
+            "--set-origin, or --any-origin if it finds its place by satellites; nothing was sent"
+        )
+    return held
+
+
+def _distance_m(site: SiteOrigin, held: Origin) -> float:
+    return math.hypot(*from_geodetic(site, Geodetic(lat=held.lat, lon=held.lon)))
+
+
+def _told(origin: Origin) -> str:
+    return f"{origin.lat:.7f}, {origin.lon:.7f}"

@@ -1,0 +1,230 @@
+"""One transfer of items to a vehicle, until it says how that ended, or falls silent.
+
+Items are pushed ahead of the vehicle's requests, a few at a time: a lost request then costs nothing, and a
+lost item a round trip. What the vehicle says is a hint of how far it is; what it holds in the end is for
+`download` to see.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from bridge.mavlink.download import Progress
+from bridge.mavlink.messages import ack_message, count_message, item_message, list_request, of_mission
+from bridge.mavlink.pace import Pace, Silence
+from bridge.mavlink.peer import Peer
+from bridge.mavlink.wire import Message, dialect
+from mission.mavlink.items import Item
+
+How = Literal["accepted", "unsure", "refused", "busy", "dropped", "silent", "rebooted"]
+"""How a transfer ended, as far as the vehicle says.
+
+unsure: the last item was sent, and no ACCEPTED came · refused: an item, or their number · busy: it never
+began · dropped: the vehicle ended it · silent: nothing came any more · rebooted: the vehicle started again.
+"""
+
+MEANT = 3
+"""So many errors in a row are meant; fewer may be late answers to what was sent before."""
+PROBE_S = 1.0
+PROBE_AFTER = 4
+"""After so long, or sending so often, without an answer to the last item, ask for what the vehicle holds."""
+HINTS = frozenset({dialect.MAV_MISSION_INVALID_SEQUENCE})
+ENDINGS = frozenset(
+    {dialect.MAV_MISSION_ERROR, dialect.MAV_MISSION_DENIED, dialect.MAV_MISSION_OPERATION_CANCELLED}
+)
+"""These say that there is no transfer, not that an item is wrong."""
+HEARD = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", "MISSION_COUNT")
+
+
+@dataclass(frozen=True)
+class Ended:
+    how: How
+    at: int
+    """How many items are known to have arrived; where one was refused, its number."""
+    result: int = dialect.MAV_MISSION_ACCEPTED
+    """MAV_MISSION_RESULT that ended it."""
+
+
+def send_items(
+    peer: Peer,
+    items: Sequence[Item],
+    *,
+    window: int,
+    patience_s: float | None = None,
+    progress: Progress | None = None,
+) -> Ended:
+    """Send the items as the whole mission; none of them clears it."""
+    return _Sending(peer, items, Pace(window), patience_s or peer.patience_s, progress).run()
+
+
+class _Sending:
+    """One transfer to the vehicle."""
+
+    def __init__(
+        self, peer: Peer, items: Sequence[Item], pace: Pace, patience_s: float, progress: Progress | None
+    ) -> None:
+        self._peer = peer
+        self._items = items
+        self._pace = pace
+        self._silence = Silence(patience_s)
+        self._progress = progress
+        self._boots = peer.boots
+        self._begun = False
+        """Whether the vehicle has asked for an item."""
+        self._base = 0
+        """All before this one have arrived."""
+        self._top = 0
+        """All before this one were sent."""
+        self._sent_s: dict[int, float] = {}
+        """When each item was sent last; -1 is the count."""
+        self._sent_again: set[int] = set()
+        self._moved_s = time.monotonic()
+        self._errors = 0
+        self._unanswered = 0
+        """How often in a row the window was sent without an answer."""
+        self._probed = False
+        """Whether the vehicle was asked for its mission, which it does not tell while it receives one."""
+
+    def run(self) -> Ended:
+        with self._peer.box(*HEARD) as box:
+            self._send_count()
+            while (ended := self._over()) is None:
+                message = box.get(self._moved_s + self._pace.again_s - time.monotonic())
+                if message is None:
+                    self._again()
+                elif of_mission(message) and (ended := self._take(message)) is not None:
+                    return ended
+            return ended
+
+    def _over(self) -> Ended | None:
+        """Whether there is nothing more to wait for."""
+        if self._peer.boots != self._boots:
+            return Ended("rebooted", self._base)
+        if self._silence.over:
+            return Ended("unsure" if self._all_sent else "silent", self._base)
+        return None
+
+    def _take(self, message: Message) -> Ended | None:
+        if message.get_type() == "MISSION_ACK":
+            return self._take_ack(message.type)
+        if message.get_type() == "MISSION_COUNT":
+            return self._take_count(message.count)
+        self._take_request(message.seq)
+        return None
+
+    @property
+    def _all_sent(self) -> bool:
+        return self._top == len(self._items) and (self._begun or not self._items)
+
+    def _take_count(self, count: int) -> Ended | None:
+        """A vehicle that tells a mission of our length has finished receiving, or had one of that length."""
+        return Ended("unsure", self._base) if self._probed and count == len(self._items) else None
+
+    def _take_request(self, seq: int) -> None:
+        if seq >= len(self._items):
+            return
+        self._errors = 0
+        self._silence.heard(went_on=seq > self._base or not self._begun)
+        if seq > self._base or not self._begun:
+            self._go_on(seq)
+        elif seq == self._base:
+            self._lacks_base()
+        elif self._old_enough(seq):
+            self._send(seq)
+
+    def _go_on(self, seq: int) -> None:
+        """The vehicle has all items before `seq`."""
+        self._see_round_trip(seq - 1)
+        self._begun = True
+        self._base = seq
+        self._top = max(self._top, seq)
+        self._moved_s = time.monotonic()
+        self._unanswered = 0
+        self._pace.went_on()
+        if self._progress is not None:
+            self._progress(seq, len(self._items))
+        self._push()
+
+    def _see_round_trip(self, seq: int) -> None:
+        if seq in self._sent_s and seq not in self._sent_again:
+            self._pace.saw(time.monotonic() - self._sent_s[seq])
+
+    def _lacks_base(self) -> None:
+        """The vehicle says what it waits for: a hint that this was lost, if it can have arrived."""
+        if self._old_enough(self._base):
+            self._send_window()
+        else:
+            self._push()
+
+    def _old_enough(self, seq: int) -> bool:
+        return time.monotonic() - self._sent_s.get(seq, 0.0) >= self._pace.soonest_s
+
+    def _take_ack(self, result: int) -> Ended | None:
+        self._silence.heard(went_on=False)
+        if result == dialect.MAV_MISSION_ACCEPTED:
+            return Ended("accepted", len(self._items)) if self._all_sent else None
+        if result in HINTS:
+            if self._begun:
+                self._lacks_base()
+            return None
+        if result in ENDINGS:
+            return self._take_ending(result)
+        return Ended("refused", self._base, result)
+
+    def _take_ending(self, result: int) -> Ended | None:
+        """The vehicle says that no transfer is under way: it is over, or it never began."""
+        if self._all_sent and result != dialect.MAV_MISSION_DENIED:
+            return Ended("unsure", self._base, result)
+        self._errors += not self._all_sent
+        if self._errors < MEANT and result != dialect.MAV_MISSION_OPERATION_CANCELLED:
+            return None
+        return Ended("dropped" if self._begun else "busy", self._base, result)
+
+    def _again(self) -> None:
+        """Nothing has come in time: send again what may be lost."""
+        self._pace.waited()
+        self._moved_s = time.monotonic()
+        if not self._begun:
+            if self._silence.seconds > PROBE_S:  # the last word of a download may have been lost
+                self._peer.send(ack_message(dialect.MAV_MISSION_ACCEPTED, self._peer.who))
+            self._send_count()
+            return
+        self._unanswered += 1
+        self._send_window()
+        if self._all_sent and (self._silence.seconds > PROBE_S or self._unanswered >= PROBE_AFTER):
+            self._probed = True
+            self._peer.send(list_request(self._peer.who))
+
+    def _send_count(self) -> None:
+        self._note_sent(-1)
+        self._peer.send(count_message(len(self._items), self._peer.who))
+
+    def _push(self) -> None:
+        """Send what has room in the window and was not sent."""
+        for seq in range(self._top, self._end):
+            self._send(seq)
+        self._top = max(self._top, self._end)
+
+    def _send_window(self) -> None:
+        for seq in range(self._base, self._end):
+            self._send(seq)
+        self._top = max(self._top, self._end)
+        self._moved_s = time.monotonic()
+
+    @property
+    def _end(self) -> int:
+        """Where the window ends: further each time nothing came, or a vehicle that has it all would wait."""
+        further = self._unanswered if self._pace.window > 1 else 0
+        return min(len(self._items), self._base + self._pace.window + further)
+
+    def _send(self, seq: int) -> None:
+        self._note_sent(seq)
+        self._peer.send(item_message(self._items[seq], seq, self._peer.who))
+
+    def _note_sent(self, seq: int) -> None:
+        if seq in self._sent_s:
+            self._sent_again.add(seq)
+        self._sent_s[seq] = time.monotonic()

@@ -1,0 +1,206 @@
+"""A mission onto a vehicle: sent, read back and compared; or what is on the vehicle instead, and why.
+
+No acknowledgement counts as success, and no silence as failure: what the vehicle reads back does. Where an
+upload ends half-way, nothing half-uploaded stays that could be started: the mission that was there before
+is put back, or the vehicle emptied.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from bridge.mavlink.download import Progress, download
+from bridge.mavlink.left import cancel, emptied, left_on, own_items
+from bridge.mavlink.messages import result_name
+from bridge.mavlink.pace import window_for
+from bridge.mavlink.peer import Peer
+from bridge.mavlink.sending import Ended, send_items
+from bridge.mavlink.wire import dialect
+from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from mission.mavlink.autopilots import autopilot_named, differences, upload_of
+from mission.mavlink.items import Item, ItemList
+
+ATTEMPTS = 4
+"""Whole transfers, where the vehicle ended one or the read-back was not what was sent."""
+SHOWN = 3
+"""Differences that an error names."""
+
+
+@dataclass(frozen=True)
+class Uploaded:
+    """A mission that was seen on the vehicle, item by item."""
+
+    items: int
+    """How many it holds, its home not counted."""
+    already: bool
+    """It held them before, and nothing was sent."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a mission is not on the vehicle."""
+
+    why: str
+    touched: bool = True
+    """Whether what the vehicle held may have changed."""
+
+
+def upload(
+    peer: Peer,
+    sent: ItemList,
+    *,
+    while_running: bool = False,
+    progress: Progress | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Uploaded:
+    """Put the items on the vehicle, and see them there as its kind of autopilot keeps them.
+
+    Parameters
+    ----------
+    while_running
+        Upload though the vehicle follows a mission; it begins its current item again.
+    progress
+        Called with items done and to do: those sent, then those read back.
+    tell
+        Takes the one line that says what is on the vehicle when a Ctrl-C has ended the upload.
+
+    Raises
+    ------
+    RobotUnreachable
+        If the vehicle did not answer and nothing was sent.
+    AnswerIsNo
+        If the vehicle refused it; the message says what it holds now.
+    OutcomeUnknown
+        If what it holds is not known.
+    """
+    check_standing(peer, while_running)
+    before = download(peer)
+    if not differences(sent, before):
+        return Uploaded(len(sent.items), already=True)
+    try:
+        failure = _attempted(peer, sent, progress or (lambda done, total: None))
+    except (KeyboardInterrupt, SystemExit):
+        cancel(peer)
+        if tell is not None:
+            tell(f"the upload was cancelled; {left_on(peer, before).words}")
+        raise
+    if failure is None:
+        return Uploaded(len(sent.items), already=False)
+    raise _error(peer, failure, before)
+
+
+def clear(peer: Peer, *, while_running: bool = False) -> int:
+    """Take the mission off the vehicle, and see that it is gone; gives the number of items it had.
+
+    Raises
+    ------
+    RobotUnreachable, AnswerIsNo, OutcomeUnknown
+        As `upload`.
+    """
+    check_standing(peer, while_running)
+    before = own_items(peer, download(peer))
+    if before and not emptied(peer):
+        raise OutcomeUnknown(
+            f"{peer}: told to empty its mission of {len(before)} items, and it was not seen empty"
+            f"{peer.why_silent()}: what it holds is unknown; see stopgo fetch-mission"
+        )
+    return len(before)
+
+
+def check_standing(peer: Peer, while_running: bool) -> None:
+    """Refuses to touch the mission that a vehicle is following."""
+    if peer.armed and peer.in_auto and not while_running:
+        raise AnswerIsNo(
+            f"{peer} is armed and follows its mission, and would begin its current item again; "
+            "pause it first, or add --while-running; nothing was sent"
+        )
+
+
+def _attempted(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None:
+    """Send and read back until the two agree; `None` when they do."""
+    items, window = upload_of(sent), window_for(peer)
+    failure = Failure("nothing was tried", touched=False)
+    for _ in range(ATTEMPTS):
+        ended = send_items(peer, items, window=window, progress=lambda done, total: progress(done, 2 * total))
+        if ended.how in ("accepted", "unsure"):
+            seen = _read_back(peer, sent, progress)
+            if seen is None or seen == failure:  # twice the same is no accident of the line
+                return seen
+            failure = seen
+        elif ended.how == "refused" and (window == 1 or ended.result == dialect.MAV_MISSION_NO_SPACE):
+            return Failure(_refusal(sent, ended))
+        elif ended.how in ("busy", "silent", "rebooted"):
+            return _given_up(peer, ended, len(items))
+        else:
+            failure = Failure(f"it ended the transfer at item {ended.at} ({result_name(ended.result)})")
+            window = 1  # then what is refused is the one item that is under way
+    return failure
+
+
+def _read_back(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None:
+    """Compare what the vehicle holds with what it should."""
+    count = len(upload_of(sent))
+    try:
+        read = download(peer, progress=lambda done, total: progress(count + done, count + total))
+    except (AnswerIsNo, RobotUnreachable) as error:
+        return Failure(f"all was sent, and could not be read back: {error}")
+    lines = differences(sent, read)
+    if not lines:
+        return None
+    more = f"; and {len(lines) - SHOWN} more" if len(lines) > SHOWN else ""
+    return Failure(f"all was sent, and read back otherwise: {'; '.join(lines[:SHOWN])}{more}")
+
+
+def _refusal(sent: ItemList, ended: Ended) -> str:
+    """Which item was refused, by what it is for, and which of its fields."""
+    name = result_name(ended.result)
+    if ended.result == dialect.MAV_MISSION_NO_SPACE:
+        return f"it refused {len(upload_of(sent))} items ({name}): plan fewer stops at once"
+    index = autopilot_named(sent.autopilot).index(ended.at)
+    if not 0 <= index < len(sent.placed):
+        return f"it refused item {ended.at}, its home ({name})"
+    placed = sent.placed[index]
+    stop = f" of stop {placed.stop}" if placed.stop is not None else ""
+    field = _field(placed.item, ended.result)
+    return f"it refused item {ended.at}, {placed.item.name}, {placed.role}{stop}{field} ({name})"
+
+
+def _field(item: Item, result: int) -> str:
+    """The field that a refusal is about, with its value; empty if it names none."""
+    values: dict[int, tuple[str, float]] = {
+        dialect.MAV_MISSION_UNSUPPORTED: ("command", item.command),
+        dialect.MAV_MISSION_UNSUPPORTED_FRAME: ("frame", item.frame),
+        dialect.MAV_MISSION_INVALID_PARAM1: ("param1", item.params[0]),
+        dialect.MAV_MISSION_INVALID_PARAM2: ("param2", item.params[1]),
+        dialect.MAV_MISSION_INVALID_PARAM3: ("param3", item.params[2]),
+        dialect.MAV_MISSION_INVALID_PARAM4: ("param4", item.params[3]),
+        dialect.MAV_MISSION_INVALID_PARAM5_X: ("x (latitude)", item.x),
+        dialect.MAV_MISSION_INVALID_PARAM6_Y: ("y (longitude)", item.y),
+        dialect.MAV_MISSION_INVALID_PARAM7: ("z", item.z),
+    }
+    if result not in values:
+        return ""
+    field, value = values[result]
+    return f": {field} {value:.10g}"
+
+
+def _given_up(peer: Peer, ended: Ended, count: int) -> Failure:
+    if ended.how == "busy":
+        return Failure(
+            f"it takes no mission now ({result_name(ended.result)}); another station may be uploading: "
+            "try again",
+            touched=False,
+        )
+    if ended.how == "rebooted":
+        return Failure(f"it was started again when {ended.at} of {count} items had arrived")
+    return Failure(f"it fell silent when {ended.at} of {count} items had arrived{peer.why_silent()}")
+
+
+def _error(peer: Peer, failure: Failure, before: Sequence[Item]) -> AnswerIsNo | OutcomeUnknown:
+    """The failure with what is on the vehicle now."""
+    if not failure.touched:
+        return AnswerIsNo(f"{peer}: {failure.why}; nothing of this mission was stored")
+    left = left_on(peer, before)
+    error = AnswerIsNo if left.known else OutcomeUnknown
+    return error(f"{peer}: {failure.why}; {left.words}")
