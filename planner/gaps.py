@@ -113,7 +113,7 @@ def crossings_through(
     one end of a narrow corridor and is joined with other such ends that can be seen from it.
     """
     gaps = _still_open(gaps, walls)
-    if not gaps or drive_area.is_empty:
+    if not gaps:
         return np.empty((0, 2, 2))
     site = Site(walls, drive_area, ground)
     ways: list[tuple[FloatArray, FloatArray]] = []

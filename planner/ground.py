@@ -72,5 +72,7 @@ def drivable(ground: Ground, settings: Settings) -> tuple[BaseGeometry, FloatArr
     inner = ground.outline.difference(edges) if settings.edge > 0 else ground.outline
     area = snapped(inner.difference(shapely.union_all([blocked, barriers])))
     area = shapely.MultiPolygon([part for part in polygon_parts(area) if part.area > GRID])
+    if area.is_empty:
+        return area, np.empty((0, 2, 2))
     walls = ground.walls(settings)
     return area, crossings_through(tight_gaps(walls), walls, area, ground.outline)

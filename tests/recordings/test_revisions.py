@@ -115,6 +115,19 @@ def test_a_station_that_only_heard_of_the_later_revision_records_the_whole_run(
     assert np.allclose(static(path, entities.STOPS, "Points2D:positions")[1:], [(3.2, 0.6), (4.8, 1.6)])
 
 
+def test_a_revision_that_was_never_heard_of_is_told_by_the_one_after_it(
+    tmp_path: Path, mission: Mission
+) -> None:
+    path, third = tmp_path / "field.rrd", sealed(msgspec.structs.replace(world.revised(mission), revision=3))
+    with FieldRecording(path, mission) as recording:
+        for report in run.reports_of_two(mission, world.revised(mission), behind="S1"):
+            tell(recording, report)
+        recording.mission(third)
+    rows = check(path).rows
+    assert rows[RUN.flat(entities.SCANNED)] == 3
+    assert RUN.revision(3).flat(entities.NEW_STOPS) in rows
+
+
 def test_what_waits_for_a_revision_that_never_comes_is_kept(tmp_path: Path, mission: Mission) -> None:
     path = tmp_path / "field.rrd"
     told = list(run.reports_of_two(mission, world.revised(mission), behind="S1"))
