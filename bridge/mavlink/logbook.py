@@ -115,9 +115,8 @@ class Logbook:
         boot = self.journal.fact("boot", Boot)
         return boot.boot_id if boot else "unknown"
 
-    def booted(self, boot_ms: int) -> bool:
-        """Told of the vehicle's clock: whether it was started anew since anybody last looked."""
-        began_ns = self.clock.now_ns() - boot_ms * 10**6
+    def booted(self, began_ns: int) -> bool:
+        """Told when the vehicle's clock began: whether it was started anew since anybody last looked."""
         boot = self.journal.fact("boot", Boot)
         if boot is not None and boot.began_ns <= began_ns <= boot.began_ns + REBOOT_NS:
             return False

@@ -38,6 +38,8 @@ class Sight:
     """Stands, by that measurement."""
     scan: ScanResult | ScanFailed | None = None
     """What the scanner told of the stop that is worked on."""
+    stood: Pose | None = None
+    """Where the robot stood at that stop, as the scanner told, or as it was seen there before."""
     in_vain: bool = False
     """No word of the scanner is to be expected any more."""
 
@@ -60,13 +62,22 @@ def steps(run: Run, course: Course, sight: Sight) -> tuple[Change, ...]:
 
 def step(run: Run, course: Course, sight: Sight) -> Change | None:
     """The next thing that has happened, if anything has."""
-    if run.stop_state == "VERIFYING" and run.state == "PAUSED":
-        return _verified(run, course, sight)
+    if run.state == "PAUSED":
+        return _ends_scan(run, course, sight)
     if run.state == "HOMING":
         return runs.ended(run, run.then) if sight.place >= course.end else None
     if run.state != "RUNNING" or run.at >= len(course.visits):
         return None
     return STEPS[run.stop_state](run, course, sight, course.visits[run.at])
+
+
+def _ends_scan(run: Run, course: Course, sight: Sight) -> Change | None:
+    """A vehicle that is paused still ends the scan it was in."""
+    if run.stop_state == "VERIFYING":
+        return _verified(run, course, sight)
+    if run.stop_state == "SCANNING" and isinstance(sight.scan, ScanResult):
+        return runs.scan_ended(run, course.mission, sight.scan)
+    return None
 
 
 def _begun(run: Run, course: Course, sight: Sight, visit: Visit) -> Change | None:
@@ -77,14 +88,17 @@ def _driven(run: Run, course: Course, sight: Sight, visit: Visit) -> Change | No
     """The vehicle says that it is there; is it?"""
     if sight.place <= visit.at:
         return None
-    if sight.place >= visit.after:
-        return _unseen(run, course)
-    if sight.pose is None:
-        return None
+    left = sight.place >= visit.after
+    pose = sight.stood if left else sight.pose
+    if pose is None:
+        reason = "nobody saw where the vehicle stood"
+        return _unconfirmed(run, course, None, reason) if left else None
     stop = course.mission.stops[run.at]
-    away = deviation(sight.pose, stop)
+    away = deviation(pose, stop)
     if away <= stop.tolerance_m:
-        return runs.reached(changed(run, leg=run.at), course.mission, sight.pose, away)
+        return runs.reached(changed(run, leg=run.at), course.mission, pose, away)
+    if left:
+        return runs.failed(_last_try(run, stop), course.mission, _beside(away, stop))
     if sight.still or sight.place >= visit.scan:
         return runs.failed(run, course.mission, _beside(away, stop))
     return None
@@ -112,12 +126,17 @@ def _scanned(run: Run, course: Course, sight: Sight, visit: Visit) -> Change | N
     if isinstance(sight.scan, ScanResult):
         return runs.scan_ended(run, course.mission, sight.scan)
     if isinstance(sight.scan, ScanFailed):
-        gone = sight.place >= visit.after  # it has left: to go back would be a way nobody planned
-        tried = changed(run, attempt=course.mission.stops[run.at].retries) if gone else run
+        left = sight.place >= visit.after
+        tried = _last_try(run, course.mission.stops[run.at]) if left else run
         return runs.scan_ended(tried, course.mission, sight.scan)
     if sight.place < visit.after or not sight.in_vain:
         return None
-    return _unconfirmed(run, course, sight.pose, "the vehicle told nothing of a scan")
+    return _unconfirmed(run, course, sight.stood, "the vehicle told nothing of a scan")
+
+
+def _last_try(run: Run, stop: Stop) -> Run:
+    """From a stop that was left there is no planned way back to it."""
+    return changed(run, attempt=stop.retries)
 
 
 def _scan_over(run: Run, course: Course, sight: Sight, visit: Visit) -> Change | None:
@@ -126,11 +145,8 @@ def _scan_over(run: Run, course: Course, sight: Sight, visit: Visit) -> Change |
 
 
 def _verified(run: Run, course: Course, sight: Sight) -> Change | None:
-    return None if sight.pose is None else runs.verified(run, course.mission, sight.pose)
-
-
-def _unseen(run: Run, course: Course) -> Change:
-    return _unconfirmed(run, course, None, "nobody saw where the vehicle stood")
+    pose = sight.stood or sight.pose
+    return None if pose is None else runs.verified(run, course.mission, pose)
 
 
 def _unconfirmed(run: Run, course: Course, pose: Pose | None, reason: str) -> Change:
@@ -169,27 +185,28 @@ def taken_over(run: Run, course: Course, sight: Sight, *, by: str = SOMEBODY) ->
     going = run.state in ("RUNNING", "HOMING")
     if going and not sight.drives and sight.place < course.end:
         why = "disarmed" if sight.mode == "AUTO" else f"mode {sight.mode}"
-        return halted(run, f"{why}, by {by}")
+        return halted(run, f"{why}, by {by}", stands=sight.mode == "HOLD")
     if run.state in ("PAUSED", "HELD") and sight.drives and sight.place < course.end:
         return resumed(run, by)
     return None
 
 
-def halted(run: Run, reason: str) -> Change:
-    """The run stands; a scan that was under way will be taken again, one that has come in is kept."""
-    keep = run.stop_state if run.stop_state == "VERIFYING" else "WAITING"
+def halted(run: Run, reason: str, *, stands: bool) -> Change:
+    """The run waits; a scan under way goes on if the vehicle stands where it is, else it is taken again."""
+    kept = ("VERIFYING", "SCANNING") if stands else ("VERIFYING",)
+    keep = run.stop_state if run.stop_state in kept else "WAITING"
     homing = run.homing or run.state == "HOMING"
     paused = changed(run, state="PAUSED", stop_state=keep, reason=reason, homing=homing)
     return Change(paused, (partial(Paused, reason=reason),))
 
 
 def resumed(run: Run, by: str) -> Change:
-    keep = run.stop_state if run.stop_state == "VERIFYING" else "WAITING"
+    keep = run.stop_state if run.stop_state in ("VERIFYING", "SCANNING") else "WAITING"
     onward = changed(run, state="HOMING" if run.homing else "RUNNING", stop_state=keep, attempt=0, reason="")
     return Change(onward, (partial(Resumed, commander=by),))
 
 
-def started(run: Run, course: Course, *, run_id: str, now_ns: int, by: str) -> Change:
+def started(run: Run, *, run_id: str, now_ns: int, by: str) -> Change:
     """A new run, begun by whoever switched the vehicle to AUTO."""
     fresh = Run(
         state="RUNNING", mission_id=run.mission_id, revision=run.revision, run_id=run_id, started_ns=now_ns

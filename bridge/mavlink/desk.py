@@ -1,0 +1,269 @@
+"""A MAVLink vehicle that answers as a robot does: in the station's process, on a link in memory.
+
+`Station`, `follow` and `watch` need not know that there is no robot of stopgo at the other end. What the
+vehicle tells moves the run on in the logbook, what the logbook holds is told as a robot tells it. While the
+vehicle is silent, so is the desk.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+
+from bridge import run as runs
+from bridge.clock import Clock, WallClock
+from bridge.link import MemoryLink, Request, Switchboard
+from bridge.mavlink.follower import Follower
+from bridge.mavlink.hands import Hands
+from bridge.mavlink.logbook import Logbook, logbook
+from bridge.mavlink.lookout import TOLD, Lookout
+from bridge.mavlink.modes import modes_of
+from bridge.mavlink.orders import Consent, Orders
+from bridge.mavlink.peer import Peer, found
+from bridge.mavlink.url import Url
+from bridge.mavlink.wire import GROUND_STATION, Box, Who, dialect, wire
+from bridge.pages import address_of, events_page, mission_part, poses_page
+from bridge.protocol import (
+    CHUNK_BYTES,
+    MAX_DOCUMENT_BYTES,
+    VERSION,
+    Command,
+    Info,
+    Keys,
+    Lease,
+    Malformed,
+    Message,
+    count_of,
+    decode,
+    encode,
+)
+from bridge.station import Station, whoami
+from mission import __version__
+from mission.errors import RobotUnreachable
+from mission.events import PoseReport, StateReport
+
+LOST_S = 3.0
+"""A vehicle that has been silent for so long is not answered for."""
+TICK_S = 0.2
+ASK_AGAIN_S = 2.0
+POSES_KEPT = 3000
+COMPONENTS = range(25, 100)
+"""Free for users (MAV_COMP_ID_USER1 to 75): by them a vehicle tells processes of one station apart."""
+POSES = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a vehicle is spoken to."""
+
+    vehicle: int | None = None
+    signing_key: bytes | None = None
+    state: Path | None = None
+    timeout_s: float = 5.0
+    commander: str | None = None
+    consent: Consent = field(default_factory=Consent)
+    looks_only: bool = False
+    """Write nothing down and tell the vehicle nothing."""
+    compares: bool = False
+    """Find out first whether the vehicle still holds what it was sent."""
+
+
+@contextmanager
+def connect(url: Url, options: Options) -> Iterator[Station]:
+    """The vehicle at `url`, as a station sees a robot.
+
+    Raises
+    ------
+    RobotUnreachable
+        If no vehicle is heard, or it does not tell what it does; nothing was sent but questions.
+    InputError
+        If several are heard and none was named, or the logbook's folder cannot be used.
+    """
+    me = Who(GROUND_STATION.system, COMPONENTS[os.getpid() % len(COMPONENTS)])
+    with (
+        wire(url, me=me, signing_key=options.signing_key) as opened,
+        found(opened, options.vehicle, timeout_s=options.timeout_s) as peer,
+        logbook(url, peer.who.system, options.state) as book,
+        desk(peer, book, options) as at,
+    ):
+        at.await_news(options.timeout_s, compares=options.compares)
+        who = options.commander or whoami()
+        yield Station(at.board.link(), at.keys, commander=who, timeout_s=options.timeout_s)
+
+
+@contextmanager
+def desk(peer: Peer, book: Logbook, options: Options) -> Iterator[Desk]:
+    """A desk at work, until the block ends; the vehicle stays as it is."""
+    opened = Desk(peer, book, options)
+    opened.open()
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+class Desk:
+    """Serves a robot's words for one vehicle."""
+
+    def __init__(self, peer: Peer, book: Logbook, options: Options) -> None:
+        self.board = Switchboard()
+        self.keys = Keys(book.robot)
+        self._peer = peer
+        self._book = book
+        self._wall: Clock = WallClock()
+        modes = modes_of(peer)
+        self._lookout = Lookout(modes, book.clock)
+        self._hands = Hands(peer, modes, self._lookout, book.clock)
+        self._orders = Orders(book, peer, self._lookout, self._hands, self._wall, options.consent)
+        self._follower = Follower(book, peer, self._lookout, self._hands, looks_only=options.looks_only)
+        self._link: MemoryLink = self.board.link()
+        self._poses: deque[PoseReport] = deque(maxlen=POSES_KEPT)
+        self._boot_id = ""
+        self._seq = self._pose_seq = 0
+        self._told = book.journal.newest
+        self._closing = threading.Event()
+        self._threads: list[threading.Thread] = []
+
+    def open(self) -> None:
+        """Answer on every key, and begin to look and to tell."""
+        keys, link = self.keys, self._link
+        link.serve(keys.info, lambda request: encode(self._info()))
+        link.serve(keys.log, lambda request: encode(events_page(self._book.journal, request)))
+        link.serve(keys.poses, lambda request: encode(poses_page(self._poses.copy(), self._boot_id, request)))
+        link.serve(keys.mission("*", "part/*"), self._mission)
+        link.serve(keys.command("*"), self._command)
+        self._tell_state = link.publisher(keys.state)
+        self._tell_event = link.publisher(keys.event)
+        self._tell_pose = link.publisher(keys.pose)
+        link.announce(keys.alive)
+        for work in (self._look, self._follower.act):
+            thread = threading.Thread(target=work, name=work.__name__, daemon=True)
+            self._threads.append(thread)
+            thread.start()
+
+    def close(self) -> None:
+        self._closing.set()
+        self._follower.close()
+        for thread in self._threads:
+            thread.join()
+        self._link.close()
+
+    def await_news(self, timeout_s: float, *, compares: bool = False) -> None:
+        """Wait until it is known what the vehicle does; where it stands, as long as that may take.
+
+        Raises
+        ------
+        RobotUnreachable
+            If it does not tell.
+        """
+        with self._hands.news:
+            course = self._book.course
+            self._hands.news.wait_for(lambda: self._lookout.complete(course), timeout_s)
+        if self._lookout.sequence is None and self._book.course is not None:
+            raise RobotUnreachable(
+                f"{self._peer} does not tell which item it works on (MISSION_CURRENT) within {timeout_s:g} s;"
+                " nothing was sent"
+            )
+        if compares:
+            self._follower.compare()
+        if not self._follower.run.over:  # what was missed: the scan that was made last
+            self._peer.ask(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
+        self._follower.looking = True
+        self._follower.look("HEARTBEAT")
+
+    # What it hears, and tells
+
+    def _look(self) -> None:
+        asked_s = -ASK_AGAIN_S
+        with self._peer.box(*TOLD) as box:
+            while not self._closing.is_set():
+                if self._wall.now_ns() / 1e9 - asked_s > ASK_AGAIN_S and not self._lookout.fresh(ASK_AGAIN_S):
+                    asked_s = self._wall.now_ns() / 1e9
+                    self._hands.ask_for_telemetry()
+                self._take_next(box)
+
+    def _take_next(self, box: Box) -> None:
+        message = box.get(TICK_S)
+        self.board.cut = self._peer.silent_s > LOST_S
+        if message is None:
+            return
+        with self._hands.news:
+            name = self._lookout.take(message, self._book.course)
+            self._hands.news.notify_all()
+        before = self._follower.run
+        self._follower.look(name)
+        if name in POSES:
+            self._report_pose()
+        if name == "HEARTBEAT" or self._follower.run != before:
+            self._report()
+
+    def _report(self) -> None:
+        """Every event once, in order, whichever process has written it; then the state."""
+        for event in self._book.journal.events(since=self._told):
+            self._tell_event(encode(event))
+            self._told = event.number
+        self._tell_state(encode(self._state()))
+
+    def _report_pose(self) -> None:
+        fix, run = self._lookout.fix, self._follower.run
+        if fix is None or fix.ns <= (self._poses[-1].robot_ns if self._poses else 0):
+            return
+        if self._boot_id != self._book.boot_id:  # each boot counts its poses anew
+            self._boot_id, self._pose_seq = self._book.boot_id, 0
+            self._poses.clear()
+        self._pose_seq += 1
+        report = PoseReport(
+            robot=self.keys.robot, boot_id=self._boot_id, seq=self._pose_seq, robot_ns=fix.ns,
+            run_id=run.run_id, mission_time_s=(fix.ns - run.started_ns) / 1e9 if run.run_id else None,
+            pose=fix.pose, speed=fix.speed,
+        )  # fmt: skip
+        self._poses.append(report)
+        self._tell_pose(encode(report))
+
+    def _state(self) -> StateReport:
+        self._seq += 1
+        run, course = self._follower.run, self._book.course
+        stop = runs.stop_of(run, None if course is None else course.mission)
+        return StateReport(
+            robot=self.keys.robot, boot_id=self._book.boot_id, seq=self._seq,
+            robot_ns=self._book.clock.now_ns(), state=run.state, run_id=run.run_id,
+            mission_id=run.mission_id, revision=run.revision, stop=stop.id if stop else None,
+            stop_state=run.stop_state if stop else None, done=run.done, skipped=run.skipped,
+            battery=self._lookout.battery, last_event=self._book.journal.newest,
+        )  # fmt: skip
+
+    # What it is asked
+
+    def _info(self) -> Info:
+        return Info(
+            protocol=VERSION, stopgo=__version__, robot=self.keys.robot, boot_id=self._book.boot_id,
+            clock_ns=self._wall.now_ns(), state=self._state(), lease=self._book.journal.fact("lease", Lease),
+            chunk_bytes=CHUNK_BYTES, document_bytes=MAX_DOCUMENT_BYTES, profiles=None, to_map=None,
+        )  # fmt: skip
+
+    def _mission(self, request: Request) -> bytes:
+        mission_id, step = address_of(request.key)
+        try:
+            number, revision = count_of(step[1]), count_of(request.parameters.get("revision", ""))
+        except ValueError as error:
+            return encode(Malformed(message=f"part: {error}"))
+        return encode(mission_part(self._book.journal, mission_id, number, revision))
+
+    def _command(self, request: Request) -> bytes:
+        return encode(self._obey(request))
+
+    def _obey(self, request: Request) -> Message:
+        try:
+            command = decode(request.payload, Command)
+        except msgspec.DecodeError as error:
+            return Malformed(message=f"Command: {error}")
+        answer = self._orders.obey(command)
+        self._follower.run = self._book.run
+        return answer

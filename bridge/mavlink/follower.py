@@ -1,0 +1,204 @@
+"""Follows a vehicle's run: what is seen is written down, and the vehicle told what follows from it."""
+
+from __future__ import annotations
+
+import threading
+import uuid
+from functools import partial
+
+from bridge import run as runs
+from bridge.mavlink import progress
+from bridge.mavlink.download import download
+from bridge.mavlink.hands import Denied, Hands
+from bridge.mavlink.logbook import Logbook, Ordered, Owed
+from bridge.mavlink.lookout import Lookout
+from bridge.mavlink.modes import AUTO
+from bridge.mavlink.peer import Peer
+from bridge.mavlink.progress import SOMEBODY, Sight, steps, tried_again
+from bridge.mavlink.visits import Course
+from bridge.run import Change, Run
+from mission.errors import OutcomeUnknown, RobotUnreachable
+from mission.events import Arrived
+from mission.mavlink.autopilots import differences
+
+SETTLED_NS = 1_500_000_000
+"""A heartbeat this soon after a change may have been sent before it."""
+REMEMBERED_NS = 60 * 10**9
+"""An order whose outcome was unknown is taken to be the cause of what the vehicle does so much later."""
+AGAIN_S = 1.0
+AT_STOP = ("SETTLING", "SCANNING", "VERIFYING")
+
+
+class Follower:
+    """Looks at each message with what is known by then; `act` tells the vehicle what is owed to it.
+
+    One that only looks keeps to itself what it sees, and tells the vehicle nothing.
+    """
+
+    def __init__(
+        self, book: Logbook, peer: Peer, lookout: Lookout, hands: Hands, *, looks_only: bool = False
+    ) -> None:
+        self._book = book
+        self._peer = peer
+        self._lookout = lookout
+        self._hands = hands
+        self._looks_only = looks_only
+        self._closing = threading.Event()
+        self._due = threading.Event()
+        self._differs: str | None = None
+        """How the vehicle's mission differs from what it was sent; `None` while nobody has compared them."""
+        self.looking = False
+        """Nothing is made of what comes in before all is known that can be asked for."""
+        self.run = book.run
+        """As it is by now."""
+
+    def close(self) -> None:
+        self._closing.set()
+        self._due.set()
+
+    def look(self, name: str) -> None:
+        """A message of this name has come."""
+        self.run = self._book.run
+        course = self._book.course
+        if not self.looking:
+            return
+        if name == "HEARTBEAT":
+            self._look_at_clock()
+        if course is None or self.run.state == "IDLE" or self._busy():
+            return
+        sight = self._lookout.sight(self.run, course, self._arrived(course))
+        if sight is None:
+            return
+        if self._looks_only:
+            happened = self._happened(self.run, course, sight)
+            self.run = happened[-1].run if happened else self.run
+            return
+        self.run = self._book.move(
+            lambda run: self._happened(run, course, sight), partial(self._owing, course)
+        )
+        self._lead_past(course, sight)
+
+    def _busy(self) -> bool:
+        """Whether the vehicle is being told something: what it does until then is neither here nor there."""
+        ordered, owed = self._book.ordered, self._book.owed
+        if owed is not None:
+            self._due.set()
+        return owed is not None or (ordered is not None and ordered.until_ns > self._book.clock.now_ns())
+
+    def _look_at_clock(self) -> None:
+        """A vehicle that was started anew stands, and has forgotten its mode, origin and item."""
+        began_ns = self._lookout.began_ns
+        if self._looks_only or began_ns is None or not self._book.booted(began_ns):
+            return
+        self._hands.ask_for_telemetry()
+        self.run = self._book.move(_rebooted)
+
+    def _happened(self, run: Run, course: Course, sight: Sight) -> tuple[Change, ...]:
+        """The steps of the run, or what others have done to it."""
+        told = steps(run, course, sight)
+        now = told[-1].run if told else run
+        if told and (now.over or tried_again(run, now) or now.state == "HELD"):
+            return told
+        if self._lookout.mode_ns < self._book.changed_ns + SETTLED_NS:
+            return told
+        other = (
+            self._strange_list(now, course)
+            or self._begun_elsewhere(now, course, sight)
+            or progress.taken_over(now, course, sight, by=self._by(sight))
+        )
+        return told if other is None else (*told, other)
+
+    def _strange_list(self, run: Run, course: Course) -> Change | None:
+        """Held, if the vehicle holds something else than it was sent."""
+        if run.over or run.state == "HELD":
+            return None
+        items, why = self._lookout.items, self._differs
+        if items is not None and items != course.end:
+            why = f"it holds {items} items, {course.end} were sent"
+        return runs.held(run, f"somebody has changed the vehicle's mission: {why}") if why else None
+
+    def _begun_elsewhere(self, run: Run, course: Course, sight: Sight) -> Change | None:
+        """A run that began without an answer here: the vehicle drives what it was sent."""
+        by = self._by(sight)
+        ours = by != SOMEBODY or self._differs == ""
+        if run.state != "READY" or not sight.drives or sight.place >= course.end or not ours:
+            return None
+        now_ns = self._book.clock.now_ns()
+        return progress.started(run, run_id=uuid.uuid4().hex[:12], now_ns=now_ns, by=by)
+
+    def _by(self, sight: Sight) -> str:
+        """Who has changed the mode: whoever gave an order to that effect whose outcome was unknown."""
+        ordered = self._book.ordered
+        if ordered is None or not self._recent(ordered) or ordered.mode != sight.mode:
+            return SOMEBODY
+        return ordered.by
+
+    def _recent(self, ordered: Ordered) -> bool:
+        return self._book.clock.now_ns() < ordered.until_ns + REMEMBERED_NS
+
+    def _arrived(self, course: Course) -> Arrived | None:
+        """That the robot was seen at the stop that is worked on: scans told before are of other times."""
+        run = self.run
+        if run.at >= len(course.visits) or run.stop_state not in AT_STOP:
+            return None
+        event = self._book.journal.last_event(run.run_id or "", "Arrived")
+        own = isinstance(event, Arrived) and event.stop == course.visits[run.at].stop
+        return event if own and isinstance(event, Arrived) else None
+
+    # What the vehicle is told
+
+    def _owing(self, course: Course, before: Run, after: Run) -> Owed | None:
+        """What a step of the run wants of the vehicle; of a run that somebody else has halted, nothing."""
+        since_ns = self._book.clock.now_ns()
+        if tried_again(before, after):
+            return Owed(deed="jump", place=course.visits[after.at].at, since_ns=since_ns)
+        stops = before.state == "RUNNING" and after.state in ("HELD", "ABORTED")
+        if stops and self._lookout.mode == AUTO and self._strange_list(before, course) is None:
+            return Owed(deed="hold", place=0, since_ns=since_ns)
+        return None
+
+    def _lead_past(self, course: Course, sight: Sight) -> None:
+        """A vehicle that waits at a stop that was left out goes on at once."""
+        if self.run.state != "RUNNING" or not sight.drives:
+            return
+        place = progress.passed_by(self.run, course, sight)
+        if place is not None:
+            owed = Owed(deed="jump", place=place, since_ns=self._book.clock.now_ns())
+            self._book.journal.store_fact("owed", owed)
+            self._due.set()
+
+    def act(self) -> None:
+        """Tell the vehicle what is owed to it, until closed."""
+        while not self._closing.is_set():
+            self._due.wait()
+            self._due.clear()
+            owed, course = self._book.owed, self._book.course
+            if owed is None or course is None or self._looks_only or self._closing.is_set():
+                continue
+            try:
+                self._pay(owed, course)
+            except (OutcomeUnknown, RobotUnreachable):
+                self._closing.wait(AGAIN_S)  # the lookout asks for it again as long as it is owed
+
+    def _pay(self, owed: Owed, course: Course) -> None:
+        try:
+            if owed.deed == "hold":
+                self._hands.hold()
+            else:
+                self._hands.jump(course.sequence(owed.place))
+        except Denied as denied:
+            reason = denied.refused.message
+            self._book.move(lambda run: () if run.state != "RUNNING" else (runs.held(run, reason),))
+        self._book.paid(owed)
+
+    def compare(self) -> None:
+        """Find out whether the vehicle holds what it was sent, item by item."""
+        course = self._book.course
+        if course is not None:
+            self._differs = next(iter(differences(course.sent, download(self._peer))), "")
+
+
+def _rebooted(run: Run) -> tuple[Change, ...]:
+    if run.over:
+        return ()
+    return (runs.rebooted(run),)

@@ -1,0 +1,110 @@
+"""What a vehicle can be told to do, each done only when the vehicle shows that it does it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from bridge.clock import Clock
+from bridge.commands import Refused
+from bridge.mavlink.lookout import Lookout
+from bridge.mavlink.modes import AUTO, HOLD, Modes
+from bridge.mavlink.peer import Peer
+from bridge.mavlink.wire import dialect
+from mission.errors import OutcomeUnknown
+
+SHOWS_S = 5.0
+"""A vehicle beats every second; so long it may take until it shows what it was told."""
+REPEATED_HZ = {
+    dialect.MAVLINK_MSG_ID_MISSION_CURRENT: 5.0,
+    dialect.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: 2.0,
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 10.0,
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 2.0,
+    dialect.MAVLINK_MSG_ID_ATTITUDE: 10.0,
+    dialect.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+    dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: 0.5,
+}
+"""How often each message is wanted; what is lost is told again."""
+
+
+class Denied(Exception):
+    """The vehicle, or what is known of it, says no; nothing has changed."""
+
+    def __init__(self, refused: Refused) -> None:
+        super().__init__(refused.message)
+        self.refused = refused
+
+
+class Hands:
+    """Orders to one vehicle, by its commands; whether it obeys, the lookout sees.
+
+    `news` is notified whenever the lookout has taken a message.
+    """
+
+    def __init__(self, peer: Peer, modes: Modes, lookout: Lookout, clock: Clock) -> None:
+        self.news = threading.Condition()
+        self._peer = peer
+        self._modes = modes
+        self._lookout = lookout
+        self._clock = clock
+
+    def ask_for_telemetry(self) -> None:
+        """Ask to be told everything often, without waiting for answers: some vehicles know no intervals."""
+        who = self._peer.who
+        for number, per_s in REPEATED_HZ.items():
+            message = dialect.MAVLink_command_long_message(
+                who.system, who.component, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, 0,
+                number, 1e6 / per_s, 0, 0, 0, 0, 0,
+            )  # fmt: skip
+            self._peer.send(message)
+
+    def hold(self) -> None:
+        """Let it stand where it is."""
+        self._mode(HOLD)
+
+    def auto(self) -> None:
+        """Let it follow its mission."""
+        self._mode(AUTO)
+
+    def jump(self, sequence: int) -> None:
+        """Make an item the one it works on; a command that is no NAV command is passed at once."""
+        asked_ns = self._clock.now_ns()
+        self._order(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, float(sequence), 0.0, what=f"item {sequence}")
+        near = range(sequence, sequence + 3)
+        self._shown(
+            lambda: self._lookout.current_ns > asked_ns and self._lookout.sequence in near,
+            f"going to item {sequence}",
+        )
+
+    def arm(self, armed: bool = True) -> None:
+        """Arm it, or disarm it."""
+        what = "arming" if armed else "disarming"
+        self._order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, float(armed), what=what)
+        self._shown(lambda: self._lookout.armed == armed, what)
+
+    def speed(self, metres_per_s: float) -> bool:
+        """Set the speed that the mission's first item sets; false if the vehicle does not take it."""
+        number = dialect.MAV_CMD_DO_CHANGE_SPEED
+        return self._peer.command(number, 1.0, metres_per_s, -1.0).accepted
+
+    def _mode(self, name: str) -> None:
+        asked_ns = self._clock.now_ns()
+        self._order(dialect.MAV_CMD_DO_SET_MODE, *self._modes.params(name), what=f"mode {name}")
+        self._shown(
+            lambda: self._lookout.mode == name and self._lookout.mode_ns > asked_ns, f"changing to {name}"
+        )
+
+    def _order(self, number: int, *params: float, what: str) -> None:
+        ack = self._peer.command(number, *params)
+        if not ack.accepted:
+            text = self._peer.newest("STATUSTEXT")
+            said = f', and last said "{text.text}"' if text is not None else ""
+            raise Denied(Refused("denied", f"the vehicle answered {ack.name} to {what}{said}"))
+
+    def _shown(self, seen: Callable[[], bool], what: str) -> None:
+        with self.news:
+            if not self.news.wait_for(seen, SHOWS_S):
+                raise OutcomeUnknown(
+                    f"{self._peer}: {what} was accepted and does not show in what it tells;"
+                    " see stopgo status, and the vehicle"
+                )

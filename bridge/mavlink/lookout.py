@@ -1,0 +1,235 @@
+"""What a vehicle tells, gathered into what is known of it at each moment."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bridge.clock import Clock
+from bridge.mavlink.captures import Capture, capture_of
+from bridge.mavlink.local import LocalFrame, local_frame
+from bridge.mavlink.modes import Modes
+from bridge.mavlink.peer import Origin
+from bridge.mavlink.progress import Sight
+from bridge.mavlink.visits import Course
+from bridge.mavlink.wire import Message, dialect
+from bridge.run import Run
+from mission.events import Arrived, Pose
+from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic, heading_of
+from mission.mavlink.autopilots import autopilot_named
+
+STILL_M_PER_S = 0.05
+"""An estimator's speed of a robot that stands is not zero."""
+GRACE_NS = 2 * 10**9
+"""How long after the end of a scan's wait its confirmation may come."""
+CAPTURES_KEPT = 100
+EARLY_NS = 5 * 10**9
+TOLD = (
+    "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT",
+    "ATTITUDE", "SYS_STATUS", "BATTERY_STATUS", "CAMERA_IMAGE_CAPTURED", "GPS_GLOBAL_ORIGIN", "SYSTEM_TIME",
+)  # fmt: skip
+"""Messages that are looked at."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Something that was told, and when that came (station's clock)."""
+
+    message: Message
+    ns: int
+
+
+@dataclass(frozen=True)
+class Fix:
+    """Where the robot stood, by one message."""
+
+    pose: Pose
+    speed: float
+    ns: int
+
+
+class Lookout:
+    """Takes messages one after another; asked, it says what they come to."""
+
+    def __init__(self, modes: Modes, clock: Clock) -> None:
+        self._modes = modes
+        self._clock = clock
+        self._newest: dict[str, Seen] = {}
+        self._captures: deque[Capture] = deque(maxlen=CAPTURES_KEPT)
+        self._frame: tuple[Course, Origin, LocalFrame] | None = None
+        self._work: tuple[int, bool] | None = None
+        """Sequence number that is worked on, and whether all is done."""
+        self._work_ns = 0
+        """Since when."""
+        self.fix: Fix | None = None
+        self.battery = 1.0
+        """0 to 1, as last told."""
+
+    def take(self, message: Message, course: Course | None) -> str:
+        """Remember what a message tells; its name."""
+        name, now_ns = str(message.get_type()), self._clock.now_ns()
+        self._newest[name] = Seen(message, now_ns)
+        taking = TAKING.get(name)
+        if taking is not None:
+            taking(self, message, course, now_ns)
+        return name
+
+    @property
+    def began_ns(self) -> int | None:
+        """When the vehicle was started, by the newest message that tells its time."""
+        told = [self._newest[name] for name in CLOCKS if name in self._newest]
+        newest = max(told, key=lambda seen: seen.ns, default=None)
+        return None if newest is None else newest.ns - int(newest.message.time_boot_ms) * 10**6
+
+    def fresh(self, within_s: float) -> bool:
+        """Whether what is wanted most comes in often enough."""
+        oldest_ns = self._clock.now_ns() - round(within_s * 1e9)
+        seen = [self._newest.get(name) for name in WANTED]
+        return all(one is not None and one.ns > oldest_ns for one in seen)
+
+    def complete(self, course: Course | None) -> bool:
+        """Whether enough is known to say what the vehicle does, and where on the course."""
+        told = {"HEARTBEAT", "MISSION_CURRENT"} <= self._newest.keys()
+        return told and (course is None or self.fix is not None)
+
+    @property
+    def mode(self) -> str:
+        """AUTO, HOLD or another; empty before a heartbeat."""
+        seen = self._newest.get("HEARTBEAT")
+        return "" if seen is None else self._modes.name(seen.message)
+
+    @property
+    def mode_ns(self) -> int:
+        """When the mode was last told."""
+        seen = self._newest.get("HEARTBEAT")
+        return 0 if seen is None else seen.ns
+
+    @property
+    def armed(self) -> bool:
+        seen = self._newest.get("HEARTBEAT")
+        return seen is not None and bool(seen.message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+
+    @property
+    def sequence(self) -> int | None:
+        """Number of the item that is worked on."""
+        return None if self._work is None else self._work[0]
+
+    @property
+    def current_ns(self) -> int:
+        """When the item that is worked on was last told."""
+        seen = self._newest.get("MISSION_CURRENT")
+        return 0 if seen is None else seen.ns
+
+    @property
+    def items(self) -> int | None:
+        """How many items the vehicle says it holds, without home; `None` if it does not say."""
+        seen = self._newest.get("MISSION_CURRENT")
+        told = 0 if seen is None else seen.message.total
+        return told if 0 < told < UNKNOWN_TOTAL else None
+
+    def sight(self, run: Run, course: Course, arrived: Arrived | None = None) -> Sight | None:
+        """What is seen of the vehicle, if enough is known; `arrived` tells that it was seen at its stop."""
+        if self._work is None or "HEARTBEAT" not in self._newest:
+            return None
+        place, began_ns = self.place(course), self._work_ns
+        fix = self.fix if self.fix is not None and self.fix.ns > began_ns else None
+        capture = self._capture(run, course, run.started_ns if arrived is None else arrived.robot_ns)
+        stood = capture.pose if capture is not None else None
+        return Sight(
+            mode=self.mode, armed=self.armed, place=place,
+            pose=None if fix is None else fix.pose,
+            still=fix is not None and fix.speed < STILL_M_PER_S,
+            scan=None if capture is None else capture.result,
+            stood=arrived.pose if arrived is not None else stood,
+            in_vain=self._clock.now_ns() > began_ns + GRACE_NS,
+        )  # fmt: skip
+
+    def place(self, course: Course) -> int:
+        """Place in the list of what the vehicle works on; its length once all is done."""
+        current = self._newest["MISSION_CURRENT"].message
+        if current.mission_state == dialect.MISSION_STATE_COMPLETE:
+            return course.end
+        reached = self._newest.get("MISSION_ITEM_REACHED")
+        last = course.sequence(course.end - 1)
+        through = reached is not None and reached.message.seq == last == current.seq
+        if through and current.mission_state == dialect.MISSION_STATE_UNKNOWN:
+            return course.end
+        return course.place(current.seq)
+
+    def _capture(self, run: Run, course: Course, since_ns: int) -> Capture | None:
+        """What was told last of a scan at the stop that is worked on."""
+        if run.at >= len(course.mission.stops):
+            return None
+        stop = course.mission.stops[run.at]
+        own = [capture for capture in self._captures if capture.ns > since_ns and capture.at(stop)]
+        return own[-1] if own else None
+
+    def _take_current(self, message: Message, course: Course | None, now_ns: int) -> None:
+        work = (message.seq, message.mission_state == dialect.MISSION_STATE_COMPLETE)
+        if self._work != work:
+            self._work, self._work_ns = work, now_ns
+
+    def _take_origin(self, message: Message, course: Course | None, now_ns: int) -> None:
+        self._frame = None
+
+    def _take_local(self, message: Message, course: Course | None, now_ns: int) -> None:
+        attitude, frame = self._newest.get("ATTITUDE"), self._local_frame(course)
+        if attitude is not None and frame is not None:
+            pose = frame.pose(message.x, message.y, attitude.message.yaw)
+            self.fix = Fix(pose, math.hypot(message.vx, message.vy), now_ns)
+
+    def _take_global(self, message: Message, course: Course | None, now_ns: int) -> None:
+        """Steps of 1e-7 degrees are centimetres: taken only of a vehicle that tells no local metres."""
+        attitude = self._newest.get("ATTITUDE")
+        if course is None or attitude is None or (message.lat, message.lon) == (0, 0):
+            return
+        if "LOCAL_POSITION_NED" in self._newest and self._local_frame(course) is not None:
+            return
+        site, rule = course.sent.origin, autopilot_named(course.sent.autopilot).rule
+        place = Geodetic(lat=message.lat / STEPS_PER_DEGREE, lon=message.lon / STEPS_PER_DEGREE)
+        x, y = from_geodetic(site, place, rule)
+        heading = heading_of(site, math.degrees(attitude.message.yaw))
+        speed = math.hypot(message.vx, message.vy) / 100
+        self.fix = Fix(Pose(x=x, y=y, heading=heading), speed, now_ns)
+
+    def _take_battery(self, message: Message, course: Course | None, now_ns: int) -> None:
+        if 0 <= message.battery_remaining <= 100:
+            self.battery = message.battery_remaining / 100
+
+    def _take_capture(self, message: Message, course: Course | None, now_ns: int) -> None:
+        since_boot_ns = now_ns - (self.began_ns or now_ns)
+        ago_ns = since_boot_ns - message.time_boot_ms * 10**6
+        if ago_ns < -EARLY_NS:  # of a boot before
+            return
+        capture = capture_of(message, course, now_ns - max(0, ago_ns))
+        if all(capture.name != known.name for known in self._captures):
+            self._captures.append(capture)
+
+    def _local_frame(self, course: Course | None) -> LocalFrame | None:
+        """The vehicle's local metres in the site; `None` before its origin is known."""
+        told = self._newest.get("GPS_GLOBAL_ORIGIN")
+        if course is None or told is None:
+            return None
+        steps, message = STEPS_PER_DEGREE, told.message
+        origin = Origin(message.latitude / steps, message.longitude / steps, message.altitude / 1000)
+        if self._frame is None or self._frame[:2] != (course, origin):
+            rule = autopilot_named(course.sent.autopilot).rule
+            self._frame = (course, origin, local_frame(course.sent.origin, origin, rule))
+        return self._frame[2]
+
+
+UNKNOWN_TOTAL = 65_535
+WANTED = ("MISSION_CURRENT", "LOCAL_POSITION_NED", "ATTITUDE")
+CLOCKS = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "ATTITUDE", "SYSTEM_TIME")
+"""Messages with the vehicle's time since it was started."""
+TAKING: dict[str, Callable[[Lookout, Message, Course | None, int], None]] = {
+    "MISSION_CURRENT": Lookout._take_current,
+    "GPS_GLOBAL_ORIGIN": Lookout._take_origin,
+    "LOCAL_POSITION_NED": Lookout._take_local,
+    "GLOBAL_POSITION_INT": Lookout._take_global,
+    "SYS_STATUS": Lookout._take_battery,
+    "BATTERY_STATUS": Lookout._take_battery,
+    "CAMERA_IMAGE_CAPTURED": Lookout._take_capture,
+}

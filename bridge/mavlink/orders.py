@@ -1,0 +1,288 @@
+"""What becomes of an order to a vehicle: decided as a robot decides, done by its autopilot, and then stored.
+
+The journal never says what the vehicle has not shown. While an order is carried out the journal says so, and
+whoever watches does not take for somebody else's what the vehicle does meanwhile.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import uuid
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from bridge import run as runs
+from bridge.clock import Clock
+from bridge.commands import Decision, Refused, Situation, decide
+from bridge.lease import FREE_VERBS
+from bridge.mavlink import progress
+from bridge.mavlink.download import download
+from bridge.mavlink.hands import Denied, Hands
+from bridge.mavlink.local import apart
+from bridge.mavlink.logbook import Logbook, Ordered
+from bridge.mavlink.lookout import Lookout
+from bridge.mavlink.modes import AUTO, HOLD, why_unfit
+from bridge.mavlink.onward import ON_WAY_M, onward, way
+from bridge.mavlink.peer import Peer
+from bridge.mavlink.progress import Sight
+from bridge.mavlink.visits import Course
+from bridge.protocol import Answer, Command, Lease, Reason, encode
+from bridge.run import Change, Run
+from mission.document import Mission
+from mission.events import Pose
+from mission.mavlink.autopilots import autopilot_named, differences
+
+ORDERING_NS = 20 * 10**9
+"""An order takes no longer; then what the vehicle does counts as somebody else's again."""
+NOWHERE = Pose(x=math.inf, y=math.inf, heading=0.0)
+HOMEWARD = (
+    "an autopilot in AUTO drives its list forward only, and nobody planned a way back from here; the"
+    " return of a mission is driven at its end. Run by stopgo robot --controller mavlink:URL it can"
+)
+
+
+@dataclass(frozen=True)
+class Consent:
+    """What the order may do to the motors; never done unasked."""
+
+    arm: bool = False
+    disarm: bool = False
+
+
+class Orders:
+    """Carries out orders to one vehicle."""
+
+    def __init__(
+        self, book: Logbook, peer: Peer, lookout: Lookout, hands: Hands, wall: Clock, consent: Consent
+    ) -> None:
+        self._book = book
+        self._peer = peer
+        self._lookout = lookout
+        self._hands = hands
+        self._wall = wall
+        self._consent = consent
+
+    def obey(self, command: Command) -> Answer:
+        """Carry out an order once, and remember what was answered.
+
+        Raises
+        ------
+        OutcomeUnknown
+            If the vehicle was told and does not show what it does; nothing is stored then.
+        """
+        before = self._book.journal.answer(command.cmd_id)
+        if before is not None:
+            return before[1]
+        decision = self._in_the_way(command) or self._decided(command)
+        if isinstance(decision, Refused):
+            return self._stored(command, decision, None)
+        course = self._book.course
+        assert course is not None  # without a mission nothing is decided
+        with self._ordering(command):
+            try:
+                change = VERBS[command.verb](self, command, course, decision)
+            except Denied as denied:
+                return self._stored(command, denied.refused, None)
+            return self._stored(command, change, decision.lease)
+
+    def _in_the_way(self, command: Command) -> Refused | None:
+        """Only one order at a time, but for those that stop."""
+        other = self._book.ordered
+        if other is None or command.verb in FREE_VERBS or other.until_ns <= self._book.clock.now_ns():
+            return None
+        return Refused("wrong_state", f"{other.verb} by {other.by} is being carried out; wait for its end")
+
+    def _decided(self, command: Command) -> Decision | Refused:
+        course, run = self._book.course, self._book.run
+        here = self._lookout.fix.pose if self._lookout.fix is not None else None
+        mission = None if course is None else course.mission
+        if here is None and mission is not None and command.verb not in FREE_VERBS:
+            return Refused("no_position", "the vehicle does not tell where it is; has it a position at all?")
+        if here is not None and course is not None and command.verb != "start":
+            here = on_way(run, course, here)
+        return decide(command, self._situation(run, mission, here or NOWHERE))
+
+    def _situation(self, run: Run, mission: Mission | None, pose: Pose) -> Situation:
+        journal = self._book.journal
+        return Situation(
+            run=run, mission=mission,
+            has_run=mission is not None and journal.has_run(mission.id, mission.revision),
+            pose=pose, now_ns=self._book.clock.now_ns(), command_ns=self._wall.now_ns(),
+            new_run_id=uuid.uuid4().hex[:12], lease=journal.fact("lease", Lease),
+            battery=self._lookout.battery, endurance_s=None,
+        )  # fmt: skip
+
+    # What each verb does
+
+    def _start(self, command: Command, course: Course, decision: Decision) -> Change:
+        run = decision.change.run
+        sight = self._sight(run, course)
+        self._ready(course)
+        first = 0 if run.at == 0 else onward(run, course, replace(sight, place=-1), self._here())
+        self._go(course, first, None)
+        return decision.change
+
+    def _resume(self, command: Command, course: Course, decision: Decision) -> Change:
+        run = self._book.run
+        sight = self._sight(run, course)
+        self._ready(course)
+        lost = run.stop_state == "SCANNING" and not self._keeps_scan(run, course, sight)
+        run = runs.changed(run, stop_state="WAITING") if lost else run
+        self._go(course, onward(run, course, sight, self._here()), sight)
+        return progress.resumed(run, command.commander)
+
+    def _keeps_scan(self, run: Run, course: Course, sight: Sight) -> bool:
+        visit = course.visits[run.at]
+        return visit.at < sight.place < visit.after
+
+    def _retry(self, command: Command, course: Course, decision: Decision) -> Change:
+        """Once more to the stop; the vehicle stands on the way to it, or beside it."""
+        run = runs.changed(self._book.run, stop_state="WAITING", approaches=0)
+        sight = self._sight(run, course)
+        self._ready(course)
+        self._go(course, onward(run, course, sight, self._here()), sight)
+        return progress.resumed(run, command.commander)
+
+    def _pause(self, command: Command, course: Course, decision: Decision) -> Change:
+        self._hands.hold()
+        return progress.halted(self._book.run, f"pause by {command.commander}", stands=True)
+
+    def _skip(self, command: Command, course: Course, decision: Decision) -> Change:
+        """The way to the stop is still driven; the vehicle is led past its waits once it is there."""
+        before, after = self._book.run, decision.change.run
+        sight = self._sight(after, course)
+        beyond = progress.passed_by(after, course, sight)
+        if before.state == "HELD":
+            self._ready(course)
+            self._go(course, onward(after, course, sight, self._here()), sight)
+        elif before.state == "RUNNING" and beyond is not None:
+            self._hands.jump(course.sequence(beyond))
+        return decision.change
+
+    def _abort(self, command: Command, course: Course, decision: Decision) -> Change:
+        self._hands.hold()
+        if self._consent.disarm:
+            self._hands.arm(False)
+        return decision.change
+
+    def _home(self, command: Command, course: Course, decision: Decision) -> Change:
+        raise Denied(Refused("unsupported", HOMEWARD))
+
+    # What several of them need
+
+    def _sight(self, run: Run, course: Course) -> Sight:
+        sight = self._lookout.sight(run, course)
+        if sight is None:
+            raise Denied(Refused("no_position", "the vehicle does not tell which item it works on"))
+        return sight
+
+    def _here(self) -> Pose:
+        return NOWHERE if self._lookout.fix is None else self._lookout.fix.pose
+
+    def _ready(self, course: Course) -> None:
+        """Whether the vehicle may drive this mission: it holds it, counts from its origin, and is armed."""
+        unfit = why_unfit(self._peer)
+        if unfit:
+            raise Denied(Refused("unsupported", unfit))
+        self._check_origin(course)
+        self._check_mission(course)
+        if not self._lookout.armed:
+            if not self._consent.arm:
+                raise Denied(Refused("not_armed", "the vehicle is disarmed; arm it, or add --arm"))
+            self._hands.arm()
+
+    def _check_origin(self, course: Course) -> None:
+        origin, sent = self._peer.origin(), course.sent
+        if origin is None:
+            wrong = "the vehicle has no origin (GPS_GLOBAL_ORIGIN): its metres count from nowhere; set it"
+        else:
+            wrong = apart(sent.origin, origin, autopilot_named(sent.autopilot).rule)
+        if wrong:
+            raise Denied(Refused("wrong_origin", wrong))
+
+    def _check_mission(self, course: Course) -> None:
+        found = differences(course.sent, download(self._peer))
+        if found:
+            more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+            raise Denied(
+                Refused("mission_differs", f"not what was pushed: {found[0]}{more}; push the mission again")
+            )
+
+    def _go(self, course: Course, place: int, sight: Sight | None) -> None:
+        """AUTO, from an item on; where it lets the first ones out, at the speed that they would set."""
+        if sight is None or place != sight.place or sight.place >= course.end:
+            self._hands.jump(course.sequence(place))
+        self._hands.auto()
+        if place > 0 and course.speed is not None:
+            self._hands.speed(course.speed)
+
+    # Storing
+
+    def _ordering(self, command: Command) -> _Ordering:
+        mode = HOLD if command.verb in FREE_VERBS else AUTO
+        until_ns = self._book.clock.now_ns() + ORDERING_NS
+        return _Ordering(
+            self._book, Ordered(verb=command.verb, by=command.commander, mode=mode, until_ns=until_ns)
+        )
+
+    def _stored(self, command: Command, outcome: Change | Refused, lease: Lease | None) -> Answer:
+        """The answer, stored together with what the order has changed."""
+        order = hashlib.sha256(encode(command)).hexdigest()
+        journal = self._book.journal
+        with journal.transaction():
+            if isinstance(outcome, Change):
+                self._book.move(lambda run: (outcome,) if run != outcome.run else ())
+                journal.forget_fact("owed")
+            if lease is not None:
+                journal.store_fact("lease", lease)
+            answer = _answer(command, outcome, self._book.run)
+            journal.store_answer(order, answer)
+        return answer
+
+
+class _Ordering:
+    """Shows in the journal that an order is being carried out; its end is shown by whoever ends it."""
+
+    def __init__(self, book: Logbook, ordered: Ordered) -> None:
+        self._book = book
+        self._ordered = ordered
+
+    def __enter__(self) -> None:
+        self._book.journal.store_fact("ordered", self._ordered)
+
+    def __exit__(self, *exception: object) -> None:
+        now_ns = self._book.clock.now_ns()
+        ended = Ordered(
+            verb=self._ordered.verb, by=self._ordered.by, mode=self._ordered.mode, until_ns=now_ns
+        )
+        self._book.journal.store_fact("ordered", ended)
+
+
+VERBS: dict[str, Callable[[Orders, Command, Course, Decision], Change]] = {
+    "start": Orders._start,
+    "pause": Orders._pause,
+    "resume": Orders._resume,
+    "skip": Orders._skip,
+    "retry": Orders._retry,
+    "abort": Orders._abort,
+    "home": Orders._home,
+}
+
+
+def _answer(command: Command, outcome: Change | Refused, run: Run) -> Answer:
+    refused = outcome if isinstance(outcome, Refused) else None
+    reason: Reason | None = refused.reason if refused else None
+    return Answer(
+        cmd_id=command.cmd_id, verb=command.verb, outcome="refused" if refused else "ok", reason=reason,
+        message=refused.message if refused else "", run_id=run.run_id, state=run.state,
+    )  # fmt: skip
+
+
+def on_way(run: Run, course: Course, pose: Pose) -> Pose:
+    """The pose, or the nearest point of the way if that is so near that the vehicle is on it."""
+    near = min(way(run, course), key=lambda piece: piece.away(pose), default=None)
+    if near is None or near.away(pose) > ON_WAY_M:
+        return pose
+    x, y = near.foot(pose)
+    return Pose(x=x, y=y, heading=pose.heading)

@@ -1,0 +1,127 @@
+"""A small site: three stops round a corner, a simulated vehicle that holds their mission, and its logbook."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from bridge.mavlink.desk import Options, connect
+from bridge.mavlink.logbook import Logbook, logbook, remember
+from bridge.mavlink.orders import Consent
+from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
+from bridge.mavlink.simulated.process import vehicle_on
+from bridge.mavlink.simulated.profile import PROFILES
+from bridge.mavlink.simulated.store import Store
+from bridge.mavlink.simulated.vehicle import Setting
+from bridge.mavlink.url import Url
+from bridge.run import Run
+from bridge.station import Station
+from mission.document import Mission, Scan, SiteOrigin, Stop
+from mission.events import AnyEvent, Pose
+from mission.mavlink.autopilots import autopilot_named, upload_of
+from mission.mavlink.items import ItemList
+from mission.mavlink.translate import translate
+from tests.bridge.mavlink.scripted import free_udp_port
+from tests.mission.worlds import mission_of, stop
+
+SPEED_UP = 5.0
+KINDS = {"strict": "generic", "ardupilot": "ardupilot", "px4": "px4"}
+"""The autopilot of each profile of the simulated vehicle."""
+
+
+def tour(**details: Any) -> Mission:
+    """Stops 2 m ahead, 2 m further and 2 m to the left by way of a corner, and 2 m back."""
+    made = (
+        stop("S1", (0.0, 0.0), (2.0, 0.0)),
+        stop("S2", (2.0, 0.0), (4.0, 0.0), (4.0, 2.0), heading=math.pi / 2),
+        stop("S3", (4.0, 2.0), (2.0, 2.0), heading=math.pi),
+    )
+    return mission_of(*(quick(one, **details) for one in made))
+
+
+def quick(one: Stop, **details: Any) -> Stop:
+    plain = {"settle_s": 2.0, "scan": Scan(profile="default", duration_s=4.0, timeout_s=20.0), "retries": 0}
+    return msgspec.structs.replace(one, **(plain | details))
+
+
+@dataclass
+class Site:
+    """A vehicle's world; `up` switches the vehicle on, `reached` is a station's process that talks to it."""
+
+    folder: Path
+    profile: str = "ardupilot"
+    mission: Mission = field(default_factory=tour)
+    faults: Sequence[str] = ()
+    trigger: Any = "auto"
+    origin: SiteOrigin | None = None
+    at: Pose | None = field(default_factory=lambda: Pose(x=0.0, y=0.0, heading=0.0))
+    speed_up: float = SPEED_UP
+
+    def __post_init__(self) -> None:
+        self.sent: ItemList = translate(self.mission, KINDS[self.profile], trigger=self.trigger)
+        self.url = Url("udpout", "127.0.0.1", free_udp_port())
+        self.origin = self.origin or self.mission.georeference
+        self.load(self.sent)
+        with self.book() as book:
+            remember(book, self.mission, self.sent)
+
+    def load(self, sent: ItemList) -> None:
+        """Let the vehicle hold this list."""
+        vehicle = autopilot_named(sent.autopilot)
+        Store(self.folder / "vehicle").keep(mission=tuple(vehicle.kept(item) for item in upload_of(sent)))
+
+    @contextmanager
+    def up(self) -> Iterator[None]:
+        """The vehicle is on."""
+        made = VehicleFaults(tuple(read_vehicle_fault(text) for text in self.faults))
+        setting = Setting(PROFILES[self.profile], self.folder / "vehicle", self.origin, self.at, made)
+        listening = Url("udpin", self.url.host, self.url.number)
+        with vehicle_on(listening, setting, speed_up=self.speed_up):
+            yield
+
+    @contextmanager
+    def book(self) -> Iterator[Logbook]:
+        with logbook(self.url, 1, self.folder / "station") as opened:
+            yield opened
+
+    @contextmanager
+    def reached(self, *, arm: bool = True, disarm: bool = False, **options: Any) -> Iterator[Station]:
+        """The vehicle, from a process of its own."""
+        given: dict[str, Any] = {"state": self.folder / "station", "timeout_s": 5.0}
+        given |= {"commander": "test", "vehicle": 1}
+        consent = Consent(arm=arm, disarm=disarm)
+        with connect(self.url, Options(consent=consent, **(given | options))) as station:
+            yield station
+
+    def order(self, verb: Any, *, arm: bool = True, disarm: bool = False, **details: Any) -> Any:
+        with self.reached(arm=arm, disarm=disarm) as station:
+            return station.command(verb, **details)
+
+    @property
+    def run(self) -> Run:
+        with self.book() as book:
+            return book.run
+
+    @property
+    def events(self) -> tuple[AnyEvent, ...]:
+        with self.book() as book:
+            return book.journal.events()
+
+
+def told(events: Sequence[AnyEvent]) -> list[str]:
+    """The events as words, such as "Arrived S1"."""
+    return [f"{type(event).__name__} {getattr(event, 'stop', '')}".strip() for event in events]
+
+
+ALL = [
+    "Started",
+    *(f"{word} {name}" for name in ("S1", "S2", "S3") for word in ("Arrived", "Settled", "Scanned")),
+    "Finished",
+]
+"""What is told of a run of the tour in which all goes well."""
