@@ -17,6 +17,8 @@ from bridge.spawn import free_port
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
 ENDPOINT = "tcp/127.0.0.1:7447"
+PRINTED = ("plan", "show", "export")
+"""Journeys whose output stands in the README word for word, in the order they depend on one another."""
 BLOCK = re.compile(r"<!-- journey: (?P<name>\w+) -->\n```console\n(?P<text>.*?)```", re.DOTALL)
 
 
@@ -92,7 +94,7 @@ def refreshed() -> str:
     text, endpoint = README.read_text(encoding="utf-8"), f"tcp/127.0.0.1:{free_port()}"
     found = blocks()
     with workplace() as folder:
-        new = {name: with_output(found[name], folder, endpoint) for name in ("plan", "show")}
+        new = {name: with_output(found[name], folder, endpoint) for name in PRINTED}
         with robot(commands(found["robot"])[0], folder, endpoint):
             new["run"] = with_output(found["run"], folder, endpoint).replace(endpoint, ENDPOINT)
     for name, block in new.items():

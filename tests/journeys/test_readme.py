@@ -8,7 +8,7 @@ import re
 from bridge.spawn import free_port
 from mission.files import mission_json
 from recordings.read import check
-from tests.journeys.readme import blocks, commands, robot, run, with_output, workplace
+from tests.journeys.readme import PRINTED, blocks, commands, robot, run, with_output, workplace
 
 
 def test_a_robot_that_was_unplugged_finishes_its_run() -> None:
@@ -34,7 +34,7 @@ def test_a_robot_that_was_unplugged_finishes_its_run() -> None:
 def test_the_tour_runs_from_plan_to_field_recording() -> None:
     found, endpoint = blocks(), f"tcp/127.0.0.1:{free_port()}"
     with workplace() as folder:
-        for name in ("plan", "show"):
+        for name in PRINTED:
             assert with_output(found[name], folder, endpoint) == found[name], f"refresh the README's {name}"
         mission = mission_json.read(folder / "plan" / "mission.json")
         with robot(commands(found["robot"])[0], folder, endpoint):
