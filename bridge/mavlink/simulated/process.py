@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -69,17 +69,16 @@ def vehicle_on(
     """
     key = None if setting.faults.any("unsigned") else signing_key
     line = on_line(open_transport(url), setting.faults)
-    wire = Wire(line, me=VEHICLE, signing_key=key)
-    stop, stopped = threading.Event(), threading.Event()
-    vehicle = Vehicle(setting, clock=WallClock(speed_up=speed_up), wall=WallClock(), say=wire.send)
-    thread = threading.Thread(target=_live, args=(vehicle, wire, stop, stopped), daemon=True)
-    thread.start()
-    try:
-        yield stopped
-    finally:
-        stop.set()
-        thread.join()
-        wire.close()
+    with closing(Wire(line, me=VEHICLE, signing_key=key)) as wire:
+        vehicle = Vehicle(setting, clock=WallClock(speed_up=speed_up), wall=WallClock(), say=wire.send)
+        stop, stopped = threading.Event(), threading.Event()
+        thread = threading.Thread(target=_live, args=(vehicle, wire, stop, stopped), daemon=True)
+        thread.start()
+        try:
+            yield stopped
+        finally:
+            stop.set()
+            thread.join()
 
 
 def _live(vehicle: Vehicle, wire: Wire, stop: threading.Event, stopped: threading.Event) -> None:

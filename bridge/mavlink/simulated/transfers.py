@@ -211,8 +211,13 @@ class Transfers:
             self._ask(up)
 
     def _no_upload(self, who: Who, message: Message) -> None:
-        again = (who, message.mission_type, message.seq) == self._done
-        self._ack(who, self._profile.last_again if again else dialect.MAV_MISSION_ERROR, message.mission_type)
+        """An item without an upload: a late copy of one that is over, or nonsense."""
+        kind, done = message.mission_type, self._done
+        if (who, kind, message.seq) == done:
+            return self._ack(who, self._profile.last_again, kind)
+        late = done is not None and (who, kind) == done[:2] and message.seq < done[2]
+        if not (late and self._profile.name == "strict"):
+            self._ack(who, dialect.MAV_MISSION_ERROR, kind)
 
     def _request_list(self, who: Who, message: Message) -> None:
         kind = message.mission_type

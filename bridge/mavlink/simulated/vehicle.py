@@ -19,7 +19,7 @@ from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.scanner import Captured, Scanner
 from bridge.mavlink.simulated.store import MISSION, Store
 from bridge.mavlink.simulated.transfers import Transfers
-from bridge.mavlink.wire import Message, Who
+from bridge.mavlink.wire import Message, sender
 from mission.document import Point, SiteOrigin
 from mission.events import Pose
 from mission.mavlink.autopilots import home_item
@@ -107,7 +107,7 @@ class Vehicle:
         self.advance()
         handler = self._handlers.get(message.get_type())
         if handler is not None and not self._quiet():
-            handler(Who(message.get_srcSystem(), message.get_srcComponent()), message)
+            handler(sender(message), message)
 
     def advance(self) -> None:
         """Let happen whatever is due by now, in its order, and tell what is to be told."""
