@@ -1,0 +1,53 @@
+"""A mission placed on the earth or on a robot's map by what a person types; its file stays as it is."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+
+from mission.document import Frame, Mission, SiteOrigin, Transform
+from mission.errors import InputError
+from mission.sense import FAR
+from mission.settings import HOW, read_settings
+
+MAP = "write X,Y,HEADING in metres and degrees, such as 1.5,2,90"
+
+
+def placed(mission: Mission, *, origin: str | None, to_map: str | None) -> Mission:
+    """The mission with the georeference `LAT,LON,ALT,HEADING` and the map's pose `X,Y,HEADING`, where given.
+
+    Raises
+    ------
+    InputError
+        Naming the option, what was typed, and how to write it.
+    """
+    if origin is not None:
+        mission = msgspec.structs.replace(mission, georeference=_site_origin(origin))
+    if to_map is not None:
+        frame = Frame(name=mission.frame.name, to_map=_transform(to_map))
+        mission = msgspec.structs.replace(mission, frame=frame)
+    return mission
+
+
+def numbers(text: str, option: str, how: str) -> tuple[float, ...]:
+    """The numbers in `1,2.5,-3`, given for an option; `how` says how to write them."""
+    try:
+        return tuple(map(float, text.split(",")))
+    except ValueError:
+        raise InputError(f"--{option} {text}: {how}") from None
+
+
+def _site_origin(text: str) -> SiteOrigin:
+    """Checked as the same option of `stopgo plan`."""
+    place = read_settings(None, {"origin": numbers(text, "origin", HOW["origin"])}).origin
+    assert place is not None
+    lat, lon, alt, heading = place
+    return SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=heading)
+
+
+def _transform(text: str) -> Transform:
+    found = numbers(text, "map", MAP)
+    if len(found) != 3 or not all(abs(number) < FAR for number in found):
+        raise InputError(f"--map {text}: {MAP}")
+    return Transform(x=found[0], y=found[1], heading=math.radians(found[2]))
