@@ -61,14 +61,16 @@ class Path:
         self._link = link
         self._keys = keys
         self._newest = 0
+        self._ask_at = 0.0
         self.run_id: str | None = None
         self.boot_id: str | None = None
         self.told = 0
 
     @property
     def behind(self) -> bool:
-        """Whether there are poses of the run that have not been told."""
-        return self.run_id is not None and self._newest > self.told
+        """Whether there are poses of the run that have not been told, and it is time to ask for them."""
+        due = time.monotonic() >= self._ask_at
+        return due and self.run_id is not None and self._newest > self.told
 
     def take(self, pose: PoseReport) -> Iterator[PoseReport]:
         """Tell a pose if it is the next one; else it will be asked for with the others."""
@@ -83,7 +85,8 @@ class Path:
     def catch_up(self) -> Iterator[PoseReport]:
         """A page of what was missed."""
         page = self._page()
-        if page is None:
+        if page is None:  # at once, if the link is down
+            self._ask_at = time.monotonic() + SILENCE_S
             return
         self._booted(page.boot_id)
         for pose in page.poses:

@@ -62,3 +62,13 @@ def test_poses_of_another_run_are_not_told() -> None:
     robot, path = Trail(board, boot_id="b", poses=0), followed(board)
     assert list(path.take(robot.pose(7, run_id="other"))) == []
     assert not path.behind
+
+
+def test_poses_that_nobody_answers_for_are_not_asked_for_again_at_once() -> None:
+    board = Switchboard()
+    robot, path = Trail(board, boot_id="b", poses=3), followed(board)
+    list(path.take(robot.pose(3)))
+    board.cut = True
+    assert path.behind
+    assert list(path.catch_up()) == []
+    assert not path.behind

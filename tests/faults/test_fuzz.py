@@ -84,7 +84,7 @@ parameters = st.dictionaries(
 def key_of(field: Field, draw: st.DataObject) -> str:
     keys = field.keys
     made = st.one_of(
-        st.sampled_from([keys.info, keys.log]),
+        st.sampled_from([keys.info, keys.log, keys.poses]),
         st.sampled_from(VERBS).map(keys.command),
         st.tuples(st.sampled_from([MISSION.id, "x", "%", "mission"]), st.sampled_from(STEPS)).map(
             lambda pair: keys.mission(*pair)
