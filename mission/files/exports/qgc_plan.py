@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
@@ -13,6 +14,7 @@ from mission.files.imports import qgc_plan
 from mission.files.imports.track import Given
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.items import Command, Frame, Item, ItemList
+from mission.mavlink.keeping import PLACED
 from mission.mavlink.translate import translate
 
 FIRMWARE = {"generic": 0, "ardupilot": 3, "px4": 12}
@@ -21,6 +23,7 @@ GROUND_ROVER = 10
 """MAV_TYPE."""
 RELATIVE = 1
 """QGroundControl's AltitudeMode: above home."""
+ABOVE_HOME = (Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT)
 
 FILE_FRAMES = {Frame.GLOBAL_INT: Frame.GLOBAL, Frame.GLOBAL_RELATIVE_ALT_INT: Frame.GLOBAL_RELATIVE_ALT}
 """In files places are degrees, so their frames are those without INT."""
@@ -29,19 +32,33 @@ FILE_FRAMES = {Frame.GLOBAL_INT: Frame.GLOBAL, Frame.GLOBAL_RELATIVE_ALT_INT: Fr
 def write(mission: Mission, supplements: Supplements) -> bytes:
     """The plan; `stopgo` holds what items cannot: the stops' ids and the bearing of the site's +y axis."""
     items = translate(mission, supplements.autopilot)
-    origin = items.origin
+    origin, speed = items.origin, mission.robot.speed
+    own = {"heading_deg": origin.heading_deg, "stops": _ids(items)}
+    home = (origin.lat, origin.lon, origin.alt)
+    return listed(items.items, items.autopilot, home=home, speed=speed, own=own)
+
+
+def listed(
+    items: Sequence[Item],
+    autopilot: str,
+    *,
+    home: tuple[float, float, float],
+    speed: float,
+    own: dict[str, Any] | None = None,
+) -> bytes:
+    """The plan of any items, home not among them; `own` is kept under `stopgo`."""
     plan = {
         **{"fileType": "Plan", "version": 1, "groundStation": "stopgo"},
         "mission": {
-            **{"version": 2, "firmwareType": FIRMWARE[items.autopilot], "vehicleType": GROUND_ROVER},
-            **{"cruiseSpeed": mission.robot.speed, "hoverSpeed": mission.robot.speed},
+            **{"version": 2, "firmwareType": FIRMWARE[autopilot], "vehicleType": GROUND_ROVER},
+            **{"cruiseSpeed": speed, "hoverSpeed": speed},
             **{"globalPlanAltitudeMode": RELATIVE},
-            "plannedHomePosition": [origin.lat, origin.lon, origin.alt],
-            "items": [_simple(item, number) for number, item in enumerate(items.items, 1)],
+            "plannedHomePosition": home,
+            "items": [_simple(item, number) for number, item in enumerate(items, 1)],
         },
         "geoFence": {"circles": [], "polygons": [], "version": 2},
         "rallyPoints": {"points": [], "version": 2},
-        "stopgo": {"heading_deg": origin.heading_deg, "stops": _ids(items)},
+        **({} if own is None else {"stopgo": own}),
     }
     return msgspec.json.format(msgspec.json.encode(plan), indent=2) + b"\n"
 
@@ -61,7 +78,7 @@ def _simple(item: Item, number: int) -> dict[str, Any]:
     numbers = [*item.params, *place(item), item.z]
     return {
         "type": "SimpleItem",
-        **(_altitude(item) if item.command == Command.NAV_WAYPOINT else {}),
+        **(_altitude(item) if item.command == Command.NAV_WAYPOINT and item.frame in ABOVE_HOME else {}),
         **{"autoContinue": item.autocontinue, "command": item.command, "doJumpId": number},
         "frame": FILE_FRAMES.get(item.frame, item.frame),
         "params": [None if math.isnan(value) else value for value in numbers],
@@ -70,7 +87,7 @@ def _simple(item: Item, number: int) -> dict[str, Any]:
 
 def place(item: Item) -> tuple[float, float]:
     """Latitude and longitude in degrees, or the two plain numbers of a command without a place."""
-    if item.command == Command.NAV_WAYPOINT:
+    if item.command in PLACED:
         return item.x / STEPS_PER_DEGREE, item.y / STEPS_PER_DEGREE
     return float(item.x), float(item.y)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from mission.document import Mission, Point
 from mission.files.exports.format import Supplements
@@ -18,7 +19,11 @@ from mission.mavlink.translate import translate
 def write(mission: Mission, supplements: Supplements) -> bytes:
     """The table: tabs, twelve columns, ten decimals of degrees, the site's origin as home."""
     items = translate(mission, supplements.autopilot)
-    rows = [home_item(items.origin), *items.items]
+    return listed([home_item(items.origin), *items.items])
+
+
+def listed(rows: Sequence[Item]) -> bytes:
+    """The table of any items, home first."""
     return "".join(f"{line}\n" for line in (HEAD, *map(_row, range(len(rows)), rows))).encode()
 
 
