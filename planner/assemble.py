@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import msgspec
 import numpy as np
 import shapely
 
@@ -12,12 +11,7 @@ from mission import __version__
 from mission.document import (
     Frame,
     Mission,
-    Origin,
     Point,
-    Policy,
-    RobotSpec,
-    Scan,
-    ScannerSpec,
     Sees,
     SiteOrigin,
     Start,
@@ -29,17 +23,22 @@ from mission.errors import StopgoError
 from mission.geometry import FloatArray
 from mission.planning import Candidates, NavigableSpace, Route
 from mission.settings import Settings
+from mission.specs import (
+    DECIMALS,
+    origin_of,
+    policy_of,
+    robot_of,
+    rounded,
+    scan_of,
+    scanner_of,
+    site_origin_of,
+)
 from planner.gaps import Walls, keeps_clear
 from planner.reach import walls_of
 from planner.shapes import local_origin
 
-DECIMALS = 6
-"""Missions hold micrometres: finer would be float noise."""
 CLEAR_SLACK = 2e-6
 """What rounding to DECIMALS may cost in clearance."""
-SCAN_TIMEOUT = 2.0
-"""A scan may take this many times as long as planned, and at least SCAN_PATIENCE more."""
-SCAN_PATIENCE = 30.0
 
 
 def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
@@ -55,47 +54,27 @@ def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
             digest="",
             frame=Frame(name="site"),
             georeference=_georeference(space),
-            robot=_robot(settings),
-            scanner=ScannerSpec(profile=settings.profile, range=settings.range, fov_deg=settings.fov),
+            robot=robot_of(settings),
+            scanner=scanner_of(settings),
             start=Start(
-                x=_rounded(route.start[0]),
-                y=_rounded(route.start[1]),
+                x=rounded(route.start[0]),
+                y=rounded(route.start[1]),
                 heading=_turned(route.start[2]),
                 reason=route.start_reason,
             ),
             stops=_stops(route, settings),
             return_=None if route.return_leg is None else _line(route.return_leg),
-            policy=Policy(
-                link_loss=settings.link_loss,
-                link_loss_after_s=settings.link_loss_after,
-                battery_min=settings.battery_min,
-            ),
-            origin=Origin(
-                floor=floor.name,
-                floor_digest=floor.digest,
-                parameters=msgspec.json.decode(msgspec.json.encode(settings)),
-                stopgo=__version__,
-            ),
+            policy=policy_of(settings),
+            origin=origin_of(settings, floor=floor.name, digest=floor.digest),
         )
     )
 
 
 def _georeference(space: NavigableSpace) -> SiteOrigin | None:
-    given, known = space.settings.origin, space.floor.georeference
-    if given is not None:
-        return SiteOrigin(lat=given[0], lon=given[1], alt=given[2], heading_deg=given[3])
-    if known is None:
-        return None
+    given, known = site_origin_of(space.settings), space.floor.georeference
+    if given is not None or known is None:
+        return given
     return SiteOrigin(lat=known.lat, lon=known.lon, alt=known.alt, heading_deg=known.heading_deg)
-
-
-def _robot(settings: Settings) -> RobotSpec:
-    return RobotSpec(
-        radius=settings.radius,
-        speed=settings.speed,
-        turn_rate=_rounded(math.radians(settings.turn_rate)),
-        acceleration=settings.acceleration,
-    )
 
 
 def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
@@ -129,7 +108,7 @@ def _arrival_heading(approach: FloatArray, before: float) -> float:
     if len(approach) < 2:
         return before
     step = approach[-1] - approach[-2]
-    return _rounded(math.atan2(_rounded(step[1]), _rounded(step[0])))
+    return rounded(math.atan2(rounded(step[1]), rounded(step[0])))
 
 
 def _stop(
@@ -144,11 +123,7 @@ def _stop(
         doorway=doorway,
         tolerance_m=settings.tolerance,
         settle_s=settings.settle,
-        scan=Scan(
-            profile=settings.profile,
-            duration_s=settings.scan_time,
-            timeout_s=max(SCAN_TIMEOUT * settings.scan_time, settings.scan_time + SCAN_PATIENCE),
-        ),
+        scan=scan_of(settings.profile, settings.scan_time),
         on_failure=settings.on_failure,
         retries=settings.retries,
         approach=line,
@@ -157,17 +132,12 @@ def _stop(
 
 
 def _line(points: FloatArray) -> tuple[Point, ...]:
-    return tuple((_rounded(x), _rounded(y)) for x, y in points.tolist())
+    return tuple((rounded(x), rounded(y)) for x, y in points.tolist())
 
 
 def _turned(heading: float) -> float:
     """A heading in radians between -π and π."""
-    return _rounded(math.remainder(heading, math.tau))
-
-
-def _rounded(value: float) -> float:
-    """A plain number without float noise, and never minus zero."""
-    return round(float(value), DECIMALS) + 0.0
+    return rounded(math.remainder(heading, math.tau))
 
 
 def check_legs(route: Route) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from mission.document import Mission, SiteOrigin
+from mission.document import Mission
 from mission.errors import InputError
 from mission.files.imports import qgc_plan, qgc_waypoints, stops_csv
 from mission.files.imports.assembling import mission_of
 from mission.files.imports.track import Given, Reader, Track
 from mission.settings import Settings
+from mission.specs import site_origin_of
 
 READERS: dict[str, Reader] = {
     "plan": qgc_plan.read,
@@ -35,7 +36,7 @@ def read_mission(
     """
     reader = READERS[_kind(path, kind)]
     data = _bytes_of(path)
-    track = reader(data, str(path), Given(_origin(settings), autopilot))
+    track = reader(data, str(path), Given(site_origin_of(settings), autopilot))
     digest = hashlib.sha256(data).hexdigest()
     return mission_of(track, settings, name=path.stem, file=path.name, digest=digest), track
 
@@ -60,10 +61,3 @@ def _bytes_of(path: Path) -> bytes:
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"{path}: cannot be read ({why}); give a file to import") from None
-
-
-def _origin(settings: Settings) -> SiteOrigin | None:
-    if settings.origin is None:
-        return None
-    lat, lon, alt, heading = settings.origin
-    return SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=heading)

@@ -11,14 +11,10 @@ from mission import __version__
 from mission.document import (
     Frame,
     Mission,
-    Origin,
     Point,
-    Policy,
     RobotSpec,
     Scan,
-    ScannerSpec,
     Sees,
-    SiteOrigin,
     Start,
     Stop,
     mission_id,
@@ -28,12 +24,7 @@ from mission.errors import InputError
 from mission.files.imports.track import Track, Visit
 from mission.sense import problems_of
 from mission.settings import Settings
-
-DECIMALS = 6
-"""Missions hold micrometres."""
-SCAN_TIMEOUT = 2.0
-SCAN_PATIENCE = 30.0
-"""A scan may take so many times as long as planned and at least so many seconds more, as in a plan."""
+from mission.specs import origin_of, policy_of, robot_of, rounded, scan_of, scanner_of, site_origin_of
 
 
 def mission_of(track: Track, settings: Settings, *, name: str, file: str, digest: str) -> Mission:
@@ -58,18 +49,14 @@ def mission_of(track: Track, settings: Settings, *, name: str, file: str, digest
             name=name,
             digest="",
             frame=Frame(name="site"),
-            georeference=_georeference(track, settings),
+            georeference=site_origin_of(settings) or track.origin,
             robot=_robot(track, settings),
-            scanner=ScannerSpec(profile=settings.profile, range=settings.range, fov_deg=settings.fov),
+            scanner=scanner_of(settings),
             start=start,
             stops=tuple(_stops(track.visits, legs, start.heading, settings)),
             return_=tuple(_distinct([legs[-1][-1], *track.back])) if track.back else None,
-            policy=Policy(
-                link_loss=settings.link_loss,
-                link_loss_after_s=settings.link_loss_after,
-                battery_min=settings.battery_min,
-            ),
-            origin=_origin(settings, file, digest),
+            policy=policy_of(settings),
+            origin=origin_of(settings, floor=file, digest=digest),
         )
     )
     for problem in problems_of(mission):
@@ -89,7 +76,7 @@ def _legs(track: Track, settings: Settings) -> Iterator[list[Point]]:
 
 def _distinct(leg: Sequence[Point]) -> list[Point]:
     """Rounded to DECIMALS, without points that stand on the one before."""
-    points = [(_rounded(x), _rounded(y)) for x, y in leg]
+    points = [(rounded(x), rounded(y)) for x, y in leg]
     return [point for number, point in enumerate(points) if number == 0 or point != points[number - 1]]
 
 
@@ -97,9 +84,9 @@ def _start(track: Track, settings: Settings, leg: Sequence[Point], file: str) ->
     x, y = leg[0]
     if settings.start is not None:
         heading = math.remainder(math.radians(settings.start[2]), math.tau)
-        return Start(x=x, y=y, heading=_rounded(heading), reason="given")
+        return Start(x=x, y=y, heading=rounded(heading), reason="given")
     ahead = track.visits[0].heading or 0.0
-    return Start(x=x, y=y, heading=_rounded(_direction(leg[:2], ahead)), reason=f"the first place in {file}")
+    return Start(x=x, y=y, heading=rounded(_direction(leg[:2], ahead)), reason=f"the first place in {file}")
 
 
 def _direction(leg: Sequence[Point], otherwise: float) -> float:
@@ -117,7 +104,7 @@ def _stops(
     width = max(2, len(str(len(visits))))
     for number, (visit, leg) in enumerate(zip(visits, legs, strict=True), 1):
         heading = _direction(leg, heading) if visit.heading is None else visit.heading
-        yield _stop(visit, visit.id or f"s{number:0{width}d}", leg, _rounded(heading), settings)
+        yield _stop(visit, visit.id or f"s{number:0{width}d}", leg, rounded(heading), settings)
 
 
 def _stop(visit: Visit, name: str, leg: list[Point], heading: float, settings: Settings) -> Stop:
@@ -138,36 +125,14 @@ def _stop(visit: Visit, name: str, leg: list[Point], heading: float, settings: S
 
 
 def _scan(visit: Visit, settings: Settings) -> Scan:
-    duration = _or(visit.scan_s, settings.scan_time)
-    timeout = _or(visit.timeout_s, max(SCAN_TIMEOUT * duration, duration + SCAN_PATIENCE))
-    return Scan(profile=visit.profile or settings.profile, duration_s=duration, timeout_s=timeout)
-
-
-def _georeference(track: Track, settings: Settings) -> SiteOrigin | None:
-    if settings.origin is None:
-        return track.origin
-    lat, lon, alt, heading = settings.origin
-    return SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=heading)
+    scan = scan_of(visit.profile or settings.profile, _or(visit.scan_s, settings.scan_time))
+    return scan if visit.timeout_s is None else msgspec.structs.replace(scan, timeout_s=visit.timeout_s)
 
 
 def _robot(track: Track, settings: Settings) -> RobotSpec:
-    return RobotSpec(
-        radius=settings.radius,
-        speed=_or(track.speed, settings.speed),
-        turn_rate=_rounded(math.radians(settings.turn_rate)),
-        acceleration=settings.acceleration,
-    )
-
-
-def _origin(settings: Settings, file: str, digest: str) -> Origin:
-    parameters = msgspec.json.decode(msgspec.json.encode(settings))
-    return Origin(floor=file, floor_digest=digest, parameters=parameters, stopgo=__version__)
+    robot = robot_of(settings)
+    return robot if track.speed is None else msgspec.structs.replace(robot, speed=track.speed)
 
 
 def _or(value: float | None, otherwise: float) -> float:
     return otherwise if value is None else value
-
-
-def _rounded(value: float) -> float:
-    """Without float noise, and never minus zero."""
-    return round(value, DECIMALS) + 0.0
