@@ -1,0 +1,41 @@
+"""What a command says to the person: lines and a progress bar on stderr, one JSON object on stdout."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+KILOBYTES = ("kB", 1000)
+
+
+class Bar:
+    """A progress bar on stderr, if that is a terminal."""
+
+    def __init__(self, label: str, unit: tuple[str, int] = KILOBYTES) -> None:
+        self._label = label
+        self._unit, self._per = unit
+        self._shows = sys.stderr.isatty()
+
+    def __enter__(self) -> Bar:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._shows:
+            print(file=sys.stderr)  # noqa: T201
+
+    def show(self, done: int, total: int) -> None:
+        if self._shows:
+            filled = 30 * done // max(1, total)
+            bar = "█" * filled + "·" * (30 - filled)
+            amount = f"{done / self._per:.0f}/{total / self._per:.0f} {self._unit}"
+            print(f"\r{self._label} {bar} {amount}", end="", file=sys.stderr)  # noqa: T201
+
+
+def say(line: str) -> None:
+    """One line for the person, on stderr."""
+    print(line, file=sys.stderr, flush=True)  # noqa: T201
+
+
+def print_json(document: dict[str, Any]) -> None:
+    print(json.dumps(document))  # noqa: T201
