@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 from mission.document import SiteOrigin
 from mission.errors import InputError
@@ -197,12 +198,8 @@ def _visit(visit: Visit, name: str, items: Sequence[Listed], autopilot: str) -> 
 
 def _done_at(visit: Visit, items: Sequence[Listed]) -> list[Listed]:
     """The items between a stop's waypoint and the next."""
-    done = []
-    for item in items[visit.index + 1 :]:
-        if item.command in PLACES:
-            break
-        done.append(item)
-    return done
+    after = (items[index] for index in range(visit.index + 1, len(items)))
+    return list(takewhile(lambda item: item.command not in PLACES, after))
 
 
 def _is_ours(item: Listed) -> bool:

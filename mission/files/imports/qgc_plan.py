@@ -12,6 +12,8 @@ from mission.files.imports.items import Listed, autopilot_for, track_of
 from mission.files.imports.track import Given, Track
 
 NAN = float("nan")
+LARGEST_CODE = 65_535
+"""Of a command or a frame."""
 LARGEST = 1e15
 """No number in a plan is larger."""
 
@@ -100,8 +102,11 @@ def _listed(value: object, number: int, source: str) -> Listed:
             "only simple waypoints, delays and triggers are read"
         )
     for key in ("command", "frame"):
-        if not isinstance(item.get(key), int) or isinstance(item[key], bool):
-            raise InputError(f"{source}: item {number}: {key} is {_shown(item.get(key))}, not a whole number")
+        value = item.get(key)
+        if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= LARGEST_CODE:
+            raise InputError(
+                f"{source}: item {number}: {key} is {_shown(value)}, not a whole number up to 65535"
+            )
     params = item.get("params")
     if not isinstance(params, list) or len(params) != 7:
         raise InputError(f"{source}: item {number}: params is {_shown(params)}, not a list of 7")

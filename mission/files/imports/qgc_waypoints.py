@@ -7,6 +7,7 @@ import math
 from mission.document import SiteOrigin
 from mission.errors import InputError
 from mission.files.imports.items import Listed, autopilot_for, track_of
+from mission.files.imports.qgc_plan import LARGEST_CODE
 from mission.files.imports.track import Given, Track
 
 HEAD = "QGC WPL 110"
@@ -52,6 +53,10 @@ def _row(line: str, number: int, count: int, source: str) -> Listed:
         raise InputError(
             f"{source}: line {number} holds something that is no number: {line.strip()[:60]}"
         ) from None
+    if not (0 <= frame <= LARGEST_CODE and 0 <= command <= LARGEST_CODE):
+        raise InputError(
+            f"{source}: line {number} has a frame or a command above {LARGEST_CODE}, which is none"
+        )
     if sequence != count:
         raise InputError(
             f"{source}: line {number} is row {sequence}, but {count} is due; a row is missing or moved"

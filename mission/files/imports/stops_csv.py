@@ -10,6 +10,7 @@ import csv
 import io
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, get_args
@@ -140,8 +141,9 @@ def _in_order(rows: list[_Row]) -> list[_Row]:
     if "number" not in rows[0].cells:
         return rows
     numbers = [row.number("number") for row in rows]
+    times = Counter(numbers)
     for row, number in zip(rows, numbers, strict=True):
-        if number is None or number != round(number) or numbers.count(number) > 1:
+        if number is None or number != round(number) or times[number] > 1:
             raise row.refused("number", "it must be the stop's place in the route, a number no other row has")
     return [row for _, row in sorted(zip(numbers, rows, strict=True), key=lambda pair: pair[0] or 0.0)]
 

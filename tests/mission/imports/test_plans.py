@@ -80,6 +80,8 @@ BROKEN = {
     "item 1 is 5, not an object": changed(items=[5]),
     "item 1: command is '16', not a whole number": changed(command="16"),
     "item 1: command is True, not a whole number": changed(command=True),
+    "item 1: command is -1, not a whole number up to 65535": changed(command=-1),
+    "item 1: command is 999999999999999999999999999999999999…": changed(command=int("9" * 4000)),
     "item 1: frame is missing, not a whole number": changed(frame=None),
     "item 1: params is a list of 6, not a list of 7": changed(params=[0] * 6),
     "neither number nor null": changed(params=[0] * 6 + ["x"]),
@@ -102,6 +104,7 @@ def test_what_is_no_plan_is_one_line(words: str) -> None:
 
 GOOD = waypoints(waypoint(hold=5)).decode()
 TABLES = {
+    "line 3 has a frame or a command above 65535": GOOD.replace("\t16\t5", "\t99999\t5"),
     "begins with '', not 'QGC WPL 110'": "",
     "begins with 'QGC WPL 120'": GOOD.replace("110", "120"),
     "has no row after": "QGC WPL 110\n",
