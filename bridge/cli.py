@@ -2,62 +2,75 @@
 
 from __future__ import annotations
 
-import json
 import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from bridge.console import Bar, print_json, say
+from bridge.key_commands import key_commands
+from bridge.ways import (
+    DEFAULT_ENDPOINT,
+    Connect,
+    Insecure,
+    KeyFolder,
+    MavlinkUrl,
+    SigningKey,
+    Site,
+    StateFolder,
+    Timeout,
+    VehicleId,
+    Way,
+    by_way,
+    in_time,
+    reached,
+    way_of,
+)
 from mission.errors import InputError
 
 if TYPE_CHECKING:
     from bridge.mavlink.scanner import Trigger
     from bridge.protocol import Answer, Verb
     from bridge.revision import RevisionPolicy
-    from bridge.station import Station
     from bridge.watch import Recording
     from mission.document import Mission, Transform
     from mission.events import Pose, StateReport
 
-RobotName = Annotated[str, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
-Connect = Annotated[
-    str, typer.Option("--connect", metavar="ENDPOINT", help="Where it listens, such as tcp/127.0.0.1:7447.")
-]
-Site = Annotated[str | None, typer.Option("--site", metavar="NAME", help="Prefix of the site's keys.")]
-As = Annotated[
-    str | None, typer.Option("--as", metavar="WHO", help="Who gives the order; user@host if not given.")
-]
-Timeout = Annotated[
-    float, typer.Option("--timeout", min=0.1, metavar="S", help="How long to wait, in seconds.")
-]
 PushTimeout = Annotated[
     float | None,
     typer.Option("--timeout", min=0.1, metavar="S", help="How long to go on without an answer, in seconds; "
                  "if not given, 5 to find the robot and 20 for each piece."),
 ]  # fmt: skip
-Insecure = Annotated[
-    bool, typer.Option("--insecure", help="Allow addresses beyond this machine without keys.")
-]
-KeyFolder = Annotated[
-    Path | None, typer.Option("--keys", metavar="DIR", help="Folder of the keys that stopgo keys issued.")
-]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 TakeOver = Annotated[bool, typer.Option("--take-over", help="Command it though somebody else does.")]
+NeededMavlink = Annotated[
+    str,
+    typer.Option(
+        "--mavlink", metavar="URL", help="A vehicle, such as tcp:127.0.0.1:5760 or serial:/dev/ttyUSB0:57600."
+    ),
+]
+AutopilotKind = Annotated[
+    str | None,
+    typer.Option(
+        "--autopilot", metavar="ardupilot|px4|generic", help="Its kind, if not as its heartbeat says."
+    ),
+]
+WhileRunning = Annotated[
+    bool, typer.Option("--while-running", help="Even though the vehicle is armed and follows its mission.")
+]
 StopId = Annotated[str | None, typer.Option("--stop", metavar="ID", help="The stop that is meant.")]
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-LEAST_S = 0.5
-"""Left for a question or an order, however long it took to find the robot."""
 
 
 def add_commands(app: typer.Typer) -> None:
     """Add this folder's verbs to the front door."""
     app.command()(robot)
     app.command()(push)
+    app.command("fetch-mission")(fetch_mission)
+    app.command()(clear)
     app.command()(start)
     for verb in ABOUT:
         app.command(name=verb)(order_of(verb))
@@ -185,11 +198,11 @@ def be_vehicle(name: str | None, **options: Any) -> None:
     run_vehicle(VehicleOptions(**options), ready=lambda url: say(f"ready {called} at {url}"))
 
 
-def alone(what: str, given: dict[str, object]) -> None:
+def alone(what: str, given: Mapping[str, object], command: str = "robot") -> None:
     """Refuse options that have no meaning with `what`."""
     for option, value in given.items():
         if value:
-            raise InputError(f"robot: {option} has no meaning with {what}; leave it out")
+            raise InputError(f"{command}: {option} has no meaning with {what}; leave it out")
 
 
 def read_revisions(text: str) -> RevisionPolicy:
@@ -211,28 +224,66 @@ def read_trigger(text: str) -> Trigger:
     return known
 
 
+@by_way(without=("timeout",))
 def push(
-    mission: Annotated[Path, typer.Argument(metavar="MISSION.json", help="The mission to send.")],
+    way: Way,
     *,
-    robot: RobotName,
-    connect: Connect = DEFAULT_ENDPOINT,
-    site: Site = None,
-    who: As = None,
+    mission: Annotated[Path, typer.Argument(metavar="MISSION.json", help="The mission to send.")],
     take_over: TakeOver = False,
-    timeout: PushTimeout = None,
-    insecure: Insecure = False,
-    keys: KeyFolder = None,
+    patience: PushTimeout = None,
+    autopilot: AutopilotKind = None,
+    trigger: Annotated[
+        str | None, typer.Option(metavar="auto|script|camera|none", help="What makes the vehicle scan.")
+    ] = None,
+    scan_wait: Annotated[
+        str | None,
+        typer.Option(metavar="delay|script_time", help="Wait as long as planned, or for a script's word."),
+    ] = None,
+    settle: Annotated[
+        str | None, typer.Option(metavar="delay|hold", help="Settle in an item of its own, or as a hold.")
+    ] = None,
+    set_origin: Annotated[
+        bool, typer.Option("--set-origin", help="Give a vehicle without an origin the mission's.")
+    ] = False,
+    any_origin: Annotated[
+        bool, typer.Option("--any-origin", help="Do not compare origins: it has satellite positions.")
+    ] = False,
+    while_running: WhileRunning = False,
     json_: Json = False,
 ) -> None:
     """Send a mission to a robot, and see it stored there whole, or rejected with the reasons.
 
     Example: stopgo push out/mission.json --robot r1 --connect tcp/127.0.0.1:7447
+
+    Example: stopgo push out/mission.json --mavlink udpout:127.0.0.1:14550 --set-origin
     """
     from mission.files.mission_json import read
 
-    document = read(mission)
+    if way.mavlink is None:
+        alone("--robot", {
+            "--autopilot": autopilot, "--trigger": trigger, "--scan-wait": scan_wait, "--settle": settle,
+            "--set-origin": set_origin, "--any-origin": any_origin, "--while-running": while_running,
+        }, command="push")  # fmt: skip
+        return push_over_zenoh(read(mission), pushing(way, patience), take_over=take_over, json_=json_)
+    from bridge.mavlink.commands import Leave, Line, Writing, push_mission
+
+    alone("--mavlink", {"--take-over": take_over, "--as": way.who}, command="push")
+    vehicle = way.mavlink
+    line = Line(
+        vehicle.url, vehicle.vehicle, vehicle.signing_key, way.insecure, autopilot, patience or way.timeout_s
+    )
+    push_mission(
+        read(mission), line, state=vehicle.state, as_json=json_,
+        writing=Writing(trigger or "auto", scan_wait or "delay", settle or "delay"),
+        leave=Leave(set_origin, any_origin, while_running),
+    )  # fmt: skip
+
+
+def push_over_zenoh(document: Mission, way: Way, *, take_over: bool, json_: bool) -> None:
+    """Push to a robot of ours, and say what it did with the mission."""
+    robot = way.robot
     with (
-        reached(pushing(Way(robot, connect, site, who, 5.0, insecure, keys), timeout)) as station,
+        reached(way) as station,
         Bar("pushing") as bar,
     ):
         told = turning(station.info().to_map, document)
@@ -249,6 +300,53 @@ def push(
         typer.echo(f"{robot} {how} {document.name} ({document.id[:12]} revision {document.revision}){when}")
 
 
+def fetch_mission(
+    *,
+    mavlink: NeededMavlink,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Where to write it: *.json, *.plan, *.waypoints."
+        ),
+    ] = None,
+    vehicle: VehicleId = None,
+    signing_key: SigningKey = None,
+    autopilot: AutopilotKind = None,
+    timeout: Timeout = 5.0,
+    insecure: Insecure = False,
+    json_: Json = False,
+) -> None:
+    """Read the mission that a MAVLink vehicle holds, and show it or write it to a file.
+
+    Example: stopgo fetch-mission --mavlink udpout:127.0.0.1:14550 -o held.plan
+    """
+    from bridge.mavlink.commands import Line, fetch_mission
+
+    line = Line(mavlink, vehicle, signing_key, insecure, autopilot, timeout)
+    fetch_mission(line, out=out, as_json=json_)
+
+
+def clear(
+    *,
+    mavlink: NeededMavlink,
+    vehicle: VehicleId = None,
+    signing_key: SigningKey = None,
+    autopilot: AutopilotKind = None,
+    while_running: WhileRunning = False,
+    timeout: Timeout = 5.0,
+    insecure: Insecure = False,
+    json_: Json = False,
+) -> None:
+    """Take the mission off a MAVLink vehicle, and see that it is gone.
+
+    Example: stopgo clear --mavlink udpout:127.0.0.1:14550
+    """
+    from bridge.mavlink.commands import Line, clear_mission
+
+    line = Line(mavlink, vehicle, signing_key, insecure, autopilot, timeout)
+    clear_mission(line, while_running=while_running, as_json=json_)
+
+
 def turning(own: Transform | None, mission: Mission) -> str:
     """How the robot turns the mission onto its map, in words; empty if it does not."""
     import math
@@ -260,29 +358,30 @@ def turning(own: Transform | None, mission: Mission) -> str:
     return f"on the robot's map, places are turned by {turned} ({whose})"
 
 
+Arm = Annotated[bool, typer.Option("--arm", help="Arm a vehicle that is disarmed.")]
+
+
+@by_way()
 def start(
+    way: Way,
     *,
-    robot: RobotName,
-    connect: Connect = DEFAULT_ENDPOINT,
-    site: Site = None,
-    who: As = None,
     take_over: TakeOver = False,
-    timeout: Timeout = 5.0,
-    insecure: Insecure = False,
-    keys: KeyFolder = None,
     again: Annotated[bool, typer.Option("--again", help="Run a mission that was run before.")] = False,
     from_here: Annotated[
         bool, typer.Option("--from-here", help="Start at the nearest point of the route.")
     ] = False,
+    arm: Arm = False,
     json_: Json = False,
 ) -> None:
     """Start the mission that the robot holds.
 
     Example: stopgo start --robot r1 --connect tcp/127.0.0.1:7447
+
+    Example: stopgo start --mavlink udpout:127.0.0.1:14550 --arm
     """
-    with in_time(Way(robot, connect, site, who, timeout, insecure, keys)) as station:
+    with in_time(way.to_drive(arm=arm)) as station:
         answer = station.command("start", again=again, from_here=from_here, take_over=take_over)
-    report_answer(answer, robot, json_)
+    report_answer(answer, station.keys.robot, json_)
 
 
 ABOUT: dict[Verb, str] = {
@@ -299,26 +398,21 @@ def order_of(verb: Verb) -> Callable[..., None]:
     """The command that gives the order `verb`."""
 
     def command(
+        way: Way,
         *,
-        robot: RobotName,
-        stop: Annotated[
-            str | None, typer.Option("--stop", metavar="ID", help="The stop that is meant.")
-        ] = None,
-        connect: Connect = DEFAULT_ENDPOINT,
-        site: Site = None,
-        who: As = None,
+        stop: StopId = None,
         take_over: TakeOver = False,
-        timeout: Timeout = 5.0,
-        insecure: Insecure = False,
-        keys: KeyFolder = None,
+        arm: Arm = False,
+        disarm: Annotated[bool, typer.Option("--disarm", help="Disarm a vehicle that stands.")] = False,
         json_: Json = False,
     ) -> None:
-        with in_time(Way(robot, connect, site, who, timeout, insecure, keys)) as station:
+        with in_time(way.to_drive(arm=arm, disarm=disarm)) as station:
             answer = station.command(verb, stop=stop, take_over=take_over)
-        report_answer(answer, robot, json_)
+        report_answer(answer, station.keys.robot, json_)
 
     command.__doc__ = f"{ABOUT[verb]}\n\nExample: stopgo {verb} --robot r1 --connect {DEFAULT_ENDPOINT}"
-    return command
+    without = () if verb in ("resume", "retry", "skip") else ("arm",)
+    return by_way(without=without if verb == "abort" else (*without, "disarm"))(command)
 
 
 def status(
@@ -328,6 +422,10 @@ def status(
     ] = None,
     connect: Connect = DEFAULT_ENDPOINT,
     site: Site = None,
+    mavlink: MavlinkUrl = None,
+    vehicle: VehicleId = None,
+    signing_key: SigningKey = None,
+    state: StateFolder = None,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
     keys: KeyFolder = None,
@@ -336,14 +434,20 @@ def status(
     """Tell what the robot is doing, or what all robots of the site are.
 
     Example: stopgo status --robot r1 --json
+
+    Example: stopgo status --mavlink udpout:127.0.0.1:14550
     """
     from bridge.station import fleet
 
-    if robot is None:
+    if robot is None and mavlink is None:
         reports = fleet(connect, site=site, timeout_s=timeout, insecure=insecure, keys=keys)
         as_json: dict[str, Any] = {"robots": [status_json(report) for report in reports]}
     else:
-        with in_time(Way(robot, connect, site, None, timeout, insecure, keys)) as station:
+        way = way_of(
+            robot=robot, connect=connect, site=site, mavlink=mavlink, vehicle=vehicle,
+            signing_key=signing_key, state=state, timeout=timeout, insecure=insecure, keys=keys,
+        )  # fmt: skip
+        with in_time(way.to_look()) as station:
             reports = (station.status(),)
         as_json = status_json(reports[0])
     if json_:
@@ -356,110 +460,35 @@ def status_json(report: StateReport) -> dict[str, Any]:
     return {key: getattr(report, key) for key in STATUS_KEYS}
 
 
-def key_commands() -> typer.Typer:
-    """`stopgo keys` with its verbs."""
-    commands = typer.Typer(
-        no_args_is_help=True,
-        help="Make a site's keys: an authority, and a certificate for every station, viewer and robot."
-        "\n\nExample: stopgo keys init site-keys && stopgo keys issue robot r1 --in site-keys",
-    )
-    commands.command("init")(keys_init)
-    commands.command("issue")(keys_issue)
-    commands.command("show")(keys_show)
-    return commands
-
-
-SiteFolder = Annotated[Path, typer.Option("--in", metavar="DIR", help="The site's folder of keys.")]
-
-
-def keys_init(folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder.")]) -> None:
-    """Make a site's authority; whoever has its folder can issue keys, so keep it off the robots.
-
-    Example: stopgo keys init site-keys
-    """
-    from bridge.keys import AUTHORITY, init_site, now_utc
-
-    init_site(folder, now=now_utc())
-    typer.echo(f"{folder / AUTHORITY}: the site's authority; keep it away from robots and stations")
-
-
-def keys_issue(
-    role: Annotated[str, typer.Argument(help="station, viewer or robot.")],
-    name: Annotated[str, typer.Argument(help="Who it is for; for a robot, its --name.")],
-    *,
-    folder: SiteFolder,
-    days: Annotated[int, typer.Option(min=1, max=825, help="How long they are valid.")] = 90,
-) -> None:
-    """Issue keys to a station, a viewer or a robot.
-
-    Example: stopgo keys issue station alice --in site-keys
-    """
-    from bridge.keys import ROLES, issue, now_utc
-
-    if role not in ROLES:
-        raise InputError(f"role {role!r}: one of {', '.join(ROLES)}")
-    files = issue(folder, role, name, now=now_utc(), days=days)
-    typer.echo(f"{files.folder}: keys of {role} {name} for {days} days; give it the folder as --keys")
-
-
-def keys_show(
-    site: Annotated[
-        Path | None, typer.Argument(metavar="DIR", help="The site's folder of keys.", show_default=False)
-    ] = None,
-    *,
-    folder: Annotated[Path | None, typer.Option("--in", metavar="DIR", help="The same.")] = None,
-    json_: Json = False,
-) -> None:
-    """List who holds keys, and until when.
-
-    Example: stopgo keys show site-keys
-    """
-    from bridge.keys import holders, now_utc
-
-    given = [path for path in (site, folder) if path is not None]
-    if len(given) != 1:
-        raise InputError("keys show: name the site's folder of keys once, as in: stopgo keys show site-keys")
-    found = holders(given[0])
-    if json_:
-        keys = [{"role": who.role, "name": who.name, "not_after": who.not_after.isoformat()} for who in found]
-        print_json({"keys": keys})
-        return
-    for who in found:
-        left = (who.not_after - now_utc()).days
-        until = f"until {who.not_after:%Y-%m-%d}, {left} days" if left >= 0 else "expired"
-        typer.echo(f"{who.role:8} {who.name:20} {until}")
-
-
 STATUS_KEYS = (
     "robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop", "done", "skipped", "battery",
 )  # fmt: skip
 
 
+@by_way(without=("who",))
 def watch(
+    way: Way,
     *,
-    robot: RobotName,
-    connect: Connect = DEFAULT_ENDPOINT,
-    site: Site = None,
-    timeout: Timeout = 5.0,
-    insecure: Insecure = False,
-    keys: KeyFolder = None,
     rrd: Annotated[
         Path | None, typer.Option("--rrd", metavar="FIELD.rrd", help="Record the run for Rerun.")
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="Open the viewer on what is recorded.")] = False,
     json_: Json = False,
 ) -> None:
-    """Follow the robot's run until it ends, gaps filled from its journal; never touches the robot.
+    """Follow the robot's run until it ends, gaps filled from its journal; its end never touches the robot.
 
-    Ends with 0 when the run finished and 1 when it was aborted.
+    Ends with 0 when the run finished and 1 when it was aborted. While a vehicle is watched over MAVLink, what
+    its mission says of a stop that failed is done by this command.
 
     Example: stopgo watch --robot r1 --rrd field.rrd
+
+    Example: stopgo watch --mavlink udpout:127.0.0.1:14550 --rrd field.rrd
     """
     from bridge.watch import Lines, Table, watch_showing
 
     with (
         recording(rrd, view=view) as record,
-        reached(Way(robot, connect, site, None, timeout, insecure, keys)) as station,
+        reached(way.to_look(compares=True)) as station,
     ):
         state = watch_showing(station, record, Table() if sys.stderr.isatty() else Lines(say))
     if json_:
@@ -483,42 +512,9 @@ def recording(path: Path | None, *, view: bool) -> AbstractContextManager[Record
     return Viewed(record)
 
 
-@dataclass(frozen=True)
-class Way:
-    """How a robot is to be reached, and by whom."""
-
-    robot: str
-    endpoint: str
-    site: str | None
-    who: str | None
-    timeout_s: float
-    insecure: bool
-    keys: Path | None
-    patience_s: float = 20.0
-    """For each piece of a mission that is pushed."""
-
-
 def pushing(way: Way, timeout_s: float | None) -> Way:
     """The way for a push, which takes as long as it takes: its timeout is that without an answer."""
     return way if timeout_s is None else replace(way, timeout_s=timeout_s, patience_s=timeout_s)
-
-
-def reached(way: Way) -> AbstractContextManager[Station]:
-    from bridge.station import connect
-
-    return connect(
-        way.endpoint, robot=way.robot, site=way.site, commander=way.who, timeout_s=way.timeout_s,
-        patience_s=way.patience_s, insecure=way.insecure, keys=way.keys,
-    )  # fmt: skip
-
-
-@contextmanager
-def in_time(way: Way) -> Iterator[Station]:
-    """A robot that has been reached, with what is left of the time for one question or order."""
-    began = time.monotonic()
-    with reached(way) as station:
-        station.timeout_s = max(LEAST_S, way.timeout_s - (time.monotonic() - began))
-        yield station
 
 
 def report_answer(answer: Answer, robot: str, json_: bool) -> None:
@@ -570,33 +566,3 @@ def read_pose(option: str, text: str) -> Pose:
     if not all(map(math.isfinite, (x, y, heading))):
         raise InputError(f"{option} {text}: must be finite numbers")
     return Pose(x=x, y=y, heading=math.radians(heading))
-
-
-class Bar:
-    """A progress bar on stderr, if that is a terminal."""
-
-    def __init__(self, label: str) -> None:
-        self._label = label
-        self._shows = sys.stderr.isatty()
-
-    def __enter__(self) -> Bar:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        if self._shows:
-            print(file=sys.stderr)  # noqa: T201
-
-    def show(self, done: int, total: int) -> None:
-        if self._shows:
-            filled = 30 * done // max(1, total)
-            bar = "█" * filled + "·" * (30 - filled)
-            print(f"\r{self._label} {bar} {done / 1e3:.0f}/{total / 1e3:.0f} kB", end="", file=sys.stderr)  # noqa: T201
-
-
-def say(line: str) -> None:
-    """One line for the person, on stderr."""
-    print(line, file=sys.stderr, flush=True)  # noqa: T201
-
-
-def print_json(document: dict[str, Any]) -> None:
-    print(json.dumps(document))  # noqa: T201
