@@ -181,8 +181,6 @@ class Transfers:
         fault = self._mishaps.once("nack", number)
         if fault:
             return int(fault.amount) or int(dialect.MAV_MISSION_ERROR)
-        if up.kind == MISSION and number == 0 and self._profile.autopilot.home_first:
-            return int(ACCEPTED)
         return verdict(self._profile, up.kind, item)
 
     def _take(self, up: Upload, item: Item, *, marked: bool) -> None:

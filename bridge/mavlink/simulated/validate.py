@@ -15,6 +15,8 @@ from mission.mavlink.keeping import PLACED
 ACCEPTED = dialect.MAV_MISSION_ACCEPTED
 FENCE_COMMANDS = range(5000, 5005)
 RALLY_COMMANDS = range(5100, 5101)
+ARDUPILOT_HIGHEST_M = 83_000
+"""Source: LOCATION_ALT_MAX_M."""
 GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})
 PX4_FRAMES = frozenset({0, 3, 5, 6})
 INVALID_PARAM = (
@@ -36,6 +38,8 @@ def verdict(profile: Profile, kind: int, item: Item) -> int:
         return _of_px4(item, placed)
     if placed and item.frame not in GLOBAL_FRAMES | {Frame.MISSION}:
         return dialect.MAV_MISSION_UNSUPPORTED_FRAME
+    if placed and profile.name == "ardupilot" and abs(item.z) >= ARDUPILOT_HIGHEST_M:
+        return dialect.MAV_MISSION_INVALID_PARAM7
     return _of_numbers(item, MAY_BE_NAN.get(item.command, ())) or (_of_place(item) if placed else ACCEPTED)
 
 

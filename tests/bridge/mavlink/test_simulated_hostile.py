@@ -1,0 +1,91 @@
+"""Whatever is sent to the vehicle, it answers the next good message; 20 000 times with STOPGO_FAULTS=full."""
+
+from __future__ import annotations
+
+import math
+import socket
+
+import pytest
+
+from bridge.mavlink.simulated.process import vehicle_on
+from bridge.mavlink.simulated.profile import PROFILES
+from bridge.mavlink.simulated.vehicle import Setting
+from bridge.mavlink.url import Url
+from bridge.mavlink.wire import Message, Wire, dialect, wire
+from tests.bridge.mavlink.bench import ACCEPTED, ORIGIN, Bench, delay, waypoint
+from tests.bridge.mavlink.hostile import Hostile
+from tests.bridge.mavlink.scripted import free_udp_port
+from tests.faults.sizes import size
+
+FRAMES = size(short=3000, full=20_000)
+BURST = 100
+SEEDS = range(size(short=1, full=3))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("profile", list(PROFILES))
+def test_messages_that_make_no_sense_are_survived(profile: str, seed: int) -> None:
+    """Without a socket: an exception anywhere fails here, and so does an answer that cannot be packed."""
+    hostile = Hostile(seed)
+    bench = Bench(profile, origin=ORIGIN if seed % 2 else None)
+    for number in range(FRAMES):
+        bench.say(hostile.message())
+        if number % 20 == 0:
+            bench.pass_time(hostile.chance.choice((0.1, 1.0, 5.0)), step_s=0.1)
+        if number % 200 == 0:
+            pose, speed = bench.vehicle.motion()
+            assert all(map(math.isfinite, (pose.x, pose.y, pose.heading, speed)))
+            bench.all.clear()
+    bench.pass_time(20.0)
+    bench.count(0)
+    assert bench.upload([waypoint(1.0, 0.0), delay(1.0)]) == ACCEPTED
+    assert len(bench.held()) == 2
+    assert bench.vehicle.set_mode("hold")
+
+
+@pytest.mark.parametrize("profile", list(PROFILES))
+def test_a_vehicle_on_the_wire_answers_after_every_burst_of_hostile_datagrams(profile: str) -> None:
+    hostile, port = Hostile(7), free_udp_port()
+    ask = dialect.MAVLink_command_long_message(
+        1, 1, dialect.MAV_CMD_REQUEST_MESSAGE, 0, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0, 0, 0, 0, 0, 0
+    )
+    with (
+        vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES[profile], origin=ORIGIN)) as stopped,
+        wire(Url("udpout", "127.0.0.1", port)) as station,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+    ):
+        for _ in range(FRAMES // BURST):
+            for datagram in hostile.datagrams(BURST):
+                stranger.sendto(datagram, ("127.0.0.1", port))
+            assert answered(station, ask), "the vehicle is silent"
+        assert not stopped.is_set()
+
+
+def answered(station: Wire, message: Message) -> bool:
+    """Whether an AUTOPILOT_VERSION comes; a vehicle that was made to reboot is away for a second."""
+    with station.box("AUTOPILOT_VERSION") as box:
+        for _ in range(60):
+            station.send(message)
+            if box.get(0.25) is not None:
+                return True
+    return False
+
+
+def test_a_signing_vehicle_does_nothing_that_a_stranger_says() -> None:
+    hostile, port, key = Hostile(3), free_udp_port(), bytes(32)
+    with (
+        vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES["strict"]), signing_key=key),
+        wire(Url("udpout", "127.0.0.1", port), signing_key=key) as station,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+        station.box("HEARTBEAT", "MISSION_CURRENT") as box,
+    ):
+        for datagram in hostile.datagrams(FRAMES):
+            stranger.sendto(datagram, ("127.0.0.1", port))
+        station.beat(lambda: dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+        seen = [box.get(5.0) for _ in range(4)]
+    assert {message.get_type() for message in seen} == {"HEARTBEAT", "MISSION_CURRENT"}
+    for message in seen:
+        if message.get_type() == "HEARTBEAT":
+            assert not message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        else:
+            assert (message.total, message.mission_state) == (0, dialect.MISSION_STATE_NO_MISSION)
