@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Iterator
 from typing import Any
 
 from bridge.mavlink.wire import Message, dialect
+from mission.mavlink.items import Item
 
 FLOATS = (
     0.0, -0.0, 1.0, -1.0, 0.5, 90.0, 1e7, 1e38, -1e38, 1e-45, float("inf"), float("-inf"), float("nan"),
@@ -53,6 +55,20 @@ class Hostile:
         lengths = dict(zip(made.ordered_fieldnames, made.array_lengths, strict=True))
         fields = zip(made.fieldnames, made.fieldtypes, strict=True)
         return made(*(self._value(field, kind, lengths[field]) for field, kind in fields))
+
+    def items(self) -> list[Item]:
+        """A short mission of items that a vehicle may take, with numbers that it must live with."""
+        return [self._item() for _ in range(self.chance.randrange(1, 6))]
+
+    def _item(self) -> Item:
+        near = self.chance.choice((0, 100, -300, 20_000_000, 2**31 - 1 - 850_000_000))
+        params = [self.chance.choice((*FLOATS, 2.0, 3.0)) for _ in range(4)]
+        if self.chance.random() < 0.9:
+            params = [value if math.isfinite(value) else 0.0 for value in params]
+        command = self.chance.choice((16, 16, 16, 17, 19, 20, 93, 93, 178, 203, 217, 2000, 42702))
+        frame = 6 if command in (16, 17, 19) else 2
+        one, two, three, four = params
+        return Item(command, frame, (one, two, three, four), 474_000_000 + near % 300, 85_000_000 + near)
 
     def frame(self) -> bytes:
         message, coder = self.message(), self.chance.choice(self._coders)
