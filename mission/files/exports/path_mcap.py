@@ -108,7 +108,7 @@ def _latched() -> Any:
         QosTime,
     )
 
-    ever = QosTime(sec=2147483647, nsec=4294967295)
+    ever = QosTime(sec=9_223_372_036, nsec=854_775_807)  # as ROS 2 writes "no limit"
     return Qos(
         QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL,
         ever, ever, QosLiveliness.AUTOMATIC, ever, avoid_ros_namespace_conventions=False,

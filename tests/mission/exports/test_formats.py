@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from mission.cli import FORMAT_NAMES, export
 from mission.document import Frame, Mission, Transform, digest_of
 from mission.errors import InputError, StopgoError
 from mission.files import exports
@@ -92,3 +93,9 @@ def test_an_unknown_suffix_lists_the_formats(path: str) -> None:
 def test_an_unknown_format_lists_the_formats() -> None:
     with pytest.raises(InputError, match="--to dwg: no such format; known: plan, waypoints, dxf"):
         format_named("dwg", Path("x.dxf"))
+
+
+def test_the_help_names_every_format() -> None:
+    for name, form in FORMATS.items():
+        assert form.suffix in (export.__doc__ or "")
+        assert name in FORMAT_NAMES.replace(",", "").split()
