@@ -26,6 +26,7 @@ from bridge.lease import FREE_VERBS
 from bridge.link import Link
 from bridge.protocol import (
     CHUNK_BYTES,
+    LONGEST_VALID_S,
     VERSION,
     Accepted,
     Answer,
@@ -170,7 +171,10 @@ class Station:
 
     def info(self, *, within_s: float | None = None) -> Info:
         """What the robot says of itself."""
-        reply = self._insist(self.keys.info, b"", self.timeout_s if within_s is None else within_s)
+        within_s = self.timeout_s if within_s is None else within_s
+        reply = self._insist(self.keys.info, b"", within_s)
+        if reply is None:
+            raise OutcomeUnknown(f"{self.keys.robot} did not tell its state within {within_s:.1f} s")
         info = self._answered(reply, Info, "info")
         if info.protocol != VERSION:
             raise InputError(
@@ -210,7 +214,7 @@ class Station:
         info = self.info(within_s=self.patience_s)
         commit = Commit(
             manifest=manifest, commander=self.commander, take_over=take_over, nonce=uuid.uuid4().hex,
-            not_after_ns=info.clock_ns + round(COMMIT_VALID_S * 1e9),
+            not_after_ns=info.clock_ns + round(max(COMMIT_VALID_S, self.patience_s) * 1e9),
             fence=info.lease.fence if info.lease else None,
         )  # fmt: skip
         accepted = self._step(manifest, "commit", encode(commit), Accepted)
@@ -264,10 +268,8 @@ class Station:
         deadline = time.monotonic() + self.timeout_s
         try:
             order = self.order(verb, **details)
-        except OutcomeUnknown:
-            raise RobotUnreachable(
-                f"{self.keys.robot} did not tell its state within {self.timeout_s:g} s; {verb} was not sent"
-            ) from None
+        except OutcomeUnknown as error:
+            raise RobotUnreachable(f"{error}; {verb} was not sent") from None
         return self.give(order, within_s=max(LEAST_S, deadline - time.monotonic()))
 
     def _may_order(self, what: str) -> None:
@@ -291,7 +293,7 @@ class Station:
         state, cautious = info.state, verb not in FREE_VERBS
         meant: dict[str, Any] = {
             "commander": self.commander,
-            "valid_for_s": self.timeout_s,
+            "valid_for_s": min(self.timeout_s, LONGEST_VALID_S),
             "run_id": None if verb == "start" else state.run_id,
             "mission_id": state.mission_id,
             # A pause is meant for the run, also if it has just gone on by a new revision.

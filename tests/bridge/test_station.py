@@ -110,3 +110,10 @@ def test_a_push_goes_on_for_as_long_as_its_pieces_are_answered(time: StoppedTime
     sent = len(link.asked)
     station.push(corridor(stops=400, revision=2))
     assert not any(key.endswith("/chunk/0") for key in link.asked[sent:])
+
+
+def test_an_order_may_be_waited_for_longer_than_it_may_be_valid() -> None:
+    field = Field()
+    field.station().push(corridor())
+    station = Station(field.board.link(), field.keys, commander="test", timeout_s=300.0)
+    assert station.command("start").outcome == "ok"
