@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import uuid
+from dataclasses import replace
 from functools import partial
 
 from bridge import run as runs
@@ -16,6 +17,7 @@ from bridge.mavlink.modes import AUTO
 from bridge.mavlink.peer import Peer
 from bridge.mavlink.progress import SOMEBODY, Sight, steps, tried_again
 from bridge.mavlink.visits import Course
+from bridge.mavlink.wire import dialect
 from bridge.run import Change, Run
 from mission.errors import OutcomeUnknown, RobotUnreachable
 from mission.events import Arrived
@@ -26,6 +28,8 @@ SETTLED_NS = 1_500_000_000
 REMEMBERED_NS = 60 * 10**9
 """An order whose outcome was unknown is taken to be the cause of what the vehicle does so much later."""
 AGAIN_S = 1.0
+GRACE_NS = 2 * 10**9
+"""How long after the end of a scan's wait its confirmation may come."""
 AT_STOP = ("SETTLING", "SCANNING", "VERIFYING")
 
 
@@ -49,6 +53,8 @@ class Follower:
         """How the vehicle's mission differs from what it was sent; `None` while nobody has compared them."""
         self.looking = False
         """Nothing is made of what comes in before all is known that can be asked for."""
+        self._left: tuple[tuple[str, int, int], int] | None = None
+        """The stop that the vehicle has left without a word of a scan, and since when."""
         self.run = book.run
         """As it is by now."""
 
@@ -66,17 +72,36 @@ class Follower:
             self._look_at_clock()
         if course is None or self.run.state == "IDLE" or self._busy():
             return
-        sight = self._lookout.sight(self.run, course, self._arrived(course))
+        while self._look_once(course):
+            pass
+
+    def _look_once(self, course: Course) -> bool:
+        """Take in what is seen of the stop that is worked on; whether the run went on by it."""
+        before, sight = self.run, self._sight(course)
         if sight is None:
-            return
+            return False
         if self._looks_only:
-            happened = self._happened(self.run, course, sight)
-            self.run = happened[-1].run if happened else self.run
-            return
-        self.run = self._book.move(
-            lambda run: self._happened(run, course, sight), partial(self._owing, course)
-        )
-        self._lead_past(course, sight)
+            happened = self._happened(before, course, sight)
+            self.run = happened[-1].run if happened else before
+        else:
+            owing = partial(self._owing, course)
+            self.run = self._book.move(lambda run: self._happened(run, course, sight, before), owing)
+            self._lead_past(course, sight)
+        return self.run.at > before.at and self._book.owed is None
+
+    def _sight(self, course: Course) -> Sight | None:
+        """The vehicle as it is seen now; asked once more for a scan of a stop that it has left."""
+        run, now_ns = self.run, self._book.clock.now_ns()
+        sight = self._lookout.sight(run, course, self._arrived(course))
+        scanning = run.stop_state == "SCANNING" and run.at < len(course.visits)
+        if sight is None or not scanning or sight.place < course.visits[run.at].after:
+            return sight
+        stop = (run.run_id or "", run.at, run.attempt)
+        if self._left is None or self._left[0] != stop:
+            self._left = (stop, now_ns)
+        if sight.scan is None:
+            self._hands.ask_for(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
+        return replace(sight, in_vain=now_ns > self._left[1] + GRACE_NS)
 
     def _busy(self) -> bool:
         """Whether the vehicle is being told something: what it does until then is neither here nor there."""
@@ -93,8 +118,12 @@ class Follower:
         self._hands.ask_for_telemetry()
         self.run = self._book.move(_rebooted)
 
-    def _happened(self, run: Run, course: Course, sight: Sight) -> tuple[Change, ...]:
-        """The steps of the run, or what others have done to it."""
+    def _happened(
+        self, run: Run, course: Course, sight: Sight, seen_as: Run | None = None
+    ) -> tuple[Change, ...]:
+        """The steps of the run, or what others have done to it; none if it is no longer what was seen."""
+        if seen_as is not None and run != seen_as:
+            return ()
         told = steps(run, course, sight)
         now = told[-1].run if told else run
         if told and (now.over or tried_again(run, now) or now.state == "HELD"):

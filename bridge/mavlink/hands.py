@@ -15,6 +15,7 @@ from mission.errors import OutcomeUnknown
 
 SHOWS_S = 5.0
 """A vehicle beats every second; so long it may take until it shows what it was told."""
+ASK_AGAIN_NS = 500_000_000
 REPEATED_HZ = {
     dialect.MAVLINK_MSG_ID_MISSION_CURRENT: 5.0,
     dialect.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: 2.0,
@@ -47,6 +48,7 @@ class Hands:
         self._modes = modes
         self._lookout = lookout
         self._clock = clock
+        self._asked_ns = 0
 
     def ask_for_telemetry(self) -> None:
         """Ask to be told everything often, without waiting for answers: some vehicles know no intervals."""
@@ -57,6 +59,20 @@ class Hands:
                 number, 1e6 / per_s, 0, 0, 0, 0, 0,
             )  # fmt: skip
             self._peer.send(message)
+
+    def ask_for(self, number: int) -> None:
+        """Ask for a message once more, without waiting; at most twice a second."""
+        now_ns = self._clock.now_ns()
+        if now_ns < self._asked_ns + ASK_AGAIN_NS:
+            return
+        self._asked_ns = now_ns
+        who = self._peer.who
+        request = dialect.MAV_CMD_REQUEST_MESSAGE
+        self._peer.send(
+            dialect.MAVLink_command_long_message(
+                who.system, who.component, request, 0, number, 0, 0, 0, 0, 0, 0
+            )
+        )
 
     def hold(self) -> None:
         """Let it stand where it is."""

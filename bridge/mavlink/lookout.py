@@ -22,8 +22,6 @@ from mission.mavlink.autopilots import autopilot_named
 
 STILL_M_PER_S = 0.05
 """An estimator's speed of a robot that stands is not zero."""
-GRACE_NS = 2 * 10**9
-"""How long after the end of a scan's wait its confirmation may come."""
 CAPTURES_KEPT = 100
 EARLY_NS = 5 * 10**9
 TOLD = (
@@ -143,7 +141,6 @@ class Lookout:
             still=fix is not None and fix.speed < STILL_M_PER_S,
             scan=None if capture is None else capture.result,
             stood=arrived.pose if arrived is not None else stood,
-            in_vain=self._clock.now_ns() > began_ns + GRACE_NS,
         )  # fmt: skip
 
     def place(self, course: Course) -> int:

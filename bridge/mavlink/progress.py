@@ -50,11 +50,11 @@ class Sight:
 
 
 def steps(run: Run, course: Course, sight: Sight) -> tuple[Change, ...]:
-    """All that has happened since the run was stored, one after another; none past a failure."""
+    """What has happened since the run was stored, one after another, up to the end of the present stop."""
     taken: list[Change] = []
     while (change := step(run, course, sight)) is not None:
         taken.append(change)
-        if tried_again(run, change.run):  # it must be sent back before it is looked at again
+        if change.run.at != run.at or tried_again(run, change.run):  # the sight is of this stop, this time
             break
         run = change.run
     return tuple(taken)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,6 +33,7 @@ from tests.bridge.mavlink.scripted import free_udp_port
 from tests.mission.worlds import mission_of, stop
 
 SPEED_UP = 5.0
+PATIENCE_S = 60.0
 KINDS = {"strict": "generic", "ardupilot": "ardupilot", "px4": "px4"}
 """The autopilot of each profile of the simulated vehicle."""
 
@@ -46,7 +49,7 @@ def tour(**details: Any) -> Mission:
 
 
 def quick(one: Stop, **details: Any) -> Stop:
-    plain = {"settle_s": 2.0, "scan": Scan(profile="default", duration_s=4.0, timeout_s=20.0), "retries": 0}
+    plain = {"settle_s": 1.0, "scan": Scan(profile="default", duration_s=2.0, timeout_s=20.0), "retries": 0}
     return msgspec.structs.replace(one, **(plain | details))
 
 
@@ -125,3 +128,31 @@ ALL = [
     "Finished",
 ]
 """What is told of a run of the tour in which all goes well."""
+
+
+@contextmanager
+def watched(site: Site, **options: Any) -> Iterator[list[Any]]:
+    """A watch in a process of its own; the block ends when the run has."""
+    seen: list[Any] = []
+
+    def follow() -> None:
+        with site.reached(**options) as station:
+            ready.set()
+            seen.extend(station.reports())
+
+    ready = threading.Event()
+    thread = threading.Thread(target=follow, daemon=True)
+    thread.start()
+    assert ready.wait(PATIENCE_S)
+    yield seen
+    thread.join(PATIENCE_S)
+    assert not thread.is_alive(), told(site.events)
+
+
+def until(site: Site, seen: Callable[[tuple[AnyEvent, ...], Run], bool]) -> None:
+    """Wait until the logbook has come so far, however long that takes within reason."""
+    deadline = time.monotonic() + PATIENCE_S
+    with site.book() as book:
+        while not seen(book.journal.events(), book.run):
+            assert time.monotonic() < deadline, (told(book.journal.events()), book.run)
+            time.sleep(0.05)
