@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -217,6 +218,15 @@ def export(
     floor: Annotated[Path | None, typer.Option(help="The floor's .dxf, to draw over.")] = None,
     coverage: Annotated[Path | None, typer.Option(help="coverage.json, to draw what is seen.")] = None,
     autopilot: AutopilotOption = None,
+    trigger: Annotated[
+        str | None, typer.Option(metavar="auto|script|camera|none", help="What makes the vehicle scan.")
+    ] = None,
+    scan_wait: Annotated[
+        str | None, typer.Option(metavar="delay|script_time", help="How the vehicle waits for a scan.")
+    ] = None,
+    settle: Annotated[
+        str | None, typer.Option(metavar="delay|hold", help="Settle in an item of its own, or as a hold.")
+    ] = None,
     origin: OriginOption = None,
     map_: Annotated[
         str | None,
@@ -238,11 +248,12 @@ def export(
     for problem in problems_of(document)[:1]:
         raise AnswerIsNo(f"{mission}: {problem} (stopgo check {mission} lists all)")
     name = format_named(to, out)
+    writing = {"autopilot": autopilot, "trigger": trigger, "scan-wait": scan_wait, "settle": settle}
     drawn = {"floor": floor, "coverage": coverage}
-    check_uses(name, {**drawn, "autopilot": autopilot, "origin": origin, "map": map_})
+    check_uses(name, {**drawn, **writing, "origin": origin, "map": map_})
     if out.exists() and out.samefile(mission):
         raise InputError(f"{out}: is the mission itself; choose another file for the export")
-    supplements = _supplements(document, floor, coverage, autopilot)
+    supplements = _supplements(document, floor, coverage, writing)
     there = placed(document, origin=origin, to_map=map_)
     data = exported(there, name, supplements)
     write_checked(out, data)
@@ -252,14 +263,13 @@ def export(
 
 
 def _supplements(
-    mission: Mission, floor: Path | None, coverage: Path | None, autopilot: str | None
+    mission: Mission, floor: Path | None, coverage: Path | None, writing: dict[str, str | None]
 ) -> Supplements:
-    from mission.files.exports.format import Supplements
+    from mission.files.exports.format import written_as
     from mission.files.exports.stretches import read_stretches
-    from mission.mavlink.autopilots import autopilot_named
 
-    return Supplements(
-        autopilot=autopilot_named(autopilot or "ardupilot").name,
+    return replace(
+        written_as(writing),
         floor=None if floor is None else _floor_drawing(floor, mission),
         coverage=None if coverage is None else read_stretches(coverage, mission),
         written=datetime.now(UTC),

@@ -23,14 +23,17 @@ from mission.files.exports.format import Format, Supplements
 QUANTUM = 0.008
 """Metres by which 1e-7 degrees move a place at most."""
 
+WRITING = ("autopilot", "trigger", "scan-wait", "settle")
+"""Options by which a mission is written as items."""
+
 FORMATS: dict[str, Format] = {
     "plan": Format(
         ".plan", "QGroundControl plan", qgc_plan.write, qgc_plan.read_back, QUANTUM,
-        georeferenced=True, uses=("origin", "autopilot"), notes=qgc_plan.notes,
+        georeferenced=True, uses=("origin", *WRITING), notes=qgc_plan.notes,
     ),
     "waypoints": Format(
         ".waypoints", "QGC WPL 110", qgc_waypoints.write, qgc_waypoints.read_back, QUANTUM,
-        georeferenced=True, uses=("origin", "autopilot"), notes=qgc_waypoints.notes,
+        georeferenced=True, uses=("origin", *WRITING), notes=qgc_waypoints.notes,
     ),
     "dxf": Format(
         ".dxf", "DXF drawing", stops_dxf.write, stops_dxf.read_back, 1e-6,

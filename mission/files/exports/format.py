@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from mission.document import Mission, Point
+from mission.errors import InputError
 from mission.files.exports.stretches import Stretches
+from mission.mavlink.autopilots import AUTOPILOTS
+from mission.mavlink.manner import ScanWait, Settle, Trigger
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -29,10 +32,31 @@ class Supplements:
     """What an exporter is given besides the mission; each uses only what its `Format.uses` names."""
 
     autopilot: str = "ardupilot"
+    trigger: Trigger = "auto"
+    scan_wait: ScanWait = "delay"
+    settle: Settle = "delay"
+    """How the mission is written as items; `mission.mavlink.translate.translate` says what each means."""
     floor: FloorDrawing | None = None
     coverage: Stretches | None = None
     written: datetime = datetime(1970, 1, 1, tzinfo=UTC)
     """The time that files with a time stamp get."""
+
+
+def written_as(options: Mapping[str, str | None]) -> Supplements:
+    """Supplements by the words given for `--autopilot`, `--trigger`, `--scan-wait` and `--settle`.
+
+    Raises
+    ------
+    InputError
+        Naming the option, the word and those that are known.
+    """
+    given = {option.replace("-", "_"): word for option, word in options.items() if word is not None}
+    hints = {"trigger": Trigger, "scan_wait": ScanWait, "settle": Settle}
+    for option, word in given.items():
+        known = get_args(hints[option]) if option in hints else tuple(AUTOPILOTS)
+        if word not in known:
+            raise InputError(f"--{option.replace('_', '-')} {word}: one of {', '.join(known)}")
+    return Supplements(**given)  # type: ignore[arg-type]  # checked above
 
 
 Writer = Callable[[Mission, Supplements], bytes]
@@ -58,6 +82,6 @@ class Format:
     georeferenced: bool = False
     """Whether it holds latitudes and longitudes, so that a mission without georeference is refused."""
     uses: tuple[str, ...] = ()
-    """The options it has a use for, of floor, coverage, autopilot, origin and map."""
+    """The options it has a use for, by their names without hyphens in front."""
     notes: Callable[[Mission, Supplements], tuple[str, ...]] = _nothing
     """What the person should know of this export, such as what the format cannot hold."""

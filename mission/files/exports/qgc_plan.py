@@ -31,7 +31,7 @@ FILE_FRAMES = {Frame.GLOBAL_INT: Frame.GLOBAL, Frame.GLOBAL_RELATIVE_ALT_INT: Fr
 
 def write(mission: Mission, supplements: Supplements) -> bytes:
     """The plan; `stopgo` holds what items cannot: the stops' ids and the bearing of the site's +y axis."""
-    items = translate(mission, supplements.autopilot)
+    items = items_of(mission, supplements)
     origin, speed = items.origin, mission.robot.speed
     own = {"heading_deg": origin.heading_deg, "stops": _ids(items)}
     home = (origin.lat, origin.lon, origin.alt)
@@ -63,6 +63,17 @@ def listed(
     return msgspec.json.format(msgspec.json.encode(plan), indent=2) + b"\n"
 
 
+def items_of(mission: Mission, supplements: Supplements) -> ItemList:
+    """The items that `stopgo push --mavlink` sends with the same options."""
+    return translate(
+        mission,
+        supplements.autopilot,
+        trigger=supplements.trigger,
+        scan_wait=supplements.scan_wait,
+        settle=supplements.settle,
+    )
+
+
 def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
     """The stops as `stopgo import` finds them."""
     return [visit.xy for visit in qgc_plan.read(data, "plan", Given(mission.georeference)).visits]
@@ -70,7 +81,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
     """What the autopilot does not do by itself."""
-    return translate(mission, supplements.autopilot).notes
+    return items_of(mission, supplements).notes
 
 
 def _simple(item: Item, number: int) -> dict[str, Any]:

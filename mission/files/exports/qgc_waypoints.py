@@ -7,18 +7,17 @@ from collections.abc import Sequence
 
 from mission.document import Mission, Point
 from mission.files.exports.format import Supplements
-from mission.files.exports.qgc_plan import FILE_FRAMES, place
+from mission.files.exports.qgc_plan import FILE_FRAMES, items_of, place
 from mission.files.imports import qgc_waypoints
 from mission.files.imports.qgc_waypoints import HEAD
 from mission.files.imports.track import Given
 from mission.mavlink.autopilots import home_item
 from mission.mavlink.items import Item
-from mission.mavlink.translate import translate
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:
     """The table: tabs, twelve columns, ten decimals of degrees, the site's origin as home."""
-    items = translate(mission, supplements.autopilot)
+    items = items_of(mission, supplements)
     return listed([home_item(items.origin), *items.items])
 
 
@@ -36,7 +35,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
     """What the autopilot does not do by itself, and what the table has no column for."""
     heading = "the bearing of the site's +y axis and the stops' ids are not in this table"
-    return (heading, *translate(mission, supplements.autopilot).notes)
+    return (heading, *items_of(mission, supplements).notes)
 
 
 def _row(number: int, item: Item) -> str:

@@ -119,3 +119,30 @@ def test_a_mission_that_needs_its_headings_is_refused_for_who_drops_them(name: s
     with pytest.raises(AnswerIsNo, match=r"stop s01: heading 200\.0° is needed"):
         exported(made, name, Supplements(autopilot="ardupilot"))
     assert exported(made, name, Supplements(autopilot="px4"))
+
+
+WAYS = [
+    Supplements(trigger="camera"),
+    Supplements(trigger="none"),
+    Supplements(settle="hold"),
+    Supplements(scan_wait="script_time"),
+    Supplements(autopilot="px4", settle="hold", trigger="none"),
+]
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", ["plan", "waypoints"])
+def test_items_are_those_that_a_push_sends_with_the_same_options(
+    name: str, way: Supplements, file: FileOf
+) -> None:
+    data = exported(laboratory(), name, way)
+    sent = translate(
+        laboratory(), way.autopilot, trigger=way.trigger, scan_wait=way.scan_wait, settle=way.settle
+    )
+    told = [item.command for item in sent.items]
+    if name == "plan":
+        assert [item["command"] for item in json.loads(data)["mission"]["items"]] == told
+    else:
+        loader = MAVWPLoader()
+        loader.load(file(data, "site.waypoints"))
+        assert [loader.wp(number).command for number in range(1, loader.count())] == told
