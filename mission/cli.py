@@ -251,8 +251,7 @@ def export(
     writing = {"autopilot": autopilot, "trigger": trigger, "scan-wait": scan_wait, "settle": settle}
     drawn = {"floor": floor, "coverage": coverage}
     check_uses(name, {**drawn, **writing, "origin": origin, "map": map_})
-    if out.exists() and out.samefile(mission):
-        raise InputError(f"{out}: is the mission itself; choose another file for the export")
+    _keep(out, {"the mission": mission, "the floor": floor, "the coverage": coverage})
     supplements = _supplements(document, floor, coverage, writing)
     there = placed(document, origin=origin, to_map=map_)
     data = exported(there, name, supplements)
@@ -260,6 +259,13 @@ def export(
     notes = FORMATS[name].notes(there, supplements)
     report = {"mission": str(mission), "file": str(out), "format": name, "stops": len(there.stops)}
     _say_export({**report, "bytes": len(data), "notes": notes}, FORMATS[name].title, as_json)
+
+
+def _keep(out: Path, read_from: dict[str, Path | None]) -> None:
+    """Refuse to write over what is exported from."""
+    for what, path in read_from.items():
+        if path is not None and path.exists() and out.exists() and out.samefile(path):
+            raise InputError(f"{out}: is {what} itself; choose another file for the export")
 
 
 def _supplements(

@@ -116,6 +116,21 @@ def test_the_mission_itself_is_never_overwritten(path: str, capsys: Captured) ->
     assert Path(path).read_bytes() == before
 
 
+@pytest.mark.parametrize("name", ["room.dxf", "coverage.json"])
+def test_neither_floor_nor_coverage_is_overwritten(
+    name: str, path: str, tmp_path: Path, capsys: Captured
+) -> None:
+    given = {"room.dxf": "--floor", "coverage.json": "--coverage"}[name]
+    (tmp_path / name).write_bytes(b"kept")
+    (tmp_path / "link").symlink_to(tmp_path / name)
+    arguments = [path, "--to", "dxf", given, str(tmp_path / name)]
+    for out in (name, "link"):
+        code, _, err = exit_of([*arguments, "-o", str(tmp_path / out)], capsys)
+        assert code == 2
+        assert "itself; choose another file for the export" in err
+    assert (tmp_path / name).read_bytes() == b"kept"
+
+
 def test_a_senseless_mission_is_no(path: str, tmp_path: Path, capsys: Captured) -> None:
     robot = msgspec.structs.replace(laboratory().robot, speed=-1.0)
     mission_json.write(msgspec.structs.replace(laboratory(), robot=robot), tmp_path / "bad.json")
