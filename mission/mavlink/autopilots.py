@@ -39,8 +39,8 @@ class Autopilot:
     """Keeps a waypoint's acceptance radius and heading."""
     reached: str
     """Where it counts a waypoint as reached, in words."""
-    unturned: str
-    """Why a robot does not turn to a stop's heading, in words; empty if it does."""
+    turns: bool
+    """A rover turns to a heading that it keeps."""
     max_delay_s: float
 
     def kept(self, item: Item) -> Item:
@@ -66,7 +66,7 @@ AUTOPILOTS: dict[str, Autopilot] = {
     "ardupilot": Autopilot(
         name="ardupilot", rule="ardupilot", frame=Frame.GLOBAL_RELATIVE_ALT_INT, max_items=655,
         home_first=True, keep=ardupilot_keeps, brake_hold_s=1, keeps_arrival=False, max_delay_s=4_294_967.0,
-        reached="within its parameter WP_RADIUS, or once past it", unturned="ardupilot drops it",
+        reached="within its parameter WP_RADIUS, or once past it", turns=False,
         commands=frozenset({
             Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.NAV_SCRIPT_TIME,
             Command.DO_SEND_SCRIPT_MESSAGE, Command.IMAGE_START_CAPTURE,
@@ -76,7 +76,7 @@ AUTOPILOTS: dict[str, Autopilot] = {
         name="px4", rule="px4", frame=Frame.GLOBAL_RELATIVE_ALT_INT, max_items=500,
         home_first=False, keep=px4_keeps, brake_hold_s=0, keeps_arrival=True, max_delay_s=4_294_967.0,
         reached="within its parameter NAV_ACC_RAD, 10 m unless set",
-        unturned="px4 keeps it but turns no rover to it",
+        turns=False,
         commands=frozenset({
             Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.IMAGE_START_CAPTURE,
         }),
@@ -84,7 +84,7 @@ AUTOPILOTS: dict[str, Autopilot] = {
     "generic": Autopilot(
         name="generic", rule="wgs84", frame=Frame.GLOBAL_RELATIVE_ALT_INT, max_items=UINT16_MAX,
         home_first=False, keep=as_sent, brake_hold_s=0, keeps_arrival=True, max_delay_s=4_294_967.0,
-        reached="within the acceptance radius that is sent", unturned="",
+        reached="within the acceptance radius that is sent", turns=True,
         commands=frozenset({
             Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.IMAGE_START_CAPTURE,
         }),
