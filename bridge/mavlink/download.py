@@ -21,7 +21,7 @@ Progress = Callable[[int, int], None]
 ONE_BY_ONE = frozenset({"px4"})
 """Source: PX4 ends a transfer when an item is asked for that is neither the next nor the last."""
 REFUSALS = 3
-"""So many in a row are meant; fewer may be late answers to something else."""
+"""So many tries that end with one are meant; fewer may have met late answers to something else."""
 LAST_WORDS = 3
 """The end of a transfer is not answered, so it is said so often: until it hears, PX4 takes no other."""
 
@@ -66,7 +66,10 @@ class _Reading:
         self._asked_s: dict[int, float] = {}
         """When each item that is under way was asked for last."""
         self._asked_again: set[int] = set()
+        self._refused = False
+        """Whether something was refused since the last item came; one by one, since the last try."""
         self._refusals = 0
+        self._result = dialect.MAV_MISSION_ACCEPTED
 
     def run(self) -> int | None:
         """Read everything; what the vehicle refuses with, or `None`."""
@@ -78,27 +81,26 @@ class _Reading:
                 message = box.get(self._pace.again_s if self._count is None else self._due_s())
                 if message is None:
                     self._again()
-                elif of_mission(message) and (refused := self._take(message)) is not None:
-                    return refused
+                elif of_mission(message):
+                    self._take(message)
+                if self._refusals >= REFUSALS:
+                    return self._result
         for _ in range(LAST_WORDS):
             self._peer.send(ack_message(dialect.MAV_MISSION_ACCEPTED, self._peer.who))
         return None
 
-    def _take(self, message: Message) -> int | None:
+    def _take(self, message: Message) -> None:
         name = message.get_type()
         if name == "MISSION_ACK":
-            return self._take_refusal(message.type)
-        self._refusals = 0
+            self._silence.heard(went_on=False)
+            if message.type != dialect.MAV_MISSION_ACCEPTED:
+                self._refused, self._result = True, message.type
+            return
+        self._refused, self._refusals = False, 0
         if name == "MISSION_COUNT":
             self._take_count(message.count)
         elif self._count is not None and message.seq < self._count:
             self._take_item(message)
-        return None
-
-    def _take_refusal(self, result: int) -> int | None:
-        self._silence.heard(went_on=False)
-        self._refusals += result != dialect.MAV_MISSION_ACCEPTED
-        return result if self._refusals >= REFUSALS else None
 
     def _take_count(self, count: int) -> None:
         if self._count == count:
@@ -140,9 +142,11 @@ class _Reading:
         return min(self._asked_s.values()) + self._pace.again_s - time.monotonic()
 
     def _again(self) -> None:
+        self._refusals += self._refused
+        self._refused = self._refused and self._pace.window > 1
         if self._count is None:
             self._pace.waited()
-            return self._ask_count()
+            self._ask_count()
         late_s = time.monotonic() - self._pace.again_s
         for seq in [seq for seq, asked_s in self._asked_s.items() if asked_s <= late_s]:
             self._asked_again.add(seq)

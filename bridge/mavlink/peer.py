@@ -205,7 +205,7 @@ class Peer:
         taken = 0
         with self._ordering, self.box(name, "COMMAND_ACK") as box:
             for _ in self._tries(AGAIN_S, patience_s):
-                self.wire.send(self._request(number))
+                self.request(number)
                 reply = self._reply(box, name, AGAIN_S)
                 if reply is None:
                     continue
@@ -217,6 +217,10 @@ class Peer:
         if taken:
             return None
         raise RobotUnreachable(f"{self} does not answer{self.why_silent()}; nothing was sent to it")
+
+    def request(self, number: int) -> None:
+        """Ask for the message of this number, and wait for nothing; `newest` has it if it comes."""
+        self.wire.send(self._request(number))
 
     def origin(self, *, patience_s: float | None = None) -> Origin | None:
         """What its metres count from (GPS_GLOBAL_ORIGIN); `None` if it is not set, or not told."""

@@ -27,10 +27,12 @@ began · dropped: the vehicle ended it · silent: nothing came any more · reboo
 """
 
 MEANT = 3
-"""So many errors in a row are meant; fewer may be late answers to what was sent before."""
+"""So many tries that end with an error are meant; fewer may have met late answers to what was sent before."""
 PROBE_S = 1.0
 PROBE_AFTER = 4
 """After so long, or sending so often, without an answer to the last item, ask for what the vehicle holds."""
+TIME_EACH = 5
+"""After so many windows without an answer the vehicle's clock is asked for again."""
 HINTS = frozenset({dialect.MAV_MISSION_INVALID_SEQUENCE})
 ENDINGS = frozenset(
     {dialect.MAV_MISSION_ERROR, dialect.MAV_MISSION_DENIED, dialect.MAV_MISSION_OPERATION_CANCELLED}
@@ -82,7 +84,10 @@ class _Sending:
         """When each item was sent last; -1 is the count."""
         self._sent_again: set[int] = set()
         self._moved_s = time.monotonic()
+        self._error = False
+        """Whether the vehicle has said that no transfer is under way, since it asked for an item."""
         self._errors = 0
+        self._result = dialect.MAV_MISSION_ACCEPTED
         self._unanswered = 0
         """How often in a row the window was sent without an answer."""
         self._probed = False
@@ -90,6 +95,7 @@ class _Sending:
 
     def run(self) -> Ended:
         with self._peer.box(*HEARD) as box:
+            self._ask_time()
             self._send_count()
             while (ended := self._over()) is None:
                 message = box.get(self._moved_s + self._pace.again_s - time.monotonic())
@@ -103,6 +109,8 @@ class _Sending:
         """Whether there is nothing more to wait for."""
         if self._peer.boots != self._boots:
             return Ended("rebooted", self._base)
+        if self._errors >= MEANT:
+            return Ended("dropped" if self._begun else "busy", self._base, self._result)
         if self._silence.over:
             return Ended("unsure" if self._all_sent else "silent", self._base)
         return None
@@ -126,7 +134,7 @@ class _Sending:
     def _take_request(self, seq: int) -> None:
         if seq >= len(self._items):
             return
-        self._errors = 0
+        self._error, self._errors = False, 0
         self._silence.heard(went_on=seq > self._base or not self._begun)
         if seq > self._base or not self._begun:
             self._go_on(seq)
@@ -176,27 +184,33 @@ class _Sending:
 
     def _take_ending(self, result: int) -> Ended | None:
         """The vehicle says that no transfer is under way: it is over, or it never began."""
+        self._error, self._result = True, result
         if self._all_sent and result != dialect.MAV_MISSION_DENIED:
             return Ended("unsure", self._base, result)
-        self._errors += not self._all_sent
-        if self._errors < MEANT and result != dialect.MAV_MISSION_OPERATION_CANCELLED:
-            return None
-        return Ended("dropped" if self._begun else "busy", self._base, result)
+        return None
 
     def _again(self) -> None:
         """Nothing has come in time: send again what may be lost."""
         self._pace.waited()
         self._moved_s = time.monotonic()
+        self._errors += self._error
         if not self._begun:
+            self._error = False
             if self._silence.seconds > PROBE_S:  # the last word of a download may have been lost
                 self._peer.send(ack_message(dialect.MAV_MISSION_ACCEPTED, self._peer.who))
             self._send_count()
             return
         self._unanswered += 1
+        if self._unanswered % TIME_EACH == 0:
+            self._ask_time()
         self._send_window()
         if self._all_sent and (self._silence.seconds > PROBE_S or self._unanswered >= PROBE_AFTER):
             self._probed = True
             self._peer.send(list_request(self._peer.who))
+
+    def _ask_time(self) -> None:
+        """Its clock tells whether it was started again; nobody waits for the answer."""
+        self._peer.request(dialect.MAVLINK_MSG_ID_SYSTEM_TIME)
 
     def _send_count(self) -> None:
         self._note_sent(-1)
@@ -217,7 +231,7 @@ class _Sending:
     @property
     def _end(self) -> int:
         """Where the window ends: further each time nothing came, or a vehicle that has it all would wait."""
-        further = self._unanswered if self._pace.window > 1 else 0
+        further = min(self._unanswered, self._pace.window) if self._pace.window > 1 else 0
         return min(len(self._items), self._base + self._pace.window + further)
 
     def _send(self, seq: int) -> None:

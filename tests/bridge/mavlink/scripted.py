@@ -15,6 +15,7 @@ from typing import Any
 from bridge.mavlink.url import Url
 from bridge.mavlink.wire import Message, Who, Wire, dialect, sender, wire
 
+ASK_AGAIN_S = 0.25
 VEHICLE = Who(1, dialect.MAV_COMP_ID_AUTOPILOT1)
 
 
@@ -38,6 +39,8 @@ class Scripted:
         self.held = list(held)
         """The mission it holds, as MISSION_ITEM_INT."""
         self.heard: Counter[str] = Counter()
+        self.acks: list[int] = []
+        """MAV_MISSION_RESULT of every MISSION_ACK that came."""
         self.base_mode = 0
         self.custom_mode = 0
         self.origin: tuple[int, int, int] | None = (470_000_000, 80_000_000, 0)
@@ -104,6 +107,8 @@ class Scripted:
         self.answer(message.command, dialect.MAV_RESULT_ACCEPTED, to)
 
     def on_request_message(self, number: int, to: Who) -> None:
+        if number == dialect.MAVLINK_MSG_ID_SYSTEM_TIME:
+            return self.send(dialect.MAVLink_system_time_message(0, self.boot_ms))
         known = number == dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN
         result = dialect.MAV_RESULT_ACCEPTED if known else dialect.MAV_RESULT_UNSUPPORTED
         self.answer(dialect.MAV_CMD_REQUEST_MESSAGE, result, to)
@@ -118,6 +123,9 @@ class Scripted:
         self.send(dialect.MAVLink_command_ack_message(command, result, 0, 0, to.system, to.component))
 
     # The mission protocol: an upload is kept apart until it is complete.
+
+    def on_mission_ack(self, message: Message, to: Who) -> None:
+        self.acks.append(message.type)
 
     def on_mission_request_list(self, message: Message, to: Who) -> None:
         self.send(dialect.MAVLink_mission_count_message(to.system, to.component, len(self.held), 0))
