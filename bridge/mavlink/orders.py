@@ -35,6 +35,7 @@ from mission.mavlink.autopilots import autopilot_named, differences
 
 ORDERING_NS = 20 * 10**9
 """An order takes no longer; then what the vehicle does counts as somebody else's again."""
+DRIVING = ("start", "resume", "retry")
 NOWHERE = Pose(x=math.inf, y=math.inf, heading=0.0)
 HOMEWARD = (
     "an autopilot in AUTO drives its list forward only, and nobody planned a way back from here; the"
@@ -74,7 +75,7 @@ class Orders:
         before = self._book.journal.answer(command.cmd_id)
         if before is not None:
             return before[1]
-        decision = self._in_the_way(command) or self._decided(command)
+        decision = self._in_the_way(command) or self._elsewhere(command) or self._decided(command)
         if isinstance(decision, Refused):
             return self._stored(command, decision, None)
         course = self._book.course
@@ -92,6 +93,21 @@ class Orders:
         if other is None or command.verb in FREE_VERBS or other.until_ns <= self._book.clock.now_ns():
             return None
         return Refused("wrong_state", f"{other.verb} by {other.by} is being carried out; wait for its end")
+
+    def _elsewhere(self, command: Command) -> Refused | None:
+        """Where the vehicle stands means something only if it counts from the mission's origin."""
+        course = self._book.course
+        if course is None or command.verb not in DRIVING:
+            return None
+        origin, sent = self._peer.origin(), course.sent
+        if origin is None:
+            return Refused(
+                "wrong_origin",
+                "the vehicle has no origin (GPS_GLOBAL_ORIGIN), so its metres count from nowhere, or does not"
+                " tell it; set it to the mission's (stopgo push --set-origin)",
+            )
+        wrong = apart(sent.origin, origin, autopilot_named(sent.autopilot).rule)
+        return Refused("wrong_origin", wrong) if wrong else None
 
     def _decided(self, command: Command) -> Decision | Refused:
         course, run = self._book.course, self._book.run
@@ -181,25 +197,15 @@ class Orders:
         return NOWHERE if self._lookout.fix is None else self._lookout.fix.pose
 
     def _ready(self, course: Course) -> None:
-        """Whether the vehicle may drive this mission: it holds it, counts from its origin, and is armed."""
+        """Whether the vehicle may drive this mission: it holds it, and is armed."""
         unfit = why_unfit(self._peer)
         if unfit:
             raise Denied(Refused("unsupported", unfit))
-        self._check_origin(course)
         self._check_mission(course)
         if not self._lookout.armed:
             if not self._consent.arm:
                 raise Denied(Refused("not_armed", "the vehicle is disarmed; arm it, or add --arm"))
             self._hands.arm()
-
-    def _check_origin(self, course: Course) -> None:
-        origin, sent = self._peer.origin(), course.sent
-        if origin is None:
-            wrong = "the vehicle has no origin (GPS_GLOBAL_ORIGIN): its metres count from nowhere; set it"
-        else:
-            wrong = apart(sent.origin, origin, autopilot_named(sent.autopilot).rule)
-        if wrong:
-            raise Denied(Refused("wrong_origin", wrong))
 
     def _check_mission(self, course: Course) -> None:
         found = differences(course.sent, download(self._peer))

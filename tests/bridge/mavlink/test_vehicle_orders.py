@@ -1,0 +1,148 @@
+"""Orders to a vehicle: done by its autopilot and shown by it, or refused with the way out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mission.document import SiteOrigin
+from mission.errors import AnswerIsNo, InputError, RobotUnreachable
+from mission.events import Aborted, Pose, Resumed
+from mission.mavlink.translate import translate
+from tests.bridge.mavlink.site import ALL, Site, told, tour, until, watched
+
+PROFILES = ["ardupilot", "px4", "strict"]
+
+
+def refused(site: Site, verb: str, **details: object) -> str:
+    """Why an order was refused."""
+    with pytest.raises(AnswerIsNo) as no:
+        site.order(verb, **details)
+    return str(no.value)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_a_paused_vehicle_goes_on_where_it_stood(profile: str, tmp_path: Path) -> None:
+    site = Site(tmp_path, profile)
+    with site.up(), watched(site):
+        site.order("start")
+        until(site, lambda events, run: "Scanned S1" in told(events))
+        assert site.order("pause").state == "PAUSED"
+        assert site.order("resume").state == "RUNNING"
+    words = told(site.events)
+    assert [word for word in words if word not in ("Paused", "Resumed")] == ALL
+    assert [event.commander for event in site.events if isinstance(event, Resumed)] == ["test"]
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_a_stop_that_is_skipped_on_the_way_is_driven_past_without_waiting(
+    profile: str, tmp_path: Path
+) -> None:
+    site = Site(tmp_path, profile)
+    with site.up(), watched(site):
+        site.order("start")
+        until(site, lambda events, run: run.at == 1)
+        site.order("skip", stop="S2")
+    assert site.run.done == ("S1", "S3") and site.run.skipped == ("S2",)
+    assert "Scanned S2" not in told(site.events)
+
+
+def test_a_vehicle_that_is_aborted_stands_and_may_be_disarmed(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up(), watched(site):
+        site.order("start")
+        until(site, lambda events, run: "Arrived S1" in told(events))
+        assert site.order("abort", disarm=True).state == "ABORTED"
+        with site.reached(arm=False) as station:
+            assert station.status().state == "ABORTED"
+        assert "disarmed" in refused(site, "start", arm=False, again=True, from_here=True)
+    assert isinstance(site.events[-1], Aborted)
+
+
+def test_an_aborted_mission_is_begun_anew_only_when_that_is_meant(tmp_path: Path) -> None:
+    site = Site(tmp_path, "px4")
+    with site.up():
+        site.order("start")
+        site.order("abort")
+        assert "finished_before" in refused(site, "start")
+        assert site.order("start", again=True, from_here=True).outcome == "ok"
+        with watched(site):
+            pass
+    words = told(site.events)
+    assert words.count("Started") == 2 and words[-1] == "Finished"
+
+
+def test_home_is_refused_with_the_way_out(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        site.order("start")
+        why = refused(site, "home")
+        site.order("abort")
+    assert "unsupported" in why and "--controller mavlink:URL" in why
+
+
+def test_a_disarmed_vehicle_is_armed_only_when_that_is_said(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        why = refused(site, "start", arm=False)
+        assert "not_armed" in why and "--arm" in why
+        assert site.run.state == "READY"
+
+
+def test_another_mission_is_never_started(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    other = tour(settle_s=3.0)
+    site.load(translate(other, "ardupilot"))
+    with site.up():
+        why = refused(site, "start")
+    assert "mission_differs" in why and "settle of S1" in why and "push" in why
+
+
+@pytest.mark.parametrize(
+    ("origin", "word"),
+    [(SiteOrigin(lat=51.5001, lon=7.5, alt=100.0, heading_deg=0.0), "11.1"), (None, "no origin")],
+)
+def test_a_vehicle_that_counts_from_elsewhere_is_not_started(
+    origin: SiteOrigin | None, word: str, tmp_path: Path
+) -> None:
+    site = Site(tmp_path, "ardupilot")
+    site.origin = origin
+    with site.up():
+        why = refused(site, "start")
+    assert word in why and "wrong_origin" in why
+
+
+def test_a_vehicle_that_stands_elsewhere_is_not_started(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot", at=Pose(x=1.0, y=0.0, heading=0.0))
+    with site.up():
+        why = refused(site, "start")
+        assert "not_at_start" in why and "1.00 m" in why and "--from-here" in why
+        assert site.order("start", from_here=True).outcome == "ok"
+        site.order("abort")
+
+
+def test_nothing_is_sent_where_no_vehicle_is(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with pytest.raises(RobotUnreachable, match="nothing was sent"), site.reached(timeout_s=0.5):
+        pass
+
+
+def test_the_same_order_again_is_not_carried_out_again(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up(), site.reached() as station:
+        order = station.order("start")
+        assert station.give(order) == station.give(order)
+        station.command("abort")
+    assert told(site.events).count("Started") == 1
+
+
+def test_a_folder_belongs_to_one_vehicle(tmp_path: Path) -> None:
+    from bridge.mavlink.logbook import logbook
+
+    site = Site(tmp_path, "ardupilot")
+    with (
+        pytest.raises(InputError, match="belongs to robot mavlink-1"),
+        logbook(site.url, 2, tmp_path / "station"),
+    ):
+        pass
