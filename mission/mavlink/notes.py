@@ -26,13 +26,8 @@ def _failures(mission: Mission) -> Iterator[str]:
 def _arrival(mission: Mission, manner: Manner) -> Iterator[str]:
     name, reached = manner.vehicle.name, manner.vehicle.reached
     yield f"{name} counts a stop as reached {reached}: the station checks tolerance_m before a scan"
-    if mission.scanner.fov_deg < 360 and manner.vehicle.turns:
+    if mission.scanner.fov_deg < 360:
         yield "headings are sent: the station checks them before a scan"
-    if mission.scanner.fov_deg < 360 and not manner.vehicle.turns:
-        yield (
-            f"headings are sent and {name} keeps them, but it turns no rover to them: a scan that must face "
-            "elsewhere than the robot arrives is found wrong by the station"
-        )
     if manner.trigger == "none":
         yield "no item starts a scan: the station does"
 

@@ -94,12 +94,13 @@ def _check_origin(mission: Mission, origin: SiteOrigin) -> None:
 
 def _check_heading(mission: Mission, vehicle: Autopilot) -> None:
     """A scanner that does not look all round needs the heading it was planned with."""
-    if mission.scanner.fov_deg < 360 and not vehicle.keeps_arrival:
+    if mission.scanner.fov_deg < 360 and not vehicle.turns:
         stop, fov = mission.stops[0], mission.scanner.fov_deg
         heading = math.degrees(stop.heading)
+        why = "turns no rover to it" if vehicle.keeps_arrival else "drops it"
         raise AnswerIsNo(
             f"{mission.name}: stop {stop.id}: heading {heading:.1f}° is needed (scanner.fov_deg is {fov:g}), "
-            f"and {vehicle.name} drops it; plan with --fov 360, or push to a robot of stopgo"
+            f"and {vehicle.name} {why}; plan with --fov 360, or push to a robot of stopgo"
         )
 
 

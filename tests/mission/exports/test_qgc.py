@@ -118,7 +118,9 @@ def test_a_mission_that_needs_its_headings_is_refused_for_who_drops_them(name: s
     made = msgspec.structs.replace(laboratory(), scanner=narrow)
     with pytest.raises(AnswerIsNo, match=r"stop s01: heading 200\.0° is needed"):
         exported(made, name, Supplements(autopilot="ardupilot"))
-    assert exported(made, name, Supplements(autopilot="px4"))
+    with pytest.raises(AnswerIsNo, match="px4 turns no rover to it"):
+        exported(made, name, Supplements(autopilot="px4"))
+    assert exported(made, name, Supplements(autopilot="generic"))
 
 
 WAYS = [
