@@ -156,7 +156,10 @@ class ZenohLink:
                 payload = b"" if query.payload is None else query.payload.to_bytes()
                 signature = b"" if query.attachment is None else query.attachment.to_bytes()
                 request = Request(str(query.key_expr), payload, _parameters(query.parameters), signature)
-                query.reply(query.key_expr, answer(request), encoding=JSON, priority=priority)
+                query.reply(
+                    query.key_expr, answer(request), encoding=JSON,
+                    priority=priority, congestion_control=zenoh.CongestionControl.BLOCK,
+                )  # fmt: skip
 
         self._declared.append(self._session.declare_queryable(key, answered, complete=True))
 
