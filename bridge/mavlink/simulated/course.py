@@ -183,10 +183,10 @@ class Course:
         return to[0] + fault.amount * math.cos(left), to[1] + fault.amount * math.sin(left)
 
     def _heading(self, item: Item) -> float | None:
-        """Counter-clockwise from east, if the vehicle keeps it and the item says it."""
+        """Counter-clockwise from east, if the vehicle turns to it and the item says it."""
         yaw = item.params[3]
-        keeps = self._profile.autopilot.keeps_arrival and item.command == Command.NAV_WAYPOINT
-        return math.pi / 2 - math.radians(yaw) if keeps and math.isfinite(yaw) else None
+        turns = self._profile.autopilot.turns and item.command == Command.NAV_WAYPOINT
+        return math.pi / 2 - math.radians(yaw) if turns and math.isfinite(yaw) else None
 
     def _hold_s(self) -> float:
         item = self._item

@@ -84,7 +84,7 @@ def _answer(vehicle: Vehicle, who: Who, order: Order) -> None:
     obey = OBEYED.get(order.command)
     _acknowledge(vehicle, who, order.command, UNSUPPORTED if obey is None else obey(vehicle, order))
     if order.command == dialect.MAV_CMD_REQUEST_MESSAGE:
-        vehicle.requested(order.whole(0))
+        vehicle.requested(order.whole(0), order.whole(1))
 
 
 def _acknowledge(vehicle: Vehicle, who: Who, command: int, result: int) -> None:
@@ -192,14 +192,16 @@ def _reposition(vehicle: Vehicle, order: Order) -> int:
 
 
 def _heading(vehicle: Vehicle, yaw: float) -> float | None:
-    """Counter-clockwise from east, of radians from north; None if it is none, or none that is kept."""
-    if not (vehicle.profile.autopilot.keeps_arrival and math.isfinite(yaw) and abs(yaw) < 100):
-        return None
-    return math.pi / 2 - yaw
+    """Counter-clockwise from east, of radians from north; None if it is none, or none that it turns to."""
+    turns = vehicle.profile.autopilot.turns and math.isfinite(yaw) and abs(yaw) < 100
+    return math.pi / 2 - yaw if turns else None
 
 
 def _change_speed(vehicle: Vehicle, order: Order) -> int:
-    return int(ACCEPTED if vehicle.rover.set_speed(order.params[1]) else DENIED)
+    """ArduPilot takes a speed only while it goes somewhere (source)."""
+    if vehicle.profile.name == "ardupilot" and not vehicle.goes_somewhere:
+        return int(FAILED)
+    return int(ACCEPTED if vehicle.change_speed(order.params[1]) else DENIED)
 
 
 def _interval(vehicle: Vehicle, order: Order) -> int:
@@ -240,6 +242,12 @@ def _script_message(vehicle: Vehicle, order: Order) -> int:
     return _scan(vehicle, order, order.whole(1, 0), order.params[2])
 
 
+def _stop_capture(vehicle: Vehicle, order: Order) -> int:
+    """The scan under way is broken off; nothing is said of it."""
+    vehicle.break_off()
+    return int(ACCEPTED)
+
+
 def _scan(vehicle: Vehicle, order: Order, number: int, seconds: float) -> int:
     """A trigger that comes again for the scan it began does not begin another."""
     under_way = vehicle.scanner.scan
@@ -264,6 +272,7 @@ OBEYED: dict[int, Callable[[Vehicle, Order], int]] = {
     dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _tell_version,
     dialect.MAV_CMD_GET_HOME_POSITION: _tell_home,
     Command.IMAGE_START_CAPTURE: _capture,
+    dialect.MAV_CMD_IMAGE_STOP_CAPTURE: _stop_capture,
     Command.DO_SEND_SCRIPT_MESSAGE: _script_message,
 }
 """Each gives the MAV_RESULT with which it is acknowledged."""
@@ -277,6 +286,9 @@ def _set_origin(vehicle: Vehicle, message: Message) -> None:
 
 
 def _target_local(vehicle: Vehicle, message: Message) -> None:
+    vehicle.led()
+    if message.type_mask & IGNORE_X_Y == IGNORE_X_Y:
+        return _turn(vehicle, message)
     east, north = message.y, message.x
     here = vehicle.motion()[0]
     if message.coordinate_frame == LOCAL_OFFSET_NED:
@@ -288,9 +300,17 @@ def _target_local(vehicle: Vehicle, message: Message) -> None:
 
 
 def _target_global(vehicle: Vehicle, message: Message) -> None:
+    vehicle.led()
     point = vehicle.rover.point(message.lat_int, message.lon_int)
     if point is not None:
         _guide(vehicle, message, point)
+
+
+def _turn(vehicle: Vehicle, message: Message) -> None:
+    """To a yaw without a place. Speeds and accelerations, which may come instead, are not followed."""
+    leads = vehicle.mode == "guided" and vehicle.armed and vehicle.profile.yaw_alone
+    if leads and not message.type_mask & IGNORE_YAW and math.isfinite(message.yaw) and abs(message.yaw) < 100:
+        vehicle.turn(math.pi / 2 - message.yaw)
 
 
 def _guide(vehicle: Vehicle, message: Message, point: tuple[float, float]) -> None:

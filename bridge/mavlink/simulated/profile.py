@@ -60,6 +60,10 @@ class Profile:
     """The mode once a mission is finished."""
     reposition_mode: ModeName
     """The mode in which DO_REPOSITION is driven."""
+    streams: bool
+    """It leaves the guided mode, and does not enter it, unless setpoints keep coming."""
+    yaw_alone: bool
+    """It turns on the spot to a yaw that comes without a place."""
     pauses: bool
     """Tells a mission that is paused from one that was not started."""
     origin_again: bool
@@ -126,25 +130,27 @@ PROFILES: dict[str, Profile] = {
         atomic=True, strays="ask", last_again=dialect.MAV_MISSION_ACCEPTED,
         stranger=dialect.MAV_MISSION_DENIED, begins_again=True, cancels=True,
         clears_in_auto=True, in_order=False, restarts_item=False, done_mode="hold", reposition_mode="hold",
-        pauses=True, origin_again=True, commands=EVERYWHERE | {177, 183, 187, 189, 195, 197, 211, 530},
+        streams=False, yaw_alone=True, pauses=True, origin_again=True,
+        commands=EVERYWHERE | {177, 183, 187, 189, 195, 197, 211, 530},
     ),
     "ardupilot": Profile(
         name="ardupilot", autopilot=AUTOPILOTS["ardupilot"], firmware=dialect.MAV_AUTOPILOT_ARDUPILOTMEGA,
         modes=ROVER_MODES, asks_int=False, ask_again_s=1.0, give_up_s=8.0, tells_giving_up=True, atomic=False,
         strays="tell", last_again=dialect.MAV_MISSION_ERROR, stranger=dialect.MAV_MISSION_DENIED,
         begins_again=True, cancels=False, clears_in_auto=False, in_order=False, restarts_item=True,
-        done_mode="auto", reposition_mode="guided", pauses=False, origin_again=False,
-        commands=frozenset(ROVER_COMMANDS),
+        done_mode="auto", reposition_mode="guided", streams=False, yaw_alone=True, pauses=False,
+        origin_again=False, commands=frozenset(ROVER_COMMANDS),
     ),
     "px4": Profile(
         name="px4", autopilot=AUTOPILOTS["px4"], firmware=dialect.MAV_AUTOPILOT_PX4, modes=PX4_MODES,
         asks_int=True, ask_again_s=0.25, give_up_s=5.0, tells_giving_up=False, atomic=True, strays="ignore",
         last_again=dialect.MAV_MISSION_ACCEPTED, stranger=dialect.MAV_MISSION_ERROR, begins_again=False,
         cancels=True, clears_in_auto=True, in_order=True, restarts_item=False, done_mode="hold",
-        reposition_mode="hold", pauses=True, origin_again=True, commands=frozenset(PX4_COMMANDS),
+        reposition_mode="hold", streams=True, yaw_alone=False, pauses=True, origin_again=True,
+        commands=frozenset(PX4_COMMANDS),
     ),
 }  # fmt: skip
 """`strict` keeps to the letter of the specification, with PX4's mode numbers, for it has none of its own.
 
-Measured on ArduPilot Rover 4.7-dev, or read in PX4's mavlink_mission.cpp.
+Measured on ArduPilot Rover 4.7-dev, or read in PX4's mavlink_mission.cpp and its documentation.
 """

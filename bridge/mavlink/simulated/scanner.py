@@ -1,7 +1,7 @@
 """The scanner on the vehicle: takes its time, needs the rover to stand, names a file that was never written.
 
 How a scanner on a MAVLink vehicle confirms a scan (read by the gateway): CAMERA_IMAGE_CAPTURED with the
-running number of the scan, capture_result 1, and a file_url `NAME.e57?size=N&points=N&sha256=HEX`.
+running number of the scan (from 0), capture_result 1, and a file_url `NAME.e57?size=N&points=N&sha256=HEX`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Scan:
     number: int
     """What the trigger carried; 0 if nothing."""
     index: int
-    """The how-manieth scan of this vehicle."""
+    """How many scans the vehicle has begun before."""
     began_ns: int
     ends_ns: int
     began_at: Pose
@@ -82,7 +82,7 @@ class Scanner:
 
 def file_url(scan: Scan) -> str:
     """At most 205 characters, which is what CAMERA_IMAGE_CAPTURED holds."""
-    name = f"scan-{scan.index:04}-{scan.number}"
+    name = f"scan-{scan.index + 1:04}-{scan.number}"
     points = max(1, round(POINTS_PER_S * (scan.ends_ns - scan.began_ns) / 1e9))
     digest = hashlib.sha256(name.encode()).hexdigest()
     return f"{name}.e57?size={points * BYTES_PER_POINT}&points={points}&sha256={digest}"

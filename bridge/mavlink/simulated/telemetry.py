@@ -57,7 +57,16 @@ def battery_status(vehicle: Vehicle) -> Message:
     cells = [4000] * 6 + [65_535] * 4
     left = round(100 * vehicle.battery)
     return dialect.MAVLink_battery_status_message(
-        0, dialect.MAV_BATTERY_FUNCTION_ALL, dialect.MAV_BATTERY_TYPE_LIPO, 2500, cells, 150, -1, -1, left
+        0,
+        dialect.MAV_BATTERY_FUNCTION_ALL,
+        dialect.MAV_BATTERY_TYPE_LIPO,
+        2500,
+        cells,
+        150,
+        -1,
+        -1,
+        left,
+        round(vehicle.battery * BATTERY_NS / 1e9),
     )
 
 
@@ -145,7 +154,14 @@ def item_reached(vehicle: Vehicle) -> Message | None:
 
 
 def image_captured(vehicle: Vehicle) -> Message | None:
-    return vehicle.captured
+    """Of the scan that ended last."""
+    return next(reversed(vehicle.captured.values()), None)
+
+
+def capture_status(vehicle: Vehicle) -> Message:
+    scans = int(vehicle.scanner.scan is not None)
+    count = vehicle.store.kept.images
+    return dialect.MAVLink_camera_capture_status_message(vehicle.boot_ms, scans, 0, 0.0, 0, 0.0, count)
 
 
 def autopilot_version(vehicle: Vehicle) -> Message:
@@ -171,6 +187,7 @@ MAKERS: dict[int, Maker] = {
     dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
     dialect.MAVLINK_MSG_ID_HOME_POSITION: home,
     dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_state,
+    dialect.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS: capture_status,
     dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED: image_captured,
 }
 DEFAULT_US: dict[int, int] = {

@@ -25,7 +25,7 @@ from mission.events import Pose
 from mission.mavlink.autopilots import home_item
 from mission.mavlink.items import Command, Frame, Item
 
-BOOT_NS = KEEP_NS = 1_000_000_000
+BOOT_NS = KEEP_NS = LED_NS = 1_000_000_000
 FOREVER_NS = 2**63
 NOWHERE = Item(Command.NAV_WAYPOINT, Frame.GLOBAL)
 
@@ -64,6 +64,7 @@ class Vehicle:
         self._mishaps = Mishaps(setting.faults)
         self._booted_ns = clock.now_ns()
         self._quiet_until_ns = self._kept_ns = 0
+        self._led_ns = -LED_NS
         self._guided: tuple[Point, float | None] | None = None
         self.now_ns = self._booted_ns
         """The time of what is happening."""
@@ -71,8 +72,8 @@ class Vehicle:
         self.armed = False
         self.reached: int | None = None
         """The item reached last."""
-        self.captured: Message | None = None
-        """The message about the scan taken last."""
+        self.captured: dict[int, Message] = {}
+        """What was said of each scan since the boot, by its number."""
         self.last_scan = 0
         """The number of the scan begun last."""
         self.store = Store(setting.state)
@@ -122,6 +123,9 @@ class Vehicle:
         self._keep()
         if self._quiet():
             return
+        if self.mode == "guided" and self.profile.streams and not self._is_led():
+            self.text("Offboard: setpoints lost")
+            self.set_mode("hold")
         self.transfers.tick()
         for number in self.streams.due():
             self.tell(number)
@@ -172,6 +176,9 @@ class Vehicle:
             return False
         if mode == self.mode:
             return True
+        if mode == "guided" and self.profile.streams and not self._is_led():
+            self.text("Offboard: no setpoints")
+            return False
         self.mode, self._guided = mode, None
         self.course.stand(self.now_ns)
         self.rover.brake(self.now_ns)
@@ -206,11 +213,11 @@ class Vehicle:
 
     def scan(self, number: int, seconds: float) -> bool:
         """Begin a scan; false if one is under way. 0 seconds: as the parameter says."""
-        index = self.store.kept.images + 1
+        index = self.store.kept.images
         lasts = seconds if seconds > 0 else self.parameters.scan_s
         begun = self.scanner.begin(number, lasts, index=index, pose=self.motion()[0], now_ns=self.now_ns)
         if begun:
-            self.store.keep(images=index)
+            self.store.keep(images=index + 1)
             self.last_scan = number
         return begun
 
@@ -220,16 +227,47 @@ class Vehicle:
             self._guided = (point, heading)
             self.rover.drive(point, self.now_ns, heading=heading)
 
-    def requested(self, number: int) -> None:
-        """Send a message that was asked for, if there is something to tell."""
-        if number in telemetry.MAKERS:
+    def turn(self, heading: float) -> None:
+        """Turn on the spot to a heading that a station leads it to."""
+        here = self.motion()[0]
+        if self._guided is None or self._guided[1] != heading:
+            self._guided = ((here.x, here.y), heading)
+            self.rover.drive((here.x, here.y), self.now_ns, heading=heading)
+
+    def led(self) -> None:
+        """A setpoint has come: somebody is leading the vehicle."""
+        self._led_ns = self._wall.now_ns()
+
+    def change_speed(self, speed: float) -> bool:
+        """From now on where it is led, from the next leg on in AUTO; false if that is no speed for it."""
+        if not self.rover.set_speed(speed):
+            return False
+        if self._guided is not None:
+            self.rover.drive(self._guided[0], self.now_ns, heading=self._guided[1])
+        return True
+
+    @property
+    def goes_somewhere(self) -> bool:
+        """Whether it drives its mission, or is led to a place."""
+        return self.course.state == "active" or self._guided is not None
+
+    def requested(self, number: int, index: int) -> None:
+        """Send a message that was asked for, if there is something to tell; an older scan's by its number."""
+        if number == dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED and index in self.captured and index > 0:
+            self.say(self.captured[index])
+        elif number in telemetry.MAKERS:
             self.tell(number)
+
+    def break_off(self) -> None:
+        """End the scan under way, if there is one, without a result."""
+        self.scanner.stop()
+        self.course.scan_over(self.now_ns)
 
     def reboot(self) -> None:
         """Be away for a while, then wake up with the items but without mode, origin or current item."""
         self.rover.brake(self.now_ns)
         self.rover.origin = self._setting.origin
-        self.armed, self.mode, self.reached, self.captured = False, "manual", None, None
+        self.armed, self.mode, self.reached, self.captured = False, "manual", None, {}
         self.course.stand(self.now_ns)
         self.course.reset()
         self.scanner.stop()
@@ -245,6 +283,9 @@ class Vehicle:
         if scan is None or course_ns is None:
             return course_ns if scan is None else scan.ends_ns
         return min(scan.ends_ns, course_ns)
+
+    def _is_led(self) -> bool:
+        return self._wall.now_ns() - self._led_ns <= LED_NS
 
     def _keep(self) -> None:
         """Write down where it stands, by the wall's clock, for the disk's sake."""
@@ -279,8 +320,8 @@ class Vehicle:
         done = self.scanner.end(self.motion()[0])
         if done.why:
             self.text(f"Scan {done.number}: {done.why}")
-        self.captured = self._capture_message(done)
-        self.say(self.captured)
+        self.captured[done.index] = message = self._capture_message(done)
+        self.say(message)
         self.course.scan_over(self.now_ns)
 
     def _capture_message(self, done: Captured) -> Message:
