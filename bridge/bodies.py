@@ -74,6 +74,8 @@ class AutopilotBody:
     vehicle: int | None = None
     """Its system id, if several are heard."""
     insecure: bool = False
+    patience_s: float = 30.0
+    """How long to wait for it, and for its position."""
 
     @contextmanager
     def __call__(self, clock: Clock) -> Iterator[Body]:
@@ -86,7 +88,7 @@ class AutopilotBody:
         url = read_url(self.url, "--controller")
         key = None if self.signing_key is None else read_signing_key(self.signing_key)
         check_guarded(url, signed=key is not None, insecure=self.insecure, option="--controller")
-        with on_board(url, signing_key=key, vehicle=self.vehicle) as autopilot:
+        with on_board(url, signing_key=key, vehicle=self.vehicle, timeout_s=self.patience_s) as autopilot:
             base = MavlinkBase(autopilot, clock=clock, arm=self.arm)
             scanner = MavlinkScanner(autopilot, clock=clock, trigger=self.trigger)
 

@@ -10,7 +10,7 @@ import math
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from bridge.mavlink.driving import Driving, Mode, driving_of
 from bridge.mavlink.peer import Origin, Peer, found
@@ -23,10 +23,8 @@ from mission.geodesy import STEPS_PER_DEGREE
 ON_BOARD = Who(253, dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
 """Ourselves: neither QGroundControl (255) nor a station of ours (254)."""
 KEEP_S = 0.1
-LOST_S = 3.0
-"""Silence of the autopilot after which nobody knows what it does."""
-STALE_S = 1.5
-"""Age of a pose by which nothing can be driven any more."""
+LOST_S = 2.0
+"""Silence of the autopilot, or age of its pose, after which nobody knows what it does."""
 ORDER_S = 3.0
 """How long one order waits for its answer."""
 STOP_S = 2.5
@@ -91,6 +89,8 @@ def on_board(
         autopilot = Autopilot(peer, heard, driving_of(peer.autopilot, peer.heartbeat.type))
         try:
             autopilot.await_pose(timeout_s)
+            with suppress(RobotUnreachable):
+                peer.origin(patience_s=ORDER_S)  # so that it is known to the first who asks
             yield autopilot
         finally:
             autopilot.close()
@@ -151,7 +151,7 @@ class Autopilot:
 
     def speed(self) -> float:
         """Metres per second; 0 when it is not known any more."""
-        told = self._heard.newest("LOCAL_POSITION_NED", STALE_S)
+        told = self._heard.newest("LOCAL_POSITION_NED", LOST_S)
         return 0.0 if told is None else math.hypot(told.vx, told.vy)
 
     def still(self) -> bool:
@@ -181,7 +181,7 @@ class Autopilot:
         if self.peer.silent_s > LOST_S:
             gone = f" ({self.peer.wire.gone})" if self.peer.wire.gone else ""
             return f"the autopilot has not been heard for {self.peer.silent_s:.0f} s{gone}"
-        lost = [name for name in POSE if self._heard.newest(name, STALE_S) is None]
+        lost = [name for name in POSE if self._heard.newest(name, LOST_S) is None]
         return f"the autopilot tells no {lost[0]}: has it lost its position?" if lost else ""
 
     def in_other_hands(self) -> str:
@@ -198,6 +198,13 @@ class Autopilot:
         if self.left in (None, mode):
             return ""
         return f"somebody switched the autopilot to {self.driving.name_of(mode)}"
+
+    def leave(self) -> None:
+        """Take the mode it is in for the one we know: whoever orders to go on knows of it.
+
+        From a mode in which somebody else drives it, going on hold is handing it over.
+        """
+        self.left = None if self.in_other_hands() else self.mode()
 
     def _told(self, name: str) -> Message:
         told = self._heard.newest(name)
@@ -261,10 +268,11 @@ class Autopilot:
         beat = self._heard.since("HEARTBEAT", self._stop_asked_s)
         mode = self.mode()
         if beat is not None and mode != self.driving.guided:
-            self.left = mode
+            self.leave()
             self._stop_owed.clear()
         elif mode in (self.driving.guided, self.driving.hold):
             self._say(dialect.MAV_CMD_DO_SET_MODE, *self.driving.hold.params)
+        self._say(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT)
 
     def _keep(self) -> None:
         """Until closed: ask for what should be told and is not, and order the stop that is owed."""

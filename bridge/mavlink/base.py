@@ -234,7 +234,7 @@ class MavlinkBase:
         """After a drive that ended early: hold, unless somebody else has the vehicle, and stand."""
         autopilot = self.autopilot
         if autopilot.changed_hands() and not autopilot.out_of_reach():
-            autopilot.left = autopilot.mode()  # told once: whoever orders to go on knows of it
+            autopilot.leave()
         else:
             autopilot.stop()
         until_s = self._now_s() + STAND_S
