@@ -231,8 +231,10 @@ def test_a_line_without_faults_is_the_line() -> None:
     assert on_line(loop, VehicleFaults((VehicleFault("nack", 1),))) is loop
 
 
-def test_every_fault_can_be_written() -> None:
+def test_every_fault_can_be_written_and_is_in_the_guide() -> None:
     assert {read_vehicle_fault(f"{kind}@1=2").kind for kind in FAULTS} == set(FAULTS)
+    guide = (Path(__file__).parents[3] / "docs" / "mavlink.md").read_text(encoding="utf-8")
+    assert [kind for kind in FAULTS if f"`{kind}@" not in guide] == []
 
 
 def test_a_pose_is_said_in_the_sites_frame() -> None:
