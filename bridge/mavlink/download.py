@@ -20,6 +20,8 @@ Progress = Callable[[int, int], None]
 
 ONE_BY_ONE = frozenset({"px4"})
 """Source: PX4 ends a transfer when an item is asked for that is neither the next nor the last."""
+STUCK = 8
+"""After so many tries without any item it is asked one by one, in order, as MAVSDK's vehicle wants it."""
 REFUSALS = 3
 """So many tries that end with one are meant; fewer may have met late answers to something else."""
 LAST_WORDS = 3
@@ -38,10 +40,11 @@ def download(
     AnswerIsNo
         If it refuses, which it does while another station uploads.
     """
-    window = 1 if peer.autopilot in ONE_BY_ONE else window_for(peer)
+    window = 1 if peer.in_order or peer.autopilot in ONE_BY_ONE else window_for(peer)
     reading = _Reading(peer, window, patience_s or peer.patience_s, progress)
     refused = reading.run()
     if refused is not None and window > 1:
+        peer.in_order = True
         reading = _Reading(peer, 1, patience_s or peer.patience_s, progress)
         refused = reading.run()
     if refused is not None:
@@ -63,6 +66,8 @@ class _Reading:
         self._progress = progress
         self._count: int | None = None
         self._next = 0
+        self._moved_s = time.monotonic()
+        """When the last item came that was not there."""
         self._asked_s: dict[int, float] = {}
         """When each item that is under way was asked for last."""
         self._asked_again: set[int] = set()
@@ -83,11 +88,17 @@ class _Reading:
                     self._again()
                 elif of_mission(message):
                     self._take(message)
-                if self._refusals >= REFUSALS:
+                if self._refusals >= REFUSALS or self._stuck:
                     return self._result
         for _ in range(LAST_WORDS):
             self._peer.send(ack_message(dialect.MAV_MISSION_ACCEPTED, self._peer.who))
         return None
+
+    @property
+    def _stuck(self) -> bool:
+        """Whether a vehicle that wants its items asked for in order seems to wait for another one."""
+        since_s = time.monotonic() - self._moved_s
+        return self._pace.window > 1 and self._count is not None and since_s > STUCK * self._pace.again_s
 
     def _take(self, message: Message) -> None:
         name = message.get_type()
@@ -106,6 +117,7 @@ class _Reading:
         if self._count == count:
             return
         self._silence.heard(went_on=True)
+        self._moved_s = time.monotonic()
         self._count = count
         self.items.clear()
         self._asked_s.clear()
@@ -113,7 +125,9 @@ class _Reading:
         self._ask_more()
 
     def _take_item(self, message: Message) -> None:
-        self._silence.heard(went_on=message.seq not in self.items)
+        anew = message.seq not in self.items
+        self._silence.heard(went_on=anew)
+        self._moved_s = time.monotonic() if anew else self._moved_s
         asked_s = self._asked_s.pop(message.seq, None)
         if asked_s is not None and message.seq not in self._asked_again:
             self._pace.saw(time.monotonic() - asked_s)

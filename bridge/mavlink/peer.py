@@ -103,6 +103,8 @@ class Peer:
         self.autopilot = autopilot
         """"ardupilot", "px4" or "generic"."""
         self.patience_s = patience_s
+        self.in_order = False
+        """Whether it was found to give its items only one by one."""
         self._newest = newest
         self._ordering = threading.Lock()
 
