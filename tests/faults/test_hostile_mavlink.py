@@ -74,6 +74,22 @@ def test_a_vehicle_on_the_wire_answers_after_every_burst_of_hostile_datagrams(pr
         assert not stopped.is_set()
 
 
+def test_a_vehicle_on_a_stream_answers_whoever_else_talks_nonsense() -> None:
+    hostile, port = Hostile(11), free_udp_port()
+    ask = dialect.MAVLink_command_long_message(
+        1, 1, dialect.MAV_CMD_REQUEST_MESSAGE, 0, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0, 0, 0, 0, 0, 0
+    )
+    with (
+        vehicle_on(Url("tcpin", "127.0.0.1", port), Setting(PROFILES["strict"], origin=ORIGIN)),
+        wire(Url("tcp", "127.0.0.1", port)) as station,
+    ):
+        for _ in range(FRAMES // BURST):
+            with socket.create_connection(("127.0.0.1", port)) as stranger:
+                for datagram in hostile.datagrams(BURST):
+                    stranger.sendall(datagram)
+            assert answered(station, ask), "the vehicle is silent"
+
+
 def answered(station: Wire, message: Message) -> bool:
     """Whether an AUTOPILOT_VERSION comes; a vehicle that was made to reboot is away for a second."""
     with station.box("AUTOPILOT_VERSION") as box:

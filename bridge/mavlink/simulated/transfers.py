@@ -134,7 +134,6 @@ class Transfers:
         if self._download and profile.in_order:
             return self._ack(who, dialect.MAV_MISSION_ERROR, kind)  # source: busy, until it is acknowledged
         if message.count > profile.autopilot.max_items:
-            self._upload = None
             return self._ack(who, dialect.MAV_MISSION_NO_SPACE, kind)
         self._begin(who, kind, message.count)
 
@@ -238,6 +237,8 @@ class Transfers:
         if self._profile.in_order and not self._in_order(who, kind, number):
             return
         items = self.items(kind)
+        if kind == MISSION and self._profile.autopilot.home_first and not items:
+            items = (self._home(),)  # source: home can always be read
         if number < len(items):
             whole = message.get_type() == "MISSION_REQUEST_INT"
             return self._say((_item_message if whole else _float_message)(who, kind, number, items[number]))

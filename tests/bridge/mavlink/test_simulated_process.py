@@ -26,7 +26,7 @@ from bridge.mavlink.simulated.store import Store
 from bridge.mavlink.simulated.vehicle import Setting
 from bridge.mavlink.transport import Address
 from bridge.mavlink.url import Url
-from bridge.mavlink.wire import Message, Wire, dialect, wire
+from bridge.mavlink.wire import Message, Who, Wire, dialect, wire
 from mission.errors import InputError
 from mission.mavlink.items import Item
 from tests.bridge.mavlink.bench import delay, item_message
@@ -155,6 +155,21 @@ def test_a_vehicle_that_was_refused_leaves_its_port_free(tmp_path: Path) -> None
     with vehicle_on(here(port), Setting(PROFILES["strict"])), wire(there(port)) as station:
         assert count_of(station) == 0
     assert threading.active_count() == threads
+
+
+def test_two_stations_on_streams_are_told_the_same() -> None:
+    port = free_udp_port()  # free for TCP as well, as good as always
+    with (
+        vehicle_on(Url("tcpin", "127.0.0.1", port), Setting(PROFILES["strict"])),
+        wire(Url("tcp", "127.0.0.1", port)) as one,
+        wire(Url("tcp", "127.0.0.1", port), me=Who(200, 190)) as other,
+    ):
+        assert upload(one, [delay(1.0), delay(2.0)])
+        assert count_of(other) == 2
+        with one.box("HEARTBEAT") as here_, other.box("HEARTBEAT") as there_:
+            for box in (here_, there_):
+                beat = box.get(PATIENCE_S)
+                assert beat is not None and beat.type == dialect.MAV_TYPE_GROUND_ROVER
 
 
 def test_a_signing_vehicle_hears_who_has_the_key_only() -> None:
