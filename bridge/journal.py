@@ -186,10 +186,12 @@ class Journal:
         return msgspec.json.decode(rows[0][0], type=Manifest) if rows else None
 
     def begin_transfer(self, manifest: Manifest) -> None:
-        """Receive this and forget what was being received; its own chunks stay."""
+        """Receive this and forget what was being received, but for pieces of the same document and size."""
         with self.transaction():
+            before = self.transfer(manifest.mission_id)
             self._write("DELETE FROM transfers")
-            self._write("DELETE FROM chunks WHERE sha256 != ?", manifest.sha256)
+            if before is None or _cut(before) != _cut(manifest):
+                self._write("DELETE FROM chunks")
             self._write(
                 "INSERT INTO transfers VALUES (?, ?)", manifest.mission_id, msgspec.json.encode(manifest)
             )
@@ -217,6 +219,11 @@ class Journal:
     def _write(self, statement: str, *values: object) -> None:
         with self.transaction():
             self._connection.execute(statement, values)
+
+
+def _cut(manifest: Manifest) -> tuple[str, int]:
+    """Which document is sent, in pieces of which size."""
+    return manifest.sha256, manifest.chunk_bytes
 
 
 class Owner(msgspec.Struct, frozen=True):

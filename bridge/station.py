@@ -232,7 +232,8 @@ class Station:
 
     def _read_back(self, manifest: Manifest) -> None:
         state = self.info(within_s=self.patience_s).state
-        kept = self._part(manifest.mission_id, manifest.revision, 0).manifest
+        # The piece beyond the last holds nothing but the manifest, which is soon here on a slow line too.
+        kept = self._part(manifest.mission_id, manifest.revision, manifest.chunks).manifest
         told = state.mission_id == manifest.mission_id and manifest.revision in (
             state.revision, state.next_revision,
         )  # fmt: skip

@@ -95,6 +95,17 @@ def test_only_missing_chunks_are_asked_for_after_a_reboot() -> None:
     assert asked(field, mission, "begin", encode(manifest)) == Ready(held=(1,))
 
 
+def test_pieces_of_another_size_are_not_mixed() -> None:
+    """A stopgo that cuts differently goes on with a push that another one began."""
+    field, mission = Field(), corridor(stops=400)
+    document = msgspec.json.encode(mission)
+    before = msgspec.structs.replace(manifest_of(mission, document), chunk_bytes=48 * 1024)
+    asked(field, mission, "begin", encode(before))
+    asked(field, mission, "chunk/0", document[: 48 * 1024], of=before.sha256)
+    assert asked(field, mission, "begin", encode(manifest_of(mission, document))) == Ready(held=())
+    assert not field.station().push(mission).already
+
+
 def test_a_commit_without_every_chunk_is_rejected() -> None:
     field, mission = Field(), corridor()
     manifest = manifest_of(mission, msgspec.json.encode(mission))
