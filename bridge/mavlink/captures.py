@@ -18,7 +18,9 @@ from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic, heading_o
 from mission.mavlink.autopilots import autopilot_named
 
 NEAR_M = 0.5
-"""No two stops are nearer to each other; a picture told from farther away is of another stop."""
+"""A failure that is told from farther away is of another stop."""
+STEPS_M = 0.02
+"""Two steps of 1e-7 degrees, in which the camera tells where it was."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +28,7 @@ class Capture:
     """One message of the camera."""
 
     name: tuple[int, int]
-    """The picture's number and the vehicle's time; the same however often it is told."""
-    ns: int
-    """When the scan was made."""
+    """The picture's number and the vehicle's time (ms since it was started); the same however often told."""
     pose: Pose | None
     """Where the vehicle was; `None` if it does not say."""
     result: ScanResult | ScanFailed
@@ -37,13 +37,14 @@ class Capture:
         """Whether it is of this stop; one that does not say where it is from may be."""
         if self.pose is None:
             return True
-        return math.dist((self.pose.x, self.pose.y), (stop.x, stop.y)) <= max(NEAR_M, stop.tolerance_m)
+        away = math.dist((self.pose.x, self.pose.y), (stop.x, stop.y))
+        return away <= (NEAR_M if isinstance(self.result, ScanFailed) else stop.tolerance_m + STEPS_M)
 
 
-def capture_of(message: Message, course: Course | None, ns: int) -> Capture:
-    """What the message tells of a scan at that time."""
+def capture_of(message: Message, course: Course | None) -> Capture:
+    """What the message tells of a scan."""
     name = (int(message.image_index), int(message.time_boot_ms))
-    return Capture(name, ns, _pose(message, course), _result(message))
+    return Capture(name, _pose(message, course), _result(message))
 
 
 def _pose(message: Message, course: Course | None) -> Pose | None:

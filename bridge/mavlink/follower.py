@@ -12,7 +12,7 @@ from bridge.mavlink import progress
 from bridge.mavlink.download import download
 from bridge.mavlink.hands import Denied, Hands
 from bridge.mavlink.logbook import Logbook, Ordered, Owed
-from bridge.mavlink.lookout import Lookout
+from bridge.mavlink.lookout import CLOCKS, Lookout
 from bridge.mavlink.modes import AUTO
 from bridge.mavlink.peer import Peer
 from bridge.mavlink.progress import SOMEBODY, Sight, steps, tried_again
@@ -30,6 +30,8 @@ REMEMBERED_NS = 60 * 10**9
 AGAIN_S = 1.0
 GRACE_NS = 2 * 10**9
 """How long after the end of a scan's wait its confirmation may come."""
+EARLY = ("NAVIGATING", "SETTLING", "SCANNING")
+"""A scan that was told of does not count yet."""
 AT_STOP = ("SETTLING", "SCANNING", "VERIFYING")
 
 
@@ -68,7 +70,7 @@ class Follower:
         course = self._book.course
         if not self.looking:
             return
-        if name == "HEARTBEAT":
+        if name in CLOCKS:
             self._look_at_clock()
         if course is None or self.run.state == "IDLE" or self._busy():
             return
@@ -80,19 +82,30 @@ class Follower:
         before, sight = self.run, self._sight(course)
         if sight is None:
             return False
+        happened = self._happened(before, course, sight)
         if self._looks_only:
-            happened = self._happened(before, course, sight)
             self.run = happened[-1].run if happened else before
-        else:
-            owing = partial(self._owing, course)
-            self.run = self._book.move(lambda run: self._happened(run, course, sight, before), owing)
-            self._lead_past(course, sight)
+        elif happened:
+            self._write_down(course, sight, before)
+        self._lead_past(course, sight)
         return self.run.at > before.at and self._book.owed is None
+
+    def _write_down(self, course: Course, sight: Sight, before: Run) -> None:
+        """Store what has happened, with what it wants of the vehicle, and the scan that counts no more."""
+        capture = self._lookout.capture(before, course, self._book.used)
+        with self._book.journal.transaction():
+            self.run = self._book.move(
+                lambda run: () if run != before else self._happened(run, course, sight),
+                partial(self._owing, course),
+            )
+            waiting = self.run.at == before.at and self.run.stop_state in EARLY
+            if capture is not None and self.run != before and not waiting:
+                self._book.use(*capture.name)
 
     def _sight(self, course: Course) -> Sight | None:
         """The vehicle as it is seen now; asked once more for a scan of a stop that it has left."""
         run, now_ns = self.run, self._book.clock.now_ns()
-        sight = self._lookout.sight(run, course, self._arrived(course))
+        sight = self._lookout.sight(run, course, self._arrived(course), after=self._book.used)
         scanning = run.stop_state == "SCANNING" and run.at < len(course.visits)
         if sight is None or not scanning or sight.place < course.visits[run.at].after:
             return sight
@@ -112,23 +125,20 @@ class Follower:
 
     def _look_at_clock(self) -> None:
         """A vehicle that was started anew stands, and has forgotten its mode, origin and item."""
+        self._book.boot_ms = self._lookout.boot_ms
         began_ns = self._lookout.began_ns
         if self._looks_only or began_ns is None or not self._book.booted(began_ns):
             return
         self._hands.ask_for_telemetry()
         self.run = self._book.move(_rebooted)
 
-    def _happened(
-        self, run: Run, course: Course, sight: Sight, seen_as: Run | None = None
-    ) -> tuple[Change, ...]:
-        """The steps of the run, or what others have done to it; none if it is no longer what was seen."""
-        if seen_as is not None and run != seen_as:
-            return ()
+    def _happened(self, run: Run, course: Course, sight: Sight) -> tuple[Change, ...]:
+        """The steps of the run, or what others have done to it."""
         told = steps(run, course, sight)
         now = told[-1].run if told else run
         if told and (now.over or tried_again(run, now) or now.state == "HELD"):
             return told
-        if self._lookout.mode_ns < self._book.changed_ns + SETTLED_NS:
+        if self._lookout.mode_ns < self._book.changed_ns + SETTLED_NS or not self._lookout.same_boot:
             return told
         other = (
             self._strange_list(now, course)
@@ -188,7 +198,7 @@ class Follower:
 
     def _lead_past(self, course: Course, sight: Sight) -> None:
         """A vehicle that waits at a stop that was left out goes on at once."""
-        if self.run.state != "RUNNING" or not sight.drives:
+        if self.run.state != "RUNNING" or not sight.drives or self._looks_only:
             return
         place = progress.passed_by(self.run, course, sight)
         if place is not None:

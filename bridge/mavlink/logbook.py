@@ -76,6 +76,14 @@ class Owed(msgspec.Struct, frozen=True, kw_only=True):
     since_ns: int
 
 
+class Used(msgspec.Struct, frozen=True, kw_only=True):
+    """The scan that was taken last; before it, the vehicle's time when the run began."""
+
+    boot_id: str
+    index: int
+    boot_ms: int
+
+
 class Moment(msgspec.Struct, frozen=True):
     at_ns: int
 
@@ -87,6 +95,8 @@ class Logbook:
         self.journal = journal
         self.robot = robot
         self.clock = clock
+        self.boot_ms = 0
+        """The vehicle's time since it was started, as last told."""
         self._course: tuple[Sent, Course] | None = None
 
     @property
@@ -147,6 +157,8 @@ class Logbook:
     def _put(self, change: Change) -> None:
         now_ns, run, before = self.clock.now_ns(), change.run, self.run
         self.journal.store_fact("run", run)
+        if run.run_id != before.run_id:
+            self.use(-1, self.boot_ms)
         if run.state != before.state:
             self.journal.store_fact("changed", Moment(now_ns))
         for telling in change.events:
@@ -156,6 +168,16 @@ class Logbook:
                 mission_time_s=(now_ns - run.started_ns) / 1e9,
             )  # fmt: skip
             self.journal.append(event)
+
+    @property
+    def used(self) -> tuple[int, int]:
+        """Number and time of the scan that was taken last; none of this boot's if it was before."""
+        used = self.journal.fact("used", Used)
+        return (used.index, used.boot_ms) if used and used.boot_id == self.boot_id else (-1, -1)
+
+    def use(self, index: int, boot_ms: int) -> None:
+        """That scan, or what was before that time, counts no more."""
+        self.journal.store_fact("used", Used(boot_id=self.boot_id, index=index, boot_ms=boot_ms))
 
     @property
     def changed_ns(self) -> int:

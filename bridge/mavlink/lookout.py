@@ -23,12 +23,17 @@ from mission.mavlink.autopilots import autopilot_named
 STILL_M_PER_S = 0.05
 """An estimator's speed of a robot that stands is not zero."""
 CAPTURES_KEPT = 100
-EARLY_NS = 5 * 10**9
+CLOCK_NS = 3 * 10**9
+"""A vehicle that has not told its time for so long does not tell it at all."""
 TOLD = (
     "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT",
     "ATTITUDE", "SYS_STATUS", "BATTERY_STATUS", "CAMERA_IMAGE_CAPTURED", "GPS_GLOBAL_ORIGIN", "SYSTEM_TIME",
 )  # fmt: skip
 """Messages that are looked at."""
+
+
+CaptureName = tuple[int, int]
+NONE_YET: CaptureName = (-1, -1)
 
 
 @dataclass(frozen=True)
@@ -61,6 +66,8 @@ class Lookout:
         """Sequence number that is worked on, and whether all is done."""
         self._work_ns = 0
         """Since when."""
+        self._mode_began_ns = 0
+        """When the vehicle was first seen in its present mode."""
         self.fix: Fix | None = None
         self.battery = 1.0
         """0 to 1, as last told."""
@@ -68,7 +75,10 @@ class Lookout:
     def take(self, message: Message, course: Course | None) -> str:
         """Remember what a message tells; its name."""
         name, now_ns = str(message.get_type()), self._clock.now_ns()
+        before = (self.mode, self.armed)
         self._newest[name] = Seen(message, now_ns)
+        if (self.mode, self.armed) != before:
+            self._mode_began_ns = now_ns
         taking = TAKING.get(name)
         if taking is not None:
             taking(self, message, course, now_ns)
@@ -77,9 +87,25 @@ class Lookout:
     @property
     def began_ns(self) -> int | None:
         """When the vehicle was started, by the newest message that tells its time."""
-        told = [self._newest[name] for name in CLOCKS if name in self._newest]
-        newest = max(told, key=lambda seen: seen.ns, default=None)
+        newest = self._clock_told()
         return None if newest is None else newest.ns - int(newest.message.time_boot_ms) * 10**6
+
+    @property
+    def boot_ms(self) -> int:
+        """Its time since it was started, as last told."""
+        newest = self._clock_told()
+        return 0 if newest is None else int(newest.message.time_boot_ms)
+
+    @property
+    def same_boot(self) -> bool:
+        """Whether its mode is known to be that of the boot that its clock tells of."""
+        newest = self._clock_told()
+        told = newest is not None and newest.ns > self._mode_began_ns
+        return told or self._clock.now_ns() > self._mode_began_ns + CLOCK_NS
+
+    def _clock_told(self) -> Seen | None:
+        told = [self._newest[name] for name in CLOCKS if name in self._newest]
+        return max(told, key=lambda seen: seen.ns, default=None)
 
     def fresh(self, within_s: float) -> bool:
         """Whether what is wanted most comes in often enough."""
@@ -127,13 +153,18 @@ class Lookout:
         told = 0 if seen is None else seen.message.total
         return told if 0 < told < UNKNOWN_TOTAL else None
 
-    def sight(self, run: Run, course: Course, arrived: Arrived | None = None) -> Sight | None:
-        """What is seen of the vehicle, if enough is known; `arrived` tells that it was seen at its stop."""
+    def sight(
+        self, run: Run, course: Course, arrived: Arrived | None = None, *, after: CaptureName = NONE_YET
+    ) -> Sight | None:
+        """What is seen of the vehicle, if enough is known.
+
+        `arrived` tells that it was seen at its stop; scans count that were made after the one named `after`.
+        """
         if self._work is None or "HEARTBEAT" not in self._newest:
             return None
         place, began_ns = self.place(course), self._work_ns
         fix = self.fix if self.fix is not None and self.fix.ns > began_ns else None
-        capture = self._capture(run, course, run.started_ns if arrived is None else arrived.robot_ns)
+        capture = self.capture(run, course, after)
         stood = capture.pose if capture is not None else None
         return Sight(
             mode=self.mode, armed=self.armed, place=place,
@@ -155,12 +186,16 @@ class Lookout:
             return course.end
         return course.place(current.seq)
 
-    def _capture(self, run: Run, course: Course, since_ns: int) -> Capture | None:
+    def capture(self, run: Run, course: Course, after: CaptureName) -> Capture | None:
         """What was told last of a scan at the stop that is worked on."""
         if run.at >= len(course.mission.stops):
             return None
         stop = course.mission.stops[run.at]
-        own = [capture for capture in self._captures if capture.ns > since_ns and capture.at(stop)]
+        own = [
+            capture
+            for capture in self._captures
+            if capture.name[1] > after[1] and capture.name != after and capture.at(stop)
+        ]
         return own[-1] if own else None
 
     def _take_current(self, message: Message, course: Course | None, now_ns: int) -> None:
@@ -196,11 +231,7 @@ class Lookout:
             self.battery = message.battery_remaining / 100
 
     def _take_capture(self, message: Message, course: Course | None, now_ns: int) -> None:
-        since_boot_ns = now_ns - (self.began_ns or now_ns)
-        ago_ns = since_boot_ns - message.time_boot_ms * 10**6
-        if ago_ns < -EARLY_NS:  # of a boot before
-            return
-        capture = capture_of(message, course, now_ns - max(0, ago_ns))
+        capture = capture_of(message, course)
         if all(capture.name != known.name for known in self._captures):
             self._captures.append(capture)
 

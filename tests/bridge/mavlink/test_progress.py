@@ -1,0 +1,156 @@
+"""What is seen of a vehicle, as steps of a run; no vehicle is needed for it."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from bridge.mavlink.onward import onward
+from bridge.mavlink.progress import Sight, passed_by, steps, taken_over
+from bridge.mavlink.visits import Course, course_of
+from bridge.robots import ScanFailed, ScanResult
+from bridge.run import Run
+from mission.events import AnyEvent, Pose
+from mission.mavlink.translate import translate
+from tests.bridge.mavlink.site import told, tour
+
+SCAN = ScanResult(file="scan-1.e57", size=1600, points=100, sha256="0" * 64)
+S2_AT = Pose(x=4.0, y=2.0, heading=0.0)
+
+
+def course(**details: object) -> Course:
+    mission = tour(**details)
+    return course_of(mission, translate(mission, "ardupilot"))
+
+
+def going(at: int = 1, stop_state: str = "NAVIGATING", **fields: object) -> Run:
+    """A run on the way to S2."""
+    plain = {
+        "state": "RUNNING",
+        "run_id": "r",
+        "leg": at,
+        "at": at,
+        "stop_state": stop_state,
+        "done": ("S1",),
+    }
+    return Run(**(plain | fields))  # type: ignore[arg-type]
+
+
+def seen(place: int, **fields: object) -> Sight:
+    return Sight(mode="AUTO", armed=True, place=place, **fields)  # type: ignore[arg-type]
+
+
+def after(run: Run, course: Course, sight: Sight) -> tuple[list[str], Run]:
+    """What is told of it, and the run then."""
+    changes = steps(run, course, sight)
+    return told([event_of(telling) for change in changes for telling in change.events]), (
+        changes[-1].run if changes else run
+    )
+
+
+def event_of(telling: object) -> AnyEvent:
+    blank = {"number": 0, "robot": "", "boot_id": "", "run_id": "", "mission_id": "", "revision": 0}
+    return telling(**blank, robot_ns=0, mission_time_s=0.0)  # type: ignore[operator,no-any-return]
+
+
+def test_a_place_in_the_list_tells_the_stop_and_the_work_there() -> None:
+    visit = course().visits[1]
+    roles = [placed.role for placed in course().sent.placed]
+    assert (roles[visit.first], roles[visit.at]) == ("corner", "stop")
+    assert (roles[visit.scan], visit.after) == ("trigger", course().visits[2].first)
+
+
+def test_a_waypoint_that_is_reached_is_an_arrival_only_within_the_tolerance() -> None:
+    mine, visit = course(), course().visits[1]
+    near, far = Pose(x=4.03, y=2.0, heading=0.0), Pose(x=4.3, y=2.0, heading=0.0)
+    assert after(going(), mine, seen(visit.at, pose=near))[0] == []
+    assert after(going(), mine, seen(visit.at + 1, pose=near))[0] == ["Arrived S2"]
+    assert after(going(), mine, seen(visit.at + 1, pose=far))[0] == []
+    assert after(going(), mine, seen(visit.at + 1, pose=far, still=True))[0] == ["Failed S2", "Held"]
+    assert after(going(), mine, seen(visit.at + 1))[0] == []
+
+
+def test_a_stop_with_tries_left_is_tried_again_without_a_word() -> None:
+    mine, visit = course(retries=1), course().visits[1]
+    far = Pose(x=4.3, y=2.0, heading=0.0)
+    words, run = after(going(), mine, seen(visit.at + 1, pose=far, still=True))
+    assert words == [] and (run.attempt, run.stop_state) == (1, "WAITING")
+
+
+def test_a_scan_counts_when_its_wait_is_over() -> None:
+    mine, visit = course(), course().visits[1]
+    scanning = going(stop_state="SCANNING", leg=2)
+    words, run = after(scanning, mine, seen(visit.scan, pose=S2_AT, scan=SCAN))
+    assert words == [] and run.stop_state == "VERIFYING"
+    assert after(run, mine, seen(visit.after, pose=S2_AT))[0] == ["Scanned S2"]
+
+
+def test_a_scan_that_nobody_confirms_is_unconfirmed_once_it_is_in_vain_to_wait() -> None:
+    mine, visit = course(), course().visits[1]
+    scanning = going(stop_state="SCANNING", leg=2)
+    assert after(scanning, mine, seen(visit.after, stood=S2_AT))[0] == []
+    words, run = after(scanning, mine, seen(visit.after, stood=S2_AT, in_vain=True))
+    assert words == ["Unconfirmed S2"] and run.done == ("S1", "S2")
+
+
+def test_a_scan_without_a_hash_is_no_scan() -> None:
+    mine, visit = course(), course().visits[1]
+    scanning = going(stop_state="VERIFYING", scan=msgspec.structs.replace(SCAN, sha256=""))
+    assert after(scanning, mine, seen(visit.after, pose=S2_AT))[0] == ["Failed S2", "Held"]
+
+
+def test_a_stop_that_was_left_is_never_gone_back_to() -> None:
+    mine, visit = course(retries=3), course().visits[1]
+    scanning = going(stop_state="SCANNING")
+    words, run = after(scanning, mine, seen(visit.after, scan=ScanFailed(reason="dark")))
+    assert words == ["Failed S2", "Held"] and run.state == "HELD"
+
+
+@pytest.mark.parametrize("mode", ["HOLD", "MANUAL"])
+def test_a_scan_under_way_outlives_a_hold_and_nothing_else(mode: str) -> None:
+    mine, visit = course(), course().visits[1]
+    sight = Sight(mode=mode, armed=True, place=visit.scan)
+    change = taken_over(going(stop_state="SCANNING"), mine, sight)
+    assert change is not None
+    assert change.run.stop_state == ("SCANNING" if mode == "HOLD" else "WAITING")
+
+
+def test_a_vehicle_that_waits_at_a_stop_that_was_left_out_is_led_past_it() -> None:
+    mine, (_, visit, last) = course(), course().visits
+    skipped = going(at=2, skipped=("S2",), leg=1)
+    assert passed_by(skipped, mine, seen(visit.at)) is None
+    assert passed_by(skipped, mine, seen(visit.scan)) == last.first
+    assert passed_by(going(at=2, done=("S1", "S2")), mine, seen(visit.scan)) is None
+
+
+@pytest.mark.parametrize(
+    ("pose", "ahead"),
+    [
+        (Pose(x=3.0, y=0.0, heading=0.0), "corner"),
+        (Pose(x=4.0, y=1.0, heading=0.0), "stop"),
+        (Pose(x=2.0, y=0.0, heading=0.0), "corner"),
+    ],
+)
+def test_after_a_reboot_the_vehicle_goes_on_along_the_piece_on_which_it_stands(
+    pose: Pose, ahead: str
+) -> None:
+    mine = course()
+    place = onward(going(stop_state="WAITING"), mine, seen(0), pose)
+    assert mine.sent.placed[place].role == ahead and mine.sent.placed[place].stop == "S2"
+
+
+def test_a_vehicle_that_has_lost_nothing_keeps_its_item() -> None:
+    mine, visit = course(), course().visits[1]
+    here = Pose(x=4.0, y=1.0, heading=0.0)
+    assert onward(going(stop_state="WAITING"), mine, seen(visit.at), here) == visit.at
+    assert onward(going(stop_state="SCANNING"), mine, seen(visit.scan + 1), S2_AT) == visit.scan + 1
+    assert onward(going(stop_state="WAITING"), mine, seen(visit.scan + 1), S2_AT) == visit.at
+
+
+def test_a_stop_that_is_not_in_the_list_is_named() -> None:
+    from mission.errors import InputError
+
+    whole = tour()
+    shorter = msgspec.structs.replace(whole, stops=whole.stops[:2])
+    with pytest.raises(InputError, match="S3"):
+        course_of(whole, translate(shorter, "ardupilot"))

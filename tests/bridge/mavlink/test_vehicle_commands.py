@@ -1,0 +1,110 @@
+"""The whole way as a person goes it: commands in processes of their own, one of them killed."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from bridge.mavlink.url import Url
+from recordings.review import review
+from tests.bridge.mavlink.scripted import free_udp_port
+from tests.bridge.mavlink.site import tour
+
+STOPGO = (sys.executable, "-m", "mission")
+KEYS = "robot boot_id state run_id mission_id revision stop done skipped battery"
+
+
+class Vehicle:
+    """A simulated vehicle's process, and the folder of the station that talks to it."""
+
+    def __init__(self, folder: Path) -> None:
+        port = free_udp_port()
+        self.url = str(Url("udpout", "127.0.0.1", port))
+        self.state = folder / "station"
+        self.mission = folder / "mission.json"
+        self.mission.write_bytes(msgspec.json.encode(tour()))
+        self.process = subprocess.Popen(
+            [*STOPGO, "robot", "--mavlink-vehicle", f"udpin:127.0.0.1:{port}", "--profile", "ardupilot",
+             "--origin", "51.5,7.5,100", "--at", "0,0,0", "--speed-up", "5"],
+            stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert self.process.stderr is not None
+        assert "ready" in self.process.stderr.readline()
+
+    def command(self, verb: str, *options: str) -> list[str]:
+        way = ["--mavlink", self.url, "--vehicle", "1", "--state", str(self.state)]
+        return [*STOPGO, verb, *options, *way]
+
+    def run(self, verb: str, *options: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            self.command(verb, *options), capture_output=True, text=True, timeout=60, check=False
+        )
+
+
+@pytest.fixture
+def vehicle(tmp_path: Path) -> Iterator[Vehicle]:
+    made = Vehicle(tmp_path)
+    try:
+        yield made
+    finally:
+        made.process.terminate()
+        made.process.wait(10)
+
+
+def test_a_mission_is_pushed_started_and_watched_to_its_end(vehicle: Vehicle, tmp_path: Path) -> None:
+    pushed = vehicle.run("push", str(vehicle.mission))
+    assert pushed.returncode == 0, pushed.stderr
+    refused = vehicle.run("start")
+    assert refused.returncode == 1 and "--arm" in refused.stderr and refused.stderr.count("\n") == 1
+    begun = vehicle.run("start", "--arm", "--json")
+    assert begun.returncode == 0 and json.loads(begun.stdout)["state"] == "RUNNING"
+
+    killed = subprocess.Popen(vehicle.command("watch"), stderr=subprocess.PIPE, text=True)
+    assert killed.stderr is not None
+    assert any("Scanned" in line for line in killed.stderr)
+    killed.send_signal(signal.SIGKILL)
+    killed.wait()
+
+    told = vehicle.run("status", "--json")
+    assert " ".join(json.loads(told.stdout)) == KEYS
+    watched = vehicle.run("watch", "--rrd", str(tmp_path / "field.rrd"), "--json")
+    assert watched.returncode == 0, watched.stderr
+    assert json.loads(watched.stdout)["done"] == ["S1", "S2", "S3"]
+    (run,) = review(tmp_path / "field.rrd").runs
+    assert sorted([*run.scanned, *run.unconfirmed]) == ["S1", "S2", "S3"]
+    assert run.ended == "Finished"
+
+
+def test_ctrl_c_in_watch_leaves_the_vehicle_alone(vehicle: Vehicle) -> None:
+    assert vehicle.run("push", str(vehicle.mission)).returncode == 0
+    assert vehicle.run("start", "--arm").returncode == 0
+    watching = subprocess.Popen(vehicle.command("watch"), stderr=subprocess.PIPE, text=True)
+    assert watching.stderr is not None
+    assert any("Arrived" in line for line in watching.stderr)
+    watching.send_signal(signal.SIGINT)
+    assert watching.wait(20) == 130
+    assert json.loads(vehicle.run("status", "--json").stdout)["state"] in ("RUNNING", "FINISHED")
+    aborted = vehicle.run("abort", "--disarm")
+    assert aborted.returncode == 0, aborted.stderr
+    assert vehicle.run("watch").returncode == 1
+
+
+def test_options_of_the_other_way_are_refused(vehicle: Vehicle) -> None:
+    for verb, *options in (("start", "--robot", "r1"), ("watch", "--site", "hall"), ("pause", "--keys", "k")):
+        told = vehicle.run(verb, *options)
+        assert told.returncode == 2 and "means nothing with --mavlink" in told.stderr
+
+
+def test_an_unsigned_way_out_of_this_machine_is_refused(tmp_path: Path) -> None:
+    told = subprocess.run(
+        [*STOPGO, "start", "--mavlink", "udpout:192.0.2.1:14550", "--state", str(tmp_path)],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert told.returncode == 2 and "--signing-key" in told.stderr
