@@ -3,6 +3,9 @@
 A transport that was opened never fails afterwards: while its line is gone (refused, closed by the other end,
 unplugged) it is silent, says why in `gone`, and comes back by itself. What silence means is for those to
 decide who wait for an answer.
+
+One thread reads, any may write. A line that breaks under a writer is closed by the reader: to close what
+somebody waits on makes the waiting fail in ways of its own.
 """
 
 from __future__ import annotations
@@ -162,7 +165,8 @@ class TcpOut:
             try:
                 line.sendall(data)
             except OSError as error:
-                self._lose(error.strerror or str(error))
+                self.gone = error.strerror or str(error)
+                _end(line)
 
     def close(self) -> None:
         if self._socket is not None:
@@ -204,7 +208,7 @@ class TcpIn:
         self._streams: dict[Address, socket.socket] = {}
 
     def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
-        streams = dict(self._streams)
+        streams = self._streams.copy()
         ready, _, _ = select.select([self._listening, *streams.values()], [], [], timeout_s)
         if self._listening in ready:
             self._accept()
@@ -220,7 +224,7 @@ class TcpIn:
                 try:
                     stream.sendall(data)
                 except OSError:
-                    self._drop(peer)
+                    _end(stream)
 
     def close(self) -> None:
         for peer in list(self._streams):
@@ -228,7 +232,10 @@ class TcpIn:
         self._listening.close()
 
     def _accept(self) -> None:
-        stream, peer = self._listening.accept()
+        try:
+            stream, peer = self._listening.accept()
+        except OSError:  # it was there, and is gone again
+            return
         stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         stream.settimeout(CONNECT_S)  # a peer that never reads must not stop the others for good
         self._streams[peer] = stream
@@ -259,11 +266,15 @@ class Serial:
         self.gone = ""
         self._url = url
         self._tried = time.monotonic()
+        self._broken = ""
+        """Why writing failed; the reader's to see."""
         self._line = self._opened()
 
     def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
         import serial
 
+        if self._broken:
+            self._lose(self._broken)
         if self._line is None:
             self._reopen(timeout_s)
             return []
@@ -272,18 +283,20 @@ class Serial:
             data = self._line.read(1)
             data += self._line.read(self._line.in_waiting) if data else b""
         except (serial.SerialException, OSError) as error:
-            self._lose(error)
+            self._lose(str(error))
             return []
         return [("serial", data)] if data else []
 
     def write(self, data: bytes, to: Address | None = None) -> None:
         import serial
 
+        line = self._line
+        if line is None or self._broken:
+            return
         try:
-            if self._line is not None:
-                self._line.write(data)
+            line.write(data)
         except (serial.SerialException, OSError) as error:
-            self._lose(error)
+            self._broken = str(error)
 
     def close(self) -> None:
         if self._line is not None:
@@ -298,11 +311,11 @@ class Serial:
             why = getattr(error, "strerror", None) or str(error)
             raise InputError(f"{self._url}: cannot be opened ({why}); is it plugged in, and free?") from None
 
-    def _lose(self, error: Exception) -> None:
-        self.gone = f"the serial line is gone ({error})"
-        if self._line is not None:
-            self._line.close()
-        self._line = None
+    def _lose(self, why: str) -> None:
+        line, self._line, self._broken = self._line, None, ""
+        self.gone = f"the serial line is gone ({why})"
+        if line is not None:
+            line.close()
 
     def _reopen(self, timeout_s: float) -> None:
         time.sleep(min(timeout_s, RETRY_S))
@@ -338,6 +351,12 @@ def _bind(made: socket.socket, url: Url) -> None:
         made.close()
         why = error.strerror or str(error)
         raise InputError(f"{url}: cannot listen there ({why}); is the port free, the address ours?") from None
+
+
+def _end(stream: socket.socket) -> None:
+    """Let whoever reads from the stream see its end."""
+    with contextlib.suppress(OSError):
+        stream.shutdown(socket.SHUT_RDWR)
 
 
 def _ready(made: socket.socket, timeout_s: float) -> bool:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import random
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -170,6 +172,21 @@ def test_two_stations_on_streams_are_told_the_same() -> None:
             for box in (here_, there_):
                 beat = box.get(PATIENCE_S)
                 assert beat is not None and beat.type == dialect.MAV_TYPE_GROUND_ROVER
+
+
+def test_a_vehicle_outlives_stations_that_hang_up() -> None:
+    """They do so while it is writing to them, with everything unread, so that its writes fail."""
+    port = free_udp_port()
+    linger = struct.pack("ii", 1, 0)
+    with (
+        vehicle_on(Url("tcpin", "127.0.0.1", port), Setting(PROFILES["strict"])),
+        wire(Url("tcp", "127.0.0.1", port)) as station,
+    ):
+        for _ in range(500):
+            with socket.create_connection(("127.0.0.1", port)) as rude:
+                rude.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+                station.send(dialect.MAVLink_param_request_list_message(1, 1))
+        assert count_of(station) == 0
 
 
 def test_a_signing_vehicle_hears_who_has_the_key_only() -> None:
