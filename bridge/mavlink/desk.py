@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -126,6 +126,7 @@ class Desk:
         self._link: MemoryLink = self.board.link()
         self._poses: deque[PoseReport] = deque(maxlen=POSES_KEPT)
         self._boot_id = ""
+        self._error: Exception | None = None
         self._seq = self._pose_seq = 0
         self._told = book.journal.newest
         self._closing = threading.Event()
@@ -144,15 +145,23 @@ class Desk:
         self._tell_pose = link.publisher(keys.pose)
         link.announce(keys.alive)
         for work in (self._look, self._follower.act):
-            thread = threading.Thread(target=work, name=work.__name__, daemon=True)
+            thread = threading.Thread(target=self._watched, args=(work,), name=work.__name__, daemon=True)
             self._threads.append(thread)
             thread.start()
 
+    def _watched(self, work: Callable[[], None]) -> None:
+        """What ends a thread is told to whoever asks next."""
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 (the end of a thread)
+            self._error = error
+
     def close(self) -> None:
-        self._closing.set()
+        looking, acting = self._threads
         self._follower.close()
-        for thread in self._threads:
-            thread.join()
+        acting.join()  # what the end of a run wants of the vehicle is still told, and seen
+        self._closing.set()
+        looking.join()
         self._link.close()
 
     def await_news(self, timeout_s: float, *, compares: bool = False) -> None:
@@ -242,6 +251,8 @@ class Desk:
     # What it is asked
 
     def _info(self) -> Info:
+        if self._error is not None:
+            raise self._error
         return Info(
             protocol=VERSION, stopgo=__version__, robot=self.keys.robot, boot_id=self._book.boot_id,
             clock_ns=self._wall.now_ns(), state=self._state(), lease=self._book.journal.fact("lease", Lease),

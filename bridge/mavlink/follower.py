@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import uuid
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -19,7 +20,7 @@ from bridge.mavlink.progress import SOMEBODY, Sight, steps, tried_again
 from bridge.mavlink.visits import Course
 from bridge.mavlink.wire import dialect
 from bridge.run import Change, Run
-from mission.errors import OutcomeUnknown, RobotUnreachable
+from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.events import Arrived
 from mission.mavlink.autopilots import differences
 
@@ -191,14 +192,15 @@ class Follower:
         since_ns = self._book.clock.now_ns()
         if tried_again(before, after):
             return Owed(deed="jump", place=course.visits[after.at].at, since_ns=since_ns)
-        stops = before.state == "RUNNING" and after.state in ("HELD", "ABORTED")
+        early = after.state == "FINISHED" and (self._lookout.sequence or 0) < course.sequence(course.end - 1)
+        stops = before.state == "RUNNING" and (after.state in ("HELD", "ABORTED") or early)
         if stops and self._lookout.mode == AUTO and self._strange_list(before, course) is None:
             return Owed(deed="hold", place=0, since_ns=since_ns)
         return None
 
     def _lead_past(self, course: Course, sight: Sight) -> None:
         """A vehicle that waits at a stop that was left out goes on at once."""
-        if self.run.state != "RUNNING" or not sight.drives or self._looks_only:
+        if self.run.state not in ("RUNNING", "HOMING") or not sight.drives or self._looks_only:
             return
         place = progress.passed_by(self.run, course, sight)
         if place is not None:
@@ -207,17 +209,17 @@ class Follower:
             self._due.set()
 
     def act(self) -> None:
-        """Tell the vehicle what is owed to it, until closed."""
+        """Tell the vehicle what is owed to it, until closed, and then what is owed still."""
         while not self._closing.is_set():
             self._due.wait()
             self._due.clear()
             owed, course = self._book.owed, self._book.course
-            if owed is None or course is None or self._looks_only or self._closing.is_set():
+            if owed is None or course is None or self._looks_only:
                 continue
             try:
                 self._pay(owed, course)
             except (OutcomeUnknown, RobotUnreachable):
-                self._closing.wait(AGAIN_S)  # the lookout asks for it again as long as it is owed
+                self._closing.wait(AGAIN_S)  # it is asked for again as long as it is owed
 
     def _pay(self, owed: Owed, course: Course) -> None:
         try:
@@ -231,9 +233,11 @@ class Follower:
         self._book.paid(owed)
 
     def compare(self) -> None:
-        """Find out whether the vehicle holds what it was sent, item by item."""
-        course = self._book.course
-        if course is not None:
+        """Find out whether the vehicle holds what it was sent, item by item; unless it will not tell now."""
+        course, state = self._book.course, self._book.run.state
+        if course is None or state in ("FINISHED", "ABORTED"):
+            return
+        with suppress(AnswerIsNo, RobotUnreachable):
             self._differs = next(iter(differences(course.sent, download(self._peer))), "")
 
 

@@ -75,9 +75,9 @@ class Orders:
         before = self._book.journal.answer(command.cmd_id)
         if before is not None:
             return before[1]
-        decision = self._in_the_way(command) or self._elsewhere(command) or self._decided(command)
+        decision = self._in_the_way(command) or self._decided(command)
         if isinstance(decision, Refused):
-            return self._stored(command, decision, None)
+            return self._refused(command, decision)
         course = self._book.course
         assert course is not None  # without a mission nothing is decided
         with self._ordering(command):
@@ -87,6 +87,18 @@ class Orders:
                 return self._stored(command, denied.refused, None)
             return self._stored(command, change, decision.lease)
 
+    def _refused(self, command: Command, refused: Refused) -> Answer:
+        """A pause that the run has no use for still stops a vehicle that drives, whoever started it."""
+        drives = self._lookout.mode == AUTO and self._lookout.armed
+        if command.verb != "pause" or not drives or refused.reason not in ("wrong_state", "no_mission"):
+            return self._stored(command, refused, None)
+        with self._ordering(command):
+            try:
+                self._hands.hold()
+            except Denied as denied:
+                return self._stored(command, denied.refused, None)
+            return self._stored(command, Change(self._book.run), None)
+
     def _in_the_way(self, command: Command) -> Refused | None:
         """Only one order at a time, but for those that stop."""
         other = self._book.ordered
@@ -94,11 +106,8 @@ class Orders:
             return None
         return Refused("wrong_state", f"{other.verb} by {other.by} is being carried out; wait for its end")
 
-    def _elsewhere(self, command: Command) -> Refused | None:
+    def _elsewhere(self, course: Course) -> Refused | None:
         """Where the vehicle stands means something only if it counts from the mission's origin."""
-        course = self._book.course
-        if course is None or command.verb not in DRIVING:
-            return None
         origin, sent = self._peer.origin(), course.sent
         if origin is None:
             return Refused(
@@ -111,6 +120,9 @@ class Orders:
 
     def _decided(self, command: Command) -> Decision | Refused:
         course, run = self._book.course, self._book.run
+        elsewhere = None if course is None or command.verb not in DRIVING else self._elsewhere(course)
+        if elsewhere is not None:
+            return elsewhere
         here = self._lookout.fix.pose if self._lookout.fix is not None else None
         mission = None if course is None else course.mission
         if here is None and mission is not None and command.verb not in FREE_VERBS:
@@ -169,7 +181,12 @@ class Orders:
         before, after = self._book.run, decision.change.run
         sight = self._sight(after, course)
         beyond = progress.passed_by(after, course, sight)
-        if before.state == "HELD":
+        if after.over:
+            self._hands.hold()
+        elif before.state == "HELD":
+            elsewhere = self._elsewhere(course)
+            if elsewhere is not None:
+                raise Denied(elsewhere)
             self._ready(course)
             self._go(course, onward(after, course, sight, self._here()), sight)
         elif before.state == "RUNNING" and beyond is not None:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
+from bridge.mavlink.peer import reached as found_peer
+from bridge.mavlink.wire import dialect
+from mission.document import sealed
 from mission.events import Arrived, Failed, Held, PoseReport, Scanned, StateReport, Unconfirmed
 from recordings.field import FieldRecording
 from recordings.review import review
@@ -92,3 +96,53 @@ def test_what_the_line_loses_is_recovered(profile: str, tmp_path: Path) -> None:
         "Arrived S3",
     ]
     assert site.run.state == "FINISHED" and site.run.done == ("S1", "S2", "S3")
+
+
+def test_a_stop_that_ends_the_run_leaves_the_vehicle_standing(tmp_path: Path) -> None:
+    site = Site(tmp_path, "px4", faults=["beside@6=0.3"], mission=tour(on_failure="abort"))
+    with site.up():
+        with watched(site):
+            site.order("start")
+        assert site.run.state == "ABORTED"
+        with found_peer(site.url, vehicle=1) as peer:
+            assert not peer.in_auto
+
+
+def test_a_last_stop_that_is_left_out_ends_the_run_where_the_vehicle_is(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        with watched(site):
+            site.order("start")
+            until(site, lambda events, run: run.at == 2)
+            assert site.order("skip").state == "FINISHED"
+        with found_peer(site.url, vehicle=1) as peer:
+            assert not peer.in_auto
+
+
+def test_the_way_back_is_driven_at_the_end(tmp_path: Path) -> None:
+    there = tour()
+    back = sealed(msgspec.structs.replace(there, return_=((2.0, 2.0), (0.0, 2.0), (0.0, 0.0))))
+    site = Site(tmp_path, "ardupilot", mission=back)
+    with site.up(), watched(site) as seen:
+        site.order("start")
+    assert told(site.events) == [*ALL[:-1], "Homing", "Finished"]
+    last = [report for report in seen if isinstance(report, PoseReport)][-1].pose
+    assert (last.x, last.y) == pytest.approx((0.0, 0.0), abs=0.03)
+
+
+def test_a_pause_stops_a_vehicle_that_somebody_else_has_started(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up(), found_peer(site.url, vehicle=1) as peer:
+        peer.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        peer.order(dialect.MAV_CMD_DO_SET_MODE, 1, 10)
+        assert site.order("pause").outcome == "ok"
+        assert not peer.in_auto
+
+
+def test_a_run_that_somebody_else_has_started_is_told_as_theirs(tmp_path: Path) -> None:
+    site = Site(tmp_path, "px4")
+    with site.up(), found_peer(site.url, vehicle=1) as peer, watched(site, compares=True):
+        peer.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        peer.order(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)
+    assert told(site.events) == ALL
+    assert "operator" in getattr(site.events[0], "commander", "")
