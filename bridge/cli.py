@@ -13,6 +13,7 @@ import typer
 
 from bridge.console import Bar, print_json, say
 from bridge.key_commands import key_commands
+from bridge.tunnel_commands import tunnel_commands
 from bridge.ways import (
     DEFAULT_ENDPOINT,
     Connect,
@@ -77,6 +78,7 @@ def add_commands(app: typer.Typer) -> None:
     app.command()(status)
     app.command()(watch)
     app.add_typer(key_commands(), name="keys")
+    app.add_typer(tunnel_commands(), name="tunnel")
 
 
 def robot(

@@ -105,6 +105,10 @@ class Keys:
         """`begin`, `chunk/<i>`, `commit` or `part/<i>` of one mission's transfer."""
         return f"{self.root}/mission/{mission_id}/{step}"
 
+    def mavlink(self, what: str) -> str:
+        """Raw frames: `down` from the vehicle, `up` to it; `alive`: token of the tunnel at the robot."""
+        return f"{self.root}/mavlink/{what}"
+
     def robot_of(self, key: str) -> str:
         """The robot whose key this is."""
         return key.removeprefix(self.root.removesuffix(self.robot)).partition("/")[0]

@@ -47,8 +47,13 @@ def start_robot(
     RobotUnreachable
         With the last line the robot said, if it ended or did not get ready.
     """
-    command = [sys.executable, "-m", "mission", "robot", "--name", name, "--state", str(state)]
-    command += ["--listen", listen, "--speed-up", f"{speed_up:g}", *extra]
+    own = ("--name", name, "--state", str(state), "--listen", listen, "--speed-up", f"{speed_up:g}")
+    return start("robot", *own, *extra, called=f"robot {name}")
+
+
+def start(*arguments: str, called: str) -> subprocess.Popen[str]:
+    """The process of a stopgo command that says when it is ready; raises as `start_robot` does."""
+    command = [sys.executable, "-m", "mission", *arguments]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     lines: list[str] = []
     ready = threading.Event()
@@ -56,9 +61,7 @@ def start_robot(
     ready.wait(READY_S)
     if not any(line.startswith(READY) for line in lines):
         end_robot(process)
-        raise RobotUnreachable(
-            f"robot {name} did not start: {lines[-1].strip() if lines else 'it said nothing'}"
-        )
+        raise RobotUnreachable(f"{called} did not start: {lines[-1].strip() if lines else 'it said nothing'}")
     return process
 
 

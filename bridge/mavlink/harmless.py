@@ -1,0 +1,77 @@
+"""Which messages for a vehicle only look at it, or stop it: all that passes a tunnel, unless it is told more.
+
+A station that is let through raw could arm, change the mission and drive while a run is under way, and no
+commander's lease would count. To stop a vehicle must always be possible.
+"""
+
+from __future__ import annotations
+
+from bridge.mavlink.driving import DRIVING
+from bridge.mavlink.peer import autopilot_of, enum_name
+from bridge.mavlink.wire import Message, dialect
+
+LOOKS = frozenset({
+    "HEARTBEAT", "PING", "TIMESYNC", "SYSTEM_TIME", "COMMAND_CANCEL",
+    "PARAM_REQUEST_READ", "PARAM_REQUEST_LIST", "REQUEST_DATA_STREAM", "MESSAGE_INTERVAL",
+    "MISSION_REQUEST_LIST", "MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_REQUEST_PARTIAL_LIST",
+    "LOG_REQUEST_LIST", "LOG_REQUEST_DATA", "LOG_REQUEST_END",
+})  # fmt: skip
+"""Messages that ask."""
+ASKS = frozenset({
+    dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
+    dialect.MAV_CMD_GET_MESSAGE_INTERVAL, dialect.MAV_CMD_GET_HOME_POSITION,
+    dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, dialect.MAV_CMD_REQUEST_PROTOCOL_VERSION,
+    dialect.MAV_CMD_REQUEST_CAMERA_INFORMATION, dialect.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS,
+})  # fmt: skip
+"""Commands that ask."""
+COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
+
+
+class Harmless:
+    """Judges what goes to the vehicle by what it knows of it: its kind, from the heartbeats that pass."""
+
+    def __init__(self) -> None:
+        self._kinds: dict[int, str] = {}
+
+    def sees(self, message: Message) -> None:
+        """Look at a message that comes from the vehicle's side."""
+        if message.get_type() == "HEARTBEAT" and message.get_srcComponent() == dialect.MAV_COMP_ID_AUTOPILOT1:
+            self._kinds[message.get_srcSystem()] = autopilot_of(message)
+
+    def lets_through(self, message: Message) -> bool:
+        """Whether a message only looks, or stops."""
+        name = message.get_type()
+        if name in COMMANDS:
+            return message.command in ASKS or self._stops(message)
+        if name == "SET_MODE":
+            return self._holds(message.target_system, message.custom_mode)
+        # A download ends with an ACK; of another result it is a cancel, which is as harmless.
+        return name in LOOKS or name == "MISSION_ACK"
+
+    def _stops(self, message: Message) -> bool:
+        first, main, sub = message.param1, message.param2, message.param3
+        if message.command == dialect.MAV_CMD_COMPONENT_ARM_DISARM:
+            return bool(first == 0)
+        if message.command == dialect.MAV_CMD_DO_PAUSE_CONTINUE:
+            return bool(first == 0)
+        if message.command == dialect.MAV_CMD_DO_FLIGHTTERMINATION:
+            return bool(first >= 0.5)
+        if message.command != dialect.MAV_CMD_DO_SET_MODE or not (_whole(main) and _whole(sub)):
+            return False
+        packed = DRIVING.get(self._kinds.get(message.target_system, ""))
+        custom = int(sub) << 24 | int(main) << 16 if packed and packed.packed else int(main)
+        return self._holds(message.target_system, custom)
+
+    def _holds(self, system: int, custom_mode: int) -> bool:
+        driving = DRIVING.get(self._kinds.get(system, ""))
+        return driving is not None and driving.mode_of(custom_mode) == driving.hold
+
+
+def described(message: Message) -> str:
+    """What a message is, for people: the name of its command if it is one."""
+    name: str = message.get_type()
+    return f"{enum_name('MAV_CMD', message.command)} ({name})" if name in COMMANDS else name
+
+
+def _whole(value: float) -> bool:
+    return 0 <= value <= 255 and value == int(value)
