@@ -11,10 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from bridge.mavlink.simulated.camera import Camera
 from bridge.mavlink.simulated.faults import Mishaps
 from bridge.mavlink.simulated.profile import Profile
 from bridge.mavlink.simulated.rover import Rover
-from bridge.mavlink.simulated.scanner import Scanner
 from bridge.mavlink.simulated.store import Items, Store
 from mission.document import Point
 from mission.mavlink.items import Command, Item
@@ -52,12 +52,12 @@ class Course:
         profile: Profile,
         store: Store,
         rover: Rover,
-        scanner: Scanner,
+        camera: Camera,
         mishaps: Mishaps,
         tells: Tells,
     ) -> None:
         self._profile, self._store, self._rover = profile, store, rover
-        self._scanner, self._mishaps, self._tells = scanner, mishaps, tells
+        self._camera, self._mishaps, self._tells = camera, mishaps, tells
         self._first = 1 if profile.autopilot.home_first else 0
         self._phase: Phase = "lost"
         self._item: Item | None = None
@@ -158,7 +158,7 @@ class Course:
         else:
             self._phase = "script"
             self.due_ns = now_ns + _ns(item.params[1]) if item.params[1] else None
-            if self._scanner.scan is None:
+            if self._camera.under_way is None:
                 self._tells.trigger(max(0, item.x), item.params[2], now_ns)
 
     def _drive(self, item: Item, now_ns: int) -> None:

@@ -187,7 +187,7 @@ def _reposition(vehicle: Vehicle, order: Order) -> int:
         return int(DENIED)
     vehicle.set_mode(mode)
     vehicle.rover.set_speed(order.params[0])
-    vehicle.guide(point, _heading(vehicle, order.params[3]))
+    vehicle.lead.go(point, _heading(vehicle, order.params[3]), vehicle.now_ns)
     return int(ACCEPTED)
 
 
@@ -199,9 +199,13 @@ def _heading(vehicle: Vehicle, yaw: float) -> float | None:
 
 def _change_speed(vehicle: Vehicle, order: Order) -> int:
     """ArduPilot takes a speed only while it goes somewhere (source)."""
-    if vehicle.profile.name == "ardupilot" and not vehicle.goes_somewhere:
+    drives = vehicle.course.state == "active" or vehicle.lead.goes_somewhere
+    if vehicle.profile.name == "ardupilot" and not drives:
         return int(FAILED)
-    return int(ACCEPTED if vehicle.change_speed(order.params[1]) else DENIED)
+    if not vehicle.rover.set_speed(order.params[1]):
+        return int(DENIED)
+    vehicle.lead.again(vehicle.now_ns)
+    return int(ACCEPTED)
 
 
 def _interval(vehicle: Vehicle, order: Order) -> int:
@@ -250,12 +254,10 @@ def _stop_capture(vehicle: Vehicle, order: Order) -> int:
 
 def _scan(vehicle: Vehicle, order: Order, number: int, seconds: float) -> int:
     """A trigger that comes again for the scan it began does not begin another."""
-    under_way = vehicle.scanner.scan
-    if under_way is not None and number > 0 and number == under_way.number:
+    same = number == vehicle.camera.under_way or (order.again and number == vehicle.camera.last)
+    if number > 0 and same:
         return int(ACCEPTED)
-    if order.again and number > 0 and number == vehicle.last_scan:
-        return int(ACCEPTED)
-    return int(ACCEPTED if vehicle.scan(max(0, number), seconds) else REJECTED)
+    return int(ACCEPTED if vehicle.camera.begin(max(0, number), seconds, vehicle.now_ns) else REJECTED)
 
 
 OBEYED: dict[int, Callable[[Vehicle, Order], int]] = {
@@ -286,7 +288,7 @@ def _set_origin(vehicle: Vehicle, message: Message) -> None:
 
 
 def _target_local(vehicle: Vehicle, message: Message) -> None:
-    vehicle.led()
+    vehicle.lead.hear()
     if message.type_mask & IGNORE_X_Y == IGNORE_X_Y:
         return _turn(vehicle, message)
     east, north = message.y, message.x
@@ -300,7 +302,7 @@ def _target_local(vehicle: Vehicle, message: Message) -> None:
 
 
 def _target_global(vehicle: Vehicle, message: Message) -> None:
-    vehicle.led()
+    vehicle.lead.hear()
     point = vehicle.rover.point(message.lat_int, message.lon_int)
     if point is not None:
         _guide(vehicle, message, point)
@@ -310,10 +312,11 @@ def _turn(vehicle: Vehicle, message: Message) -> None:
     """To a yaw without a place. Speeds and accelerations, which may come instead, are not followed."""
     leads = vehicle.mode == "guided" and vehicle.armed and vehicle.profile.yaw_alone
     if leads and not message.type_mask & IGNORE_YAW and math.isfinite(message.yaw) and abs(message.yaw) < 100:
-        vehicle.turn(math.pi / 2 - message.yaw)
+        vehicle.lead.turn(math.pi / 2 - message.yaw, vehicle.now_ns)
 
 
 def _guide(vehicle: Vehicle, message: Message, point: tuple[float, float]) -> None:
     if vehicle.mode != "guided" or not vehicle.armed or message.type_mask & IGNORE_X_Y:
         return
-    vehicle.guide(point, None if message.type_mask & IGNORE_YAW else _heading(vehicle, message.yaw))
+    heading = None if message.type_mask & IGNORE_YAW else _heading(vehicle, message.yaw)
+    vehicle.lead.go(point, heading, vehicle.now_ns)

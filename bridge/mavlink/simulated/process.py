@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge.clock import WallClock
-from bridge.mavlink.simulated.faults import VehicleFaults, on_line, read_vehicle_fault
+from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
+from bridge.mavlink.simulated.line import on_line
 from bridge.mavlink.simulated.orders import NORTHMOST
 from bridge.mavlink.simulated.profile import profile_named
 from bridge.mavlink.simulated.rover import to_east

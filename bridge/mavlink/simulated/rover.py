@@ -71,6 +71,11 @@ class Rover:
         self.speed = speed
         return True
 
+    @property
+    def alt_mm(self) -> int:
+        """The origin's altitude above the sea; 0 without one."""
+        return 0 if self.origin is None else round(self.origin.alt * 1000)
+
     def place(self, point: Point) -> tuple[int, int]:
         """Latitude and longitude in steps of 1e-7 degrees; 0, 0 without an origin."""
         if self.origin is None:

@@ -82,7 +82,7 @@ def global_position(vehicle: Vehicle) -> Message:
     north, east = _velocity(pose.heading, 100 * speed)
     heading = round(math.degrees(bearing(pose.heading)) % 360 * 100) % 36_000
     return dialect.MAVLink_global_position_int_message(
-        vehicle.boot_ms, lat, lon, vehicle.alt_mm, 0, round(north), round(east), 0, heading
+        vehicle.boot_ms, lat, lon, vehicle.rover.alt_mm, 0, round(north), round(east), 0, heading
     )
 
 
@@ -98,21 +98,21 @@ def gps_raw(vehicle: Vehicle) -> Message:
     fix = dialect.GPS_FIX_TYPE_3D_FIX if vehicle.rover.origin else dialect.GPS_FIX_TYPE_NO_FIX
     course = round(math.degrees(bearing(pose.heading)) % 360 * 100) % 36_000
     return dialect.MAVLink_gps_raw_int_message(
-        vehicle.boot_ms * 1000, fix, lat, lon, vehicle.alt_mm, 50, 50, round(100 * speed), course, 12
+        vehicle.boot_ms * 1000, fix, lat, lon, vehicle.rover.alt_mm, 50, 50, round(100 * speed), course, 12
     )
 
 
 def vfr_hud(vehicle: Vehicle) -> Message:
     pose, speed = vehicle.motion()
     course = round(math.degrees(bearing(pose.heading))) % 360
-    return dialect.MAVLink_vfr_hud_message(speed, speed, course, 0, vehicle.alt_mm / 1000, 0.0)
+    return dialect.MAVLink_vfr_hud_message(speed, speed, course, 0, vehicle.rover.alt_mm / 1000, 0.0)
 
 
 def origin(vehicle: Vehicle) -> Message | None:
     if vehicle.rover.origin is None:
         return None
     lat, lon = vehicle.rover.place((0.0, 0.0))
-    return dialect.MAVLink_gps_global_origin_message(lat, lon, vehicle.alt_mm, vehicle.boot_ms * 1000)
+    return dialect.MAVLink_gps_global_origin_message(lat, lon, vehicle.rover.alt_mm, vehicle.boot_ms * 1000)
 
 
 def home(vehicle: Vehicle) -> Message | None:
@@ -121,7 +121,7 @@ def home(vehicle: Vehicle) -> Message | None:
         return None
     lat, lon = vehicle.rover.place((0.0, 0.0))
     return dialect.MAVLink_home_position_message(
-        lat, lon, vehicle.alt_mm, 0.0, 0.0, 0.0, UPRIGHT, 0.0, 0.0, 0.0, vehicle.boot_ms * 1000
+        lat, lon, vehicle.rover.alt_mm, 0.0, 0.0, 0.0, UPRIGHT, 0.0, 0.0, 0.0, vehicle.boot_ms * 1000
     )
 
 
@@ -155,12 +155,11 @@ def item_reached(vehicle: Vehicle) -> Message | None:
 
 def image_captured(vehicle: Vehicle) -> Message | None:
     """Of the scan that ended last."""
-    return next(reversed(vehicle.captured.values()), None)
+    return vehicle.camera.newest
 
 
 def capture_status(vehicle: Vehicle) -> Message:
-    scans = int(vehicle.scanner.scan is not None)
-    count = vehicle.store.kept.images
+    scans, count = int(vehicle.camera.under_way is not None), vehicle.camera.count
     return dialect.MAVLink_camera_capture_status_message(vehicle.boot_ms, scans, 0, 0.0, 0, 0.0, count)
 
 

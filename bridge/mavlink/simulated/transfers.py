@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.clock import Clock
+from bridge.mavlink.simulated.carried import float_message, int_message, item_of
 from bridge.mavlink.simulated.faults import Mishaps
 from bridge.mavlink.simulated.profile import Profile
 from bridge.mavlink.simulated.store import ALL, FENCE, MISSION, RALLY, Items, Store
 from bridge.mavlink.simulated.validate import ACCEPTED, verdict
 from bridge.mavlink.wire import Message, Who
-from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.items import Item
-from mission.mavlink.keeping import PLACED
 
 KINDS = (MISSION, FENCE, RALLY)
-STEPPED = PLACED | frozenset(range(5000, 5005)) | {5100}
-"""Commands whose x and y are degrees."""
-INT32 = 2**31 - 1
 
 
 @dataclass
@@ -87,8 +81,8 @@ class Transfers:
         self._completed = 0
         self.handlers: dict[str, Callable[[Who, Message], None]] = {
             "MISSION_COUNT": self._count,
-            "MISSION_ITEM_INT": self._item_int,
-            "MISSION_ITEM": self._item_float,
+            "MISSION_ITEM_INT": self._item,
+            "MISSION_ITEM": self._item,
             "MISSION_REQUEST_LIST": self._request_list,
             "MISSION_REQUEST_INT": self._request,
             "MISSION_REQUEST": self._request,
@@ -147,15 +141,7 @@ class Transfers:
         self._upload = Upload(who, kind, count, heard_ns=self._clock.now_ns())
         self._ask(self._upload)
 
-    def _item_int(self, who: Who, message: Message) -> None:
-        self._item(who, message, message.x, message.y)
-
-    def _item_float(self, who: Who, message: Message) -> None:
-        """The old message: degrees in float32, good to a metre."""
-        scale = STEPS_PER_DEGREE if message.command in STEPPED else 1
-        self._item(who, message, _whole(message.x * scale), _whole(message.y * scale))
-
-    def _item(self, who: Who, message: Message, x: int, y: int) -> None:
+    def _item(self, who: Who, message: Message) -> None:
         up = self._upload
         if not self._event(message.seq):
             return
@@ -167,7 +153,7 @@ class Transfers:
             return self._ack(who, dialect.MAV_MISSION_ERROR, message.mission_type)
         if message.seq != len(up.items):
             return self._stray(up)
-        item = _item_of(message, x, y)
+        item = item_of(message)
         result = self._verdict(up, item)
         if result != ACCEPTED:
             self._upload = None
@@ -241,7 +227,7 @@ class Transfers:
             items = (self._home(),)  # source: home can always be read
         if number < len(items):
             whole = message.get_type() == "MISSION_REQUEST_INT"
-            return self._say((_item_message if whole else _float_message)(who, kind, number, items[number]))
+            return self._say((int_message if whole else float_message)(who, kind, number, items[number]))
         if self._profile.name == "ardupilot":
             self._say_count(who, kind)
             return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
@@ -319,32 +305,3 @@ class Transfers:
 def _same(one: Items, other: Items) -> bool:
     """Bit by bit, for a NaN is not equal to itself."""
     return msgspec.msgpack.encode(one) == msgspec.msgpack.encode(other)
-
-
-def _item_of(message: Message, x: int, y: int) -> Item:
-    return Item(
-        message.command, message.frame, (message.param1, message.param2, message.param3, message.param4),
-        x, y, message.z, autocontinue=bool(message.autocontinue),
-    )  # fmt: skip
-
-
-def _item_message(who: Who, kind: int, number: int, item: Item) -> Message:
-    return _message_of(dialect.MAVLink_mission_item_int_message, who, kind, number, item, item.x, item.y)
-
-
-def _float_message(who: Who, kind: int, number: int, item: Item) -> Message:
-    scale = STEPS_PER_DEGREE if item.command in STEPPED else 1
-    x, y = item.x / scale, item.y / scale
-    return _message_of(dialect.MAVLink_mission_item_message, who, kind, number, item, x, y)
-
-
-def _message_of(made: Any, who: Who, kind: int, number: int, item: Item, x: float, y: float) -> Message:
-    return made(
-        who.system, who.component, number, item.frame, item.command, 0, int(item.autocontinue), *item.params,
-        x, y, item.z, kind,
-    )  # fmt: skip
-
-
-def _whole(value: float) -> int:
-    """The nearest int32; what is no place is as far off the earth as it can be."""
-    return round(value) if math.isfinite(value) and abs(value) <= INT32 else INT32

@@ -19,9 +19,9 @@ from bridge.mavlink.simulated.faults import (
     FAULTS,
     VehicleFault,
     VehicleFaults,
-    on_line,
     read_vehicle_fault,
 )
+from bridge.mavlink.simulated.line import on_line
 from bridge.mavlink.simulated.process import VehicleOptions, setting_of, vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.store import Store

@@ -74,11 +74,11 @@ def test_a_trigger_fires_when_the_wait_before_it_is_over_and_not_before(make: Ma
     bench.upload([waypoint(4.0, 0.0), delay(10.0), trigger(bench, 1, 5.0), delay(5.0)])
     bench.start()
     bench.pass_time(19.0)
-    assert bench.vehicle.scanner.scan is None
+    assert bench.vehicle.camera.under_way is None
     bench.pass_time(2.0)
-    scan = bench.vehicle.scanner.scan
-    assert scan is not None
-    assert (scan.began_ns - bench.vehicle._booted_ns) / 1e9 == pytest.approx(20.0, abs=0.1)
+    ends_ns = bench.vehicle.camera.due_ns
+    assert ends_ns is not None
+    assert (ends_ns - bench.vehicle._booted_ns) / 1e9 == pytest.approx(25.0, abs=0.1)
 
 
 def test_a_trigger_right_before_a_waypoint_fires_while_the_vehicle_drives_and_its_scan_fails(
@@ -563,7 +563,7 @@ def test_a_scan_by_command_is_not_begun_twice(make: Make) -> None:
     assert captures(bench) == [(0, 1), (1, 1)]
     again = d.MAVLink_command_long_message(1, 1, capture, 1, 0, 4.0, 1, 3, 0, 0, 0)
     bench.say(again)
-    assert bench.vehicle.scanner.scan is None
+    assert bench.vehicle.camera.under_way is None
 
 
 def test_the_camera_tells_how_much_it_has_taken_and_an_older_picture_again(make: Make) -> None:

@@ -1,0 +1,88 @@
+"""The scanner as MAVLink has it: a camera that counts its pictures and tells of each, also again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from bridge.mavlink.simulated.faults import Mishaps
+from bridge.mavlink.simulated.rover import Rover
+from bridge.mavlink.simulated.scanner import Captured, Scanner
+from bridge.mavlink.simulated.store import Store
+from bridge.mavlink.wire import Message
+
+
+class Camera:
+    """One scan at a time, of a rover that should stand still meanwhile.
+
+    Parameters
+    ----------
+    default_s
+        Seconds of a scan whose trigger says none.
+    """
+
+    def __init__(
+        self, store: Store, rover: Rover, mishaps: Mishaps, *, default_s: Callable[[], float]
+    ) -> None:
+        self._store, self._rover, self._default_s = store, rover, default_s
+        self._scanner = Scanner(mishaps)
+        self.last = 0
+        """The number that the trigger of the newest scan carried."""
+        self.told: dict[int, Message] = {}
+        """What was said of each scan since the boot, by its index."""
+
+    @property
+    def due_ns(self) -> int | None:
+        """When the scan under way ends."""
+        return None if self._scanner.scan is None else self._scanner.scan.ends_ns
+
+    @property
+    def under_way(self) -> int | None:
+        """The number that its trigger carried."""
+        return None if self._scanner.scan is None else self._scanner.scan.number
+
+    @property
+    def count(self) -> int:
+        """Scans that were begun, ever."""
+        return self._store.kept.images
+
+    @property
+    def newest(self) -> Message | None:
+        """What was said of the scan that ended last."""
+        return next(reversed(self.told.values()), None)
+
+    def begin(self, number: int, seconds: float, now_ns: int) -> bool:
+        """Begin a scan; false if one is under way. 0 seconds: not said."""
+        lasts, pose = seconds if seconds > 0 else self._default_s(), self._rover.at(now_ns)[0]
+        if not self._scanner.begin(number, lasts, index=self.count, pose=pose, now_ns=now_ns):
+            return False
+        self._store.keep(images=self.count + 1)
+        self.last = number
+        return True
+
+    def end(self, now_ns: int, boot_ms: int) -> tuple[Message, str]:
+        """What is to be said of the scan that is due, and why it failed, if it did."""
+        done = self._scanner.end(self._rover.at(now_ns)[0])
+        message = self.told[done.index] = self._message(done, now_ns, boot_ms)
+        return message, f"Scan {done.number}: {done.why}" if done.why else ""
+
+    def stop(self) -> None:
+        """Break the scan off; nothing is said of it."""
+        self._scanner.stop()
+
+    def reset(self) -> None:
+        """Forget what was told, as a reboot does; not how many there were."""
+        self._scanner.stop()
+        self.told.clear()
+
+    def _message(self, done: Captured, now_ns: int, boot_ms: int) -> Message:
+        pose = self._rover.at(now_ns)[0]
+        lat, lon = self._rover.place((pose.x, pose.y))
+        half = math.pi / 4 - pose.heading / 2
+        facing = (math.cos(half), 0.0, 0.0, math.sin(half))
+        return dialect.MAVLink_camera_image_captured_message(
+            boot_ms, now_ns // 1000, 0, lat, lon, self._rover.alt_mm, 0, facing, done.index,
+            1 if done.file_url else 0, done.file_url.encode(),
+        )  # fmt: skip
