@@ -144,6 +144,7 @@ class Desk:
         self._tell_event = link.publisher(keys.event)
         self._tell_pose = link.publisher(keys.pose)
         link.announce(keys.alive)
+        self._lookout.take(self._peer.heartbeat, self._book.course)
         for work in (self._look, self._follower.act):
             thread = threading.Thread(target=self._watched, args=(work,), name=work.__name__, daemon=True)
             self._threads.append(thread)

@@ -30,7 +30,7 @@ REMEMBERED_NS = 60 * 10**9
 """An order whose outcome was unknown is taken to be the cause of what the vehicle does so much later."""
 AGAIN_S = 1.0
 GRACE_NS = 2 * 10**9
-"""How long after the end of a scan's wait its confirmation may come."""
+"""How long a confirmation may come after the end of a scan's wait, if the next stop is not reached before."""
 EARLY = ("NAVIGATING", "SETTLING", "SCANNING")
 """A scan that was told of does not count yet."""
 AT_STOP = ("SETTLING", "SCANNING", "VERIFYING")
@@ -115,7 +115,8 @@ class Follower:
             self._left = (stop, now_ns)
         if sight.scan is None:
             self._hands.ask_for(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
-        return replace(sight, in_vain=now_ns > self._left[1] + GRACE_NS)
+        beyond = run.at + 1 < len(course.visits) and sight.place > course.visits[run.at + 1].at
+        return replace(sight, in_vain=beyond or now_ns > self._left[1] + GRACE_NS)
 
     def _busy(self) -> bool:
         """Whether the vehicle is being told something: what it does until then is neither here nor there."""

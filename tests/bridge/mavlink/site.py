@@ -39,11 +39,11 @@ KINDS = {"strict": "generic", "ardupilot": "ardupilot", "px4": "px4"}
 
 
 def tour(**details: Any) -> Mission:
-    """Stops 2 m ahead, 2 m further and 2 m to the left by way of a corner, and 2 m back."""
+    """Stops 1 m ahead, 1 m further and 1 m to the left by way of a corner, and 1 m back."""
     made = (
-        stop("S1", (0.0, 0.0), (2.0, 0.0)),
-        stop("S2", (2.0, 0.0), (4.0, 0.0), (4.0, 2.0), heading=math.pi / 2),
-        stop("S3", (4.0, 2.0), (2.0, 2.0), heading=math.pi),
+        stop("S1", (0.0, 0.0), (1.0, 0.0)),
+        stop("S2", (1.0, 0.0), (2.0, 0.0), (2.0, 1.0), heading=math.pi / 2),
+        stop("S3", (2.0, 1.0), (1.0, 1.0), heading=math.pi),
     )
     return mission_of(*(quick(one, **details) for one in made))
 

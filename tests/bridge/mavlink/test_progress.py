@@ -15,7 +15,7 @@ from mission.mavlink.translate import translate
 from tests.bridge.mavlink.site import told, tour
 
 SCAN = ScanResult(file="scan-1.e57", size=1600, points=100, sha256="0" * 64)
-S2_AT = Pose(x=4.0, y=2.0, heading=0.0)
+S2_AT = Pose(x=2.0, y=1.0, heading=0.0)
 
 
 def course(**details: object) -> Course:
@@ -62,7 +62,7 @@ def test_a_place_in_the_list_tells_the_stop_and_the_work_there() -> None:
 
 def test_a_waypoint_that_is_reached_is_an_arrival_only_within_the_tolerance() -> None:
     mine, visit = course(), course().visits[1]
-    near, far = Pose(x=4.03, y=2.0, heading=0.0), Pose(x=4.3, y=2.0, heading=0.0)
+    near, far = Pose(x=2.03, y=1.0, heading=0.0), Pose(x=2.3, y=1.0, heading=0.0)
     assert after(going(), mine, seen(visit.at, pose=near))[0] == []
     assert after(going(), mine, seen(visit.at + 1, pose=near))[0] == ["Arrived S2"]
     assert after(going(), mine, seen(visit.at + 1, pose=far))[0] == []
@@ -72,7 +72,7 @@ def test_a_waypoint_that_is_reached_is_an_arrival_only_within_the_tolerance() ->
 
 def test_a_stop_with_tries_left_is_tried_again_without_a_word() -> None:
     mine, visit = course(retries=1), course().visits[1]
-    far = Pose(x=4.3, y=2.0, heading=0.0)
+    far = Pose(x=2.3, y=1.0, heading=0.0)
     words, run = after(going(), mine, seen(visit.at + 1, pose=far, still=True))
     assert words == [] and (run.attempt, run.stop_state) == (1, "WAITING")
 
@@ -126,9 +126,9 @@ def test_a_vehicle_that_waits_at_a_stop_that_was_left_out_is_led_past_it() -> No
 @pytest.mark.parametrize(
     ("pose", "ahead"),
     [
-        (Pose(x=3.0, y=0.0, heading=0.0), "corner"),
-        (Pose(x=4.0, y=1.0, heading=0.0), "stop"),
-        (Pose(x=2.0, y=0.0, heading=0.0), "corner"),
+        (Pose(x=1.5, y=0.0, heading=0.0), "corner"),
+        (Pose(x=2.0, y=0.5, heading=0.0), "stop"),
+        (Pose(x=1.0, y=0.0, heading=0.0), "corner"),
     ],
 )
 def test_after_a_reboot_the_vehicle_goes_on_along_the_piece_on_which_it_stands(
@@ -141,7 +141,7 @@ def test_after_a_reboot_the_vehicle_goes_on_along_the_piece_on_which_it_stands(
 
 def test_a_vehicle_that_has_lost_nothing_keeps_its_item() -> None:
     mine, visit = course(), course().visits[1]
-    here = Pose(x=4.0, y=1.0, heading=0.0)
+    here = Pose(x=2.0, y=0.5, heading=0.0)
     assert onward(going(stop_state="WAITING"), mine, seen(visit.at), here) == visit.at
     assert onward(going(stop_state="SCANNING"), mine, seen(visit.scan + 1), S2_AT) == visit.scan + 1
     assert onward(going(stop_state="WAITING"), mine, seen(visit.scan + 1), S2_AT) == visit.at
