@@ -61,12 +61,14 @@ class _Reading:
     def __init__(self, peer: Peer, window: int, patience_s: float, progress: Progress | None) -> None:
         self.items: dict[int, Item] = {}
         self._peer = peer
-        self._pace = Pace(window)
+        self._pace = Pace(window, peer.round_trips)
         self._silence = Silence(patience_s)
         self._progress = progress
         self._count: int | None = None
         self._next = 0
-        self._moved_s = time.monotonic()
+        self._lists = 0
+        """How often the list was asked for."""
+        self._began_s = self._moved_s = time.monotonic()
         """When the last item came that was not there."""
         self._asked_s: dict[int, float] = {}
         """When each item that is under way was asked for last."""
@@ -117,6 +119,8 @@ class _Reading:
         if self._count == count:
             return
         self._silence.heard(went_on=True)
+        if self._lists == 1 and self._count is None:
+            self._pace.saw(time.monotonic() - self._began_s)
         self._moved_s = time.monotonic()
         self._count = count
         self.items.clear()
@@ -138,6 +142,7 @@ class _Reading:
         self._ask_more()
 
     def _ask_count(self) -> None:
+        self._lists += 1
         self._peer.send(list_request(self._peer.who))
 
     def _ask_more(self) -> None:

@@ -1,10 +1,11 @@
-"""How much is under way at once, and when it is sent again: from the round trips that were seen."""
+"""How much is under way at once, when it is sent again, and when a transfer is given up."""
 
 from __future__ import annotations
 
 import time
 
 from bridge.mavlink.peer import Peer
+from bridge.mavlink.round_trips import RoundTrips
 
 WINDOW = 8
 """Items under way at once: some 400 bytes, what a telemetry radio takes in one go."""
@@ -20,44 +21,36 @@ MOST_GROWTH = 4.0
 
 
 class Pace:
-    """Round trips of one transfer, smoothed with their deviation as TCP does (RFC 6298)."""
+    """When what is under way on one transfer is sent again."""
 
-    def __init__(self, window: int) -> None:
+    def __init__(self, window: int, trips: RoundTrips) -> None:
         self.window = window
-        self._shortest_s: float | None = None
-        self._smooth_s = 0.0
-        self._deviation_s = 0.0
-        self._growth = 1.0
+        self._trips = trips
+        self._waits = 0
 
     @property
     def again_s(self) -> float:
         """How long to wait for an answer before sending again."""
-        if self._shortest_s is None:
-            return min(MOST_S, FIRST_S * self._growth)
-        usual = self._smooth_s + max(4.0 * self._deviation_s, self._smooth_s / 2.0)
-        return min(MOST_S, max(LEAST_S, usual) * self._growth)
+        expected_s = self._trips.expected_s
+        usual_s = FIRST_S if expected_s is None else max(LEAST_S, expected_s)
+        growth = GROWTH ** max(0, self._waits - 1)  # one loss is no sign of a full line
+        return min(MOST_S, usual_s * min(MOST_GROWTH, growth))
 
     @property
     def soonest_s(self) -> float:
         """Before this has passed, nothing that comes in can be an answer to what was just sent."""
-        return SOON * (self._shortest_s or 0.0)
+        return SOON * (self._trips.shortest_s or FIRST_S)
 
     def saw(self, round_trip_s: float) -> None:
         """A round trip was seen, of something that was sent only once."""
-        if self._shortest_s is None:
-            self._shortest_s, self._smooth_s, self._deviation_s = round_trip_s, round_trip_s, round_trip_s / 2
-            return
-        self._shortest_s = min(self._shortest_s, round_trip_s)
-        off_s = round_trip_s - self._smooth_s
-        self._deviation_s += (abs(off_s) - self._deviation_s) / 4.0
-        self._smooth_s += off_s / 8.0
+        self._trips.saw(round_trip_s)
 
     def waited(self) -> None:
         """Nothing came in time: the line may be full, not lossy."""
-        self._growth = min(MOST_GROWTH, self._growth * GROWTH)
+        self._waits += 1
 
     def went_on(self) -> None:
-        self._growth = 1.0
+        self._waits = 0
 
 
 class Silence:

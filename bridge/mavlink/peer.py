@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import count
 
+from bridge.mavlink.round_trips import RoundTrips
 from bridge.mavlink.url import Url
 from bridge.mavlink.wire import SIGNATURE, Box, Message, Who, Wire, dialect, sender, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
@@ -103,6 +104,7 @@ class Peer:
         self.autopilot = autopilot
         """"ardupilot", "px4" or "generic"."""
         self.patience_s = patience_s
+        self.round_trips = RoundTrips()
         self.in_order = False
         """Whether it was found to give its items only one by one."""
         self._newest = newest

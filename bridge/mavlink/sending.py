@@ -59,7 +59,8 @@ def send_items(
     progress: Progress | None = None,
 ) -> Ended:
     """Send the items as the whole mission; none of them clears it."""
-    return _Sending(peer, items, Pace(window), patience_s or peer.patience_s, progress).run()
+    pace = Pace(window, peer.round_trips)
+    return _Sending(peer, items, pace, patience_s or peer.patience_s, progress).run()
 
 
 class _Sending:
