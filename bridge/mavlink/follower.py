@@ -140,7 +140,7 @@ class Follower:
         now = told[-1].run if told else run
         if told and (now.over or tried_again(run, now) or now.state == "HELD"):
             return told
-        if self._lookout.mode_ns < self._book.changed_ns + SETTLED_NS or not self._lookout.same_boot:
+        if self._lookout.mode_ns < self._book.changed_ns + SETTLED_NS or not self._lookout.mode_explained:
             return told
         other = (
             self._strange_list(now, course)

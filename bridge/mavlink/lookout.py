@@ -97,10 +97,10 @@ class Lookout:
         return 0 if newest is None else int(newest.message.time_boot_ms)
 
     @property
-    def same_boot(self) -> bool:
-        """Whether its mode is known to be that of the boot that its clock tells of."""
+    def mode_explained(self) -> bool:
+        """Whether clock and item were told since the mode changed: by a reboot it does, and at the end."""
         newest = self._clock_told()
-        told = newest is not None and newest.ns > self._mode_began_ns
+        told = newest is not None and min(newest.ns, self.current_ns) > self._mode_began_ns
         return told or self._clock.now_ns() > self._mode_began_ns + CLOCK_NS
 
     def _clock_told(self) -> Seen | None:

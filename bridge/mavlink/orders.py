@@ -12,6 +12,8 @@ import uuid
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import msgspec
+
 from bridge import run as runs
 from bridge.clock import Clock
 from bridge.commands import Decision, Refused, Situation, decide
@@ -233,7 +235,12 @@ class Orders:
             )
 
     def _go(self, course: Course, place: int, sight: Sight | None) -> None:
-        """AUTO, from an item on; where it lets the first ones out, at the speed that they would set."""
+        """AUTO, from an item on; where it lets the first ones out, at the speed that they would set.
+
+        A mode that is on is not begun again, so a vehicle whose mission is over is taken out of AUTO first.
+        """
+        if self._lookout.mode == AUTO:
+            self._hands.hold()
         if sight is None or place != sight.place or sight.place >= course.end:
             self._hands.jump(course.sequence(place))
         self._hands.auto()
@@ -265,7 +272,7 @@ class Orders:
 
 
 class _Ordering:
-    """Shows in the journal that an order is being carried out; its end is shown by whoever ends it."""
+    """Shows in the journal that an order is being carried out; one whose outcome is unknown stays there."""
 
     def __init__(self, book: Logbook, ordered: Ordered) -> None:
         self._book = book
@@ -274,12 +281,11 @@ class _Ordering:
     def __enter__(self) -> None:
         self._book.journal.store_fact("ordered", self._ordered)
 
-    def __exit__(self, *exception: object) -> None:
-        now_ns = self._book.clock.now_ns()
-        ended = Ordered(
-            verb=self._ordered.verb, by=self._ordered.by, mode=self._ordered.mode, until_ns=now_ns
-        )
-        self._book.journal.store_fact("ordered", ended)
+    def __exit__(self, kind: object, *exception: object) -> None:
+        if kind is None:
+            return self._book.journal.forget_fact("ordered")
+        ended = msgspec.structs.replace(self._ordered, until_ns=self._book.clock.now_ns())
+        return self._book.journal.store_fact("ordered", ended)
 
 
 VERBS: dict[str, Callable[[Orders, Command, Course, Decision], Change]] = {

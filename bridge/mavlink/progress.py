@@ -188,6 +188,8 @@ def taken_over(run: Run, course: Course, sight: Sight, *, by: str = SOMEBODY) ->
         return halted(run, f"{why}, by {by}", stands=sight.mode == "HOLD")
     if run.state in ("PAUSED", "HELD") and sight.drives and sight.place < course.end:
         return resumed(run, by)
+    if run.state == "PAUSED" and sight.place >= course.end:  # it went on unseen, to the end
+        return resumed(run, by)
     return None
 
 

@@ -154,3 +154,11 @@ def test_a_stop_that_is_not_in_the_list_is_named() -> None:
     shorter = msgspec.structs.replace(whole, stops=whole.stops[:2])
     with pytest.raises(InputError, match="S3"):
         course_of(whole, translate(shorter, "ardupilot"))
+
+
+def test_a_vehicle_that_ends_its_mission_in_another_mode_was_not_taken_over() -> None:
+    mine = course()
+    ended = Sight(mode="HOLD", armed=True, place=mine.end)
+    assert taken_over(going(at=2), mine, ended) is None
+    paused = taken_over(going(at=2, state="PAUSED"), mine, ended)
+    assert paused is not None and paused.run.state == "RUNNING"

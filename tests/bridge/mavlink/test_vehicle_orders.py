@@ -8,7 +8,7 @@ import pytest
 
 from mission.document import SiteOrigin
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
-from mission.events import Aborted, Pose, Resumed
+from mission.events import Aborted, Pose, Resumed, Started
 from mission.mavlink.translate import translate
 from tests.bridge.mavlink.site import ALL, Site, told, tour, until, watched
 
@@ -146,3 +146,18 @@ def test_a_folder_belongs_to_one_vehicle(tmp_path: Path) -> None:
         logbook(site.url, 2, tmp_path / "station"),
     ):
         pass
+
+
+def test_a_finished_mission_runs_once_more_when_that_is_meant(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        with watched(site):
+            site.order("start")
+        with pytest.raises(AnswerIsNo, match="finished_before"):
+            site.order("start")
+        with site.reached() as station:
+            assert station.command("start", again=True, from_here=True).state == "RUNNING"
+            until(site, lambda events, run: len([e for e in events if isinstance(e, Started)]) == 2)
+            until(site, lambda events, run: run.state == "FINISHED")
+    assert told(site.events)[-1] == "Finished"
+    assert len({event.run_id for event in site.events}) == 2
