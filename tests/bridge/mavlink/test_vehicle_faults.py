@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,8 +13,8 @@ from bridge.mavlink.logbook import remember
 from bridge.mavlink.peer import Peer
 from bridge.mavlink.peer import reached as found_peer
 from bridge.mavlink.wire import dialect
-from mission.errors import AnswerIsNo
-from mission.events import Arrived, Held, Paused, Resumed
+from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
+from mission.events import Arrived, Held, Paused, Resumed, Started
 from mission.mavlink.translate import translate
 from tests.bridge.mavlink.site import ALL, Site, told, tour, until, watched
 
@@ -166,3 +167,39 @@ def test_a_stop_is_measured_where_the_vehicle_stands(tmp_path: Path) -> None:
         site.order("start")
     (arrived,) = [event for event in site.events if isinstance(event, Arrived) and event.stop == "S2"]
     assert arrived.deviation_m == pytest.approx(0.03, abs=0.012)
+
+
+def test_an_order_whose_answer_was_lost_is_told_as_its_commanders_once_it_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = Site(tmp_path, "ardupilot")
+    obeyed = Peer.command
+
+    def unheard(peer: Peer, number: int, *params: float, **details: Any) -> Any:
+        ack = obeyed(peer, number, *params, **details)
+        if number == dialect.MAV_CMD_DO_SET_MODE:
+            raise OutcomeUnknown("the answer was lost")
+        return ack
+
+    with site.up():
+        monkeypatch.setattr(Peer, "command", unheard)
+        with pytest.raises(OutcomeUnknown):
+            site.order("start")
+        assert site.run.state == "READY"
+        monkeypatch.undo()
+        with watched(site):
+            pass
+    begun = [event for event in site.events if isinstance(event, Started)]
+    assert [event.commander for event in begun] == ["test"]
+    assert site.run.state == "FINISHED"
+
+
+def test_a_journal_that_cannot_be_written_ends_the_watch_and_says_why(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up(), pytest.raises(InputError, match="disk full"), site.reached() as station:
+        station.command("start")
+        with site.book() as book:
+            book.journal._connection.execute("CREATE TRIGGER full BEFORE INSERT ON events BEGIN SELECT"
+                                             " RAISE(FAIL, 'disk full'); END")  # fmt: skip
+        for _ in station.reports():
+            pass
