@@ -101,7 +101,7 @@ class MavlinkScanner:
             )  # fmt: skip
         # All cameras, one picture. The interval means nothing for one, so it can carry how long a scan takes;
         # the number grows with every order, so that one which is repeated does not take two.
-        self._last = max(self._last + 1, taken or 1)
+        self._last = max(self._last, taken or 0) + 1
         return dialect.MAV_CMD_IMAGE_START_CAPTURE, (0.0, scan.duration_s, 1.0, float(self._last))
 
     def _ordered(self, order: Order, box: Box, until_s: float, interrupt: Event) -> str:

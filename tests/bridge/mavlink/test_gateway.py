@@ -58,6 +58,18 @@ def test_an_autopilot_drives_a_mission_to_its_end(tmp_path: Path, profile: str, 
     assert all(abs(math.remainder(pose.heading, math.tau)) < 0.01 for pose in driven)
 
 
+def test_an_ardupilot_rover_turns_to_the_headings_that_a_narrow_scanner_needs(tmp_path: Path) -> None:
+    mission = site_mission(heading=math.pi / 2)
+    narrow = msgspec.structs.replace(mission, scanner=msgspec.structs.replace(mission.scanner, fov_deg=90.0))
+    with rover(tmp_path, "ardupilot") as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
+        station.push(sealed(narrow))
+        station.command("start")
+        until(station.reports(), is_state("FINISHED"))
+        arrived = [event for event in events_of(station) if isinstance(event, Arrived)]
+    assert [event.stop for event in arrived] == ALL
+    assert all(abs(event.pose.heading - math.pi / 2) < math.radians(1.5) for event in arrived)
+
+
 def test_a_mission_without_georeference_is_refused(tmp_path: Path) -> None:
     with rover(tmp_path, "ardupilot") as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
         with pytest.raises(
@@ -294,7 +306,7 @@ def test_a_bad_line_costs_time_and_nothing_else(tmp_path: Path, seed: int) -> No
 def test_a_robot_does_not_get_ready_without_an_autopilot(tmp_path: Path) -> None:
     nobody = Url("udpout", "127.0.0.1", free_udp_port())
     with (
-        pytest.raises(RobotUnreachable, match="no vehicle 1 within 0.5 s"),
+        pytest.raises(RobotUnreachable, match=r"no vehicle 1 within 0\.5 s"),
         gateway(tmp_path, nobody, patience_s=0.5),
     ):
         pass

@@ -1,0 +1,104 @@
+"""How one straight of a leg ends, by numbers that can be checked on paper."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from bridge.mavlink.course import Course, Patience, beside_m
+from bridge.mavlink.local import LocalFrame, apart, local_frame
+from bridge.mavlink.peer import Origin
+from mission.document import SiteOrigin
+
+SITE = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=30.0)
+
+
+def course() -> Course:
+    """Four metres ahead; a vehicle is there within 5 cm, or for good within 35."""
+    return Course((0.0, 0.0), (4.0, 0.0), 0.0, near_m=0.05, over_m=0.35, patience=Patience())
+
+
+def judged(drive: Course, *seen: tuple[float, float, float, bool]) -> list[str]:
+    """The verdicts on (time, x, y, still)."""
+    return [drive.judge((x, y), still=still, now_s=at) for at, x, y, still in seen]
+
+
+def test_to_have_arrived_is_to_stand_there() -> None:
+    passing = [(8.0, 3.96, 0.0, False), (8.1, 4.04, 0.0, False)]
+    standing = [(8.2, 4.02, 0.0, True), (8.6, 4.02, 0.0, True), (8.7, 4.02, 0.0, True)]
+    assert judged(course(), *passing, *standing) == ["going"] * 4 + ["arrived"]
+
+
+def test_standing_for_good_within_the_robots_radius_is_as_near_as_it_gets() -> None:
+    drive = course()
+    assert judged(drive, (8.0, 3.8, 0.0, True), (12.9, 3.8, 0.0, True), (13.0, 3.8, 0.0, True)) == [
+        *("going", "going", "arrived")
+    ]
+
+
+def test_standing_for_good_farther_away_is_to_be_blocked() -> None:
+    drive = course()
+    assert judged(drive, (4.0, 2.0, 0.0, True), (8.9, 2.0, 0.0, True), (9.0, 2.0, 0.0, True)) == [
+        *("going", "going", "blocked")
+    ]
+    assert drive.why == "the vehicle stands 2.00 m from where it was sent, and does not go on"
+
+
+def test_a_pause_to_turn_at_the_beginning_is_no_block() -> None:
+    drive = course()
+    assert (
+        judged(drive, (0.1, 0.0, 0.0, True), (4.0, 0.0, 0.0, True), (4.2, 0.1, 0.0, False)) == ["going"] * 3
+    )
+
+
+def test_a_vehicle_that_leaves_the_way_is_stopped() -> None:
+    drive = course()
+    assert judged(drive, (2.0, 1.0, 0.99, False), (2.1, 1.0, 1.01, False)) == ["going", "blocked"]
+    assert drive.why == "the vehicle is 1.01 m beside the way"
+
+
+def test_a_vehicle_that_circles_is_stopped_after_half_a_minute() -> None:
+    drive = course()
+    assert judged(drive, (4.0, 2.0, 0.0, False), (33.9, 2.0, 0.5, False), (34.0, 2.0, 0.0, False)) == [
+        *("going", "going", "blocked")
+    ]
+    assert drive.why == "the vehicle moves without getting nearer than 2.00 m"
+
+
+@pytest.mark.parametrize(("here", "metres"), [((2.0, 1.0), 1.0), ((-3.0, 4.0), 5.0), ((7.0, 4.0), 5.0)])
+def test_beside_a_straight_is_the_distance_from_it(here: tuple[float, float], metres: float) -> None:
+    assert beside_m((0.0, 0.0), (4.0, 0.0), here) == pytest.approx(metres)
+
+
+def test_a_site_that_bears_30_degrees_turns_north_and_east() -> None:
+    frame = LocalFrame(SITE)
+    pose = frame.pose(north=math.cos(math.radians(30)), east=math.sin(math.radians(30)), yaw=math.radians(30))
+    # One metre towards the site's +y, looking there.
+    assert (pose.x, pose.y) == pytest.approx((0.0, 1.0))
+    assert pose.heading == pytest.approx(math.pi / 2)
+    assert frame.north_east((pose.x, pose.y)) == pytest.approx(
+        (math.cos(math.radians(30)), math.sin(math.radians(30)))
+    )
+    assert frame.yaw(pose.heading) == pytest.approx(math.radians(30))
+
+
+def test_an_origin_two_centimetres_off_is_the_same_and_counted() -> None:
+    # 2e-7° of latitude are 2.2 cm north by ArduPilot's scale.
+    origin = Origin(lat=SITE.lat + 2e-7, lon=SITE.lon, alt=0.0)
+    assert apart(SITE, origin, "ardupilot") == ""
+    frame = local_frame(SITE, origin, "ardupilot")
+    north = frame.pose(0.0, 0.0, 0.0)
+    assert math.hypot(north.x, north.y) == pytest.approx(0.02226, abs=1e-4)
+    assert frame.north_east((0.0, 0.0)) == pytest.approx((-0.02226, 0.0), abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("origin", "away"),
+    [
+        (Origin(lat=SITE.lat, lon=SITE.lon + 1e-6, alt=0.0), "0.08 m"),
+        (Origin(lat=0.0, lon=0.0, alt=0.0), "more than a kilometre"),
+    ],
+)
+def test_another_origin_is_told_with_its_distance(origin: Origin, away: str) -> None:
+    assert f"lies {away} from the mission's (47.4000000, 8.5000000)" in apart(SITE, origin, "px4")
