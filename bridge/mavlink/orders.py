@@ -16,7 +16,7 @@ import msgspec
 
 from bridge import run as runs
 from bridge.clock import Clock
-from bridge.commands import Decision, Refused, Situation, decide
+from bridge.commands import Decision, Refused, Situation, decide, handed_over
 from bridge.lease import FREE_VERBS
 from bridge.mavlink import progress
 from bridge.mavlink.download import download
@@ -160,7 +160,13 @@ class Orders:
         lost = run.stop_state == "SCANNING" and not self._keeps_scan(run, course, sight)
         run = runs.changed(run, stop_state="WAITING") if lost else run
         self._go(course, onward(run, course, sight, self._here()), sight)
-        return progress.resumed(run, command.commander)
+        return self._resumed(run, command, decision)
+
+    def _resumed(self, run: Run, command: Command, decision: Decision) -> Change:
+        """The run goes on, in whoever's hands it is now."""
+        before = self._book.journal.fact("lease", Lease)
+        change = progress.resumed(run, command.commander)
+        return Change(change.run, (*handed_over(before, decision.lease), *change.events))
 
     def _keeps_scan(self, run: Run, course: Course, sight: Sight) -> bool:
         visit = course.visits[run.at]
@@ -172,7 +178,7 @@ class Orders:
         sight = self._sight(run, course)
         self._ready(course)
         self._go(course, onward(run, course, sight, self._here()), sight)
-        return progress.resumed(run, command.commander)
+        return self._resumed(run, command, decision)
 
     def _pause(self, command: Command, course: Course, decision: Decision) -> Change:
         self._hands.hold()

@@ -65,6 +65,7 @@ class Site:
     origin: SiteOrigin | None = None
     at: Pose | None = field(default_factory=lambda: Pose(x=0.0, y=0.0, heading=0.0))
     speed_up: float = SPEED_UP
+    key: bytes | None = None
 
     def __post_init__(self) -> None:
         self.sent: ItemList = translate(self.mission, KINDS[self.profile], trigger=self.trigger)
@@ -85,7 +86,7 @@ class Site:
         made = VehicleFaults(tuple(read_vehicle_fault(text) for text in self.faults))
         setting = Setting(PROFILES[self.profile], self.folder / "vehicle", self.origin, self.at, made)
         listening = Url("udpin", self.url.host, self.url.number)
-        with vehicle_on(listening, setting, speed_up=self.speed_up):
+        with vehicle_on(listening, setting, speed_up=self.speed_up, signing_key=self.key):
             yield
 
     @contextmanager
@@ -97,7 +98,7 @@ class Site:
     def reached(self, *, arm: bool = True, disarm: bool = False, **options: Any) -> Iterator[Station]:
         """The vehicle, from a process of its own."""
         given: dict[str, Any] = {"state": self.folder / "station", "timeout_s": 5.0}
-        given |= {"commander": "test", "vehicle": 1}
+        given |= {"commander": "test", "vehicle": 1, "signing_key": self.key}
         consent = Consent(arm=arm, disarm=disarm)
         with connect(self.url, Options(consent=consent, **(given | options))) as station:
             yield station

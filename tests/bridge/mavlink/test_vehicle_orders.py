@@ -161,3 +161,40 @@ def test_a_finished_mission_runs_once_more_when_that_is_meant(tmp_path: Path) ->
             until(site, lambda events, run: run.state == "FINISHED")
     assert told(site.events)[-1] == "Finished"
     assert len({event.run_id for event in site.events}) == 2
+
+
+def test_a_second_station_knows_nothing_of_the_run_and_starts_nothing(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        site.order("start")
+        with site.reached(state=tmp_path / "other", commander="other") as station:
+            assert station.status().state == "IDLE" and station.status().run_id is None
+            with pytest.raises(AnswerIsNo, match="no_mission"):
+                station.command("start")
+        assert site.run.state == "RUNNING"
+        site.order("abort")
+
+
+def test_another_commander_is_refused_until_the_lease_is_over(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        site.order("start")
+        with site.reached(commander="other") as station:
+            with pytest.raises(AnswerIsNo, match="not_the_commander"):
+                station.command("skip")
+            assert station.command("pause").outcome == "ok"
+            assert station.command("resume", take_over=True).outcome == "ok"
+        site.order("abort")
+    assert "TakenOver" in told(site.events)
+
+
+def test_a_signed_vehicle_obeys_its_key_and_is_not_heard_without(tmp_path: Path) -> None:
+    site = Site(tmp_path, "px4", key=bytes(range(32)))
+    with site.up():
+        assert site.order("start").outcome == "ok"
+        assert site.order("abort").outcome == "ok"
+        with (
+            pytest.raises(RobotUnreachable, match="signing key"),
+            site.reached(signing_key=bytes(32), timeout_s=1.5),
+        ):
+            pass

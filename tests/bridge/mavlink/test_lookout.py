@@ -1,0 +1,157 @@
+"""What a vehicle tells, and what that comes to."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from bridge.clock import SimulatedClock
+from bridge.mavlink.driving import DRIVING
+from bridge.mavlink.lookout import Lookout
+from bridge.mavlink.modes import AUTOS, Modes
+from bridge.mavlink.visits import Course, course_of
+from bridge.mavlink.wire import dialect
+from bridge.robots import ScanFailed, ScanResult
+from bridge.run import Run
+from mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic
+from mission.mavlink.translate import translate
+from tests.bridge.mavlink.site import tour
+
+UNKNOWN, ACTIVE, COMPLETE = 0, dialect.MISSION_STATE_ACTIVE, dialect.MISSION_STATE_COMPLETE
+URL = b"scan-1.e57?size=1600&points=100&sha256=" + b"ab" * 32
+AT_S1 = Run(state="RUNNING", run_id="r", at=0, stop_state="SCANNING")
+
+
+class Telling:
+    """A lookout, and what it is told."""
+
+    def __init__(self) -> None:
+        mission = tour()
+        self.course: Course = course_of(mission, translate(mission, "ardupilot"))
+        self.clock = SimulatedClock()
+        rover = DRIVING["ardupilot"]
+        self.lookout = Lookout(Modes(AUTOS["ardupilot"], rover.hold, rover), self.clock)
+        self.site = self.course.sent.origin
+        self.tell(dialect.MAVLink_heartbeat_message(10, 3, 128, 10, 4, 3))
+
+    def tell(self, *messages: Any) -> None:
+        for message in messages:
+            self.clock.wait(0.1)
+            self.lookout.take(message, self.course)
+
+    def current(self, seq: int, state: int = ACTIVE, total: int | None = None) -> None:
+        held = self.course.end if total is None else total
+        self.tell(dialect.MAVLink_mission_current_message(seq, held, state, 1))
+
+    def reached(self, seq: int) -> None:
+        self.tell(dialect.MAVLink_mission_item_reached_message(seq))
+
+    def origin(self) -> None:
+        lat, lon = (round(angle * STEPS_PER_DEGREE) for angle in (self.site.lat, self.site.lon))
+        self.tell(dialect.MAVLink_gps_global_origin_message(lat, lon, round(self.site.alt * 1000)))
+
+    def captured(self, index: int, at: tuple[float, float], result: int = 1, url: bytes = URL) -> None:
+        place = to_geodetic(self.site, at, "ardupilot")
+        lat, lon = round(place.lat * STEPS_PER_DEGREE), round(place.lon * STEPS_PER_DEGREE)
+        upright = (1.0, 0.0, 0.0, 0.0)
+        self.tell(
+            dialect.MAVLink_camera_image_captured_message(
+                1000 * index, 0, 0, lat, lon, 0, 0, upright, index, result, url
+            )
+        )
+
+    def scan(self, after: tuple[int, int] = (-1, -1)) -> ScanResult | ScanFailed | None:
+        sight = self.lookout.sight(AT_S1, self.course, after=after)
+        assert sight is not None
+        return sight.scan
+
+
+def test_a_mission_ends_by_its_state_or_by_its_last_item_where_there_is_none() -> None:
+    telling = Telling()
+    last = telling.course.sequence(telling.course.end - 1)
+    telling.current(last, UNKNOWN)
+    assert telling.lookout.place(telling.course) == telling.course.end - 1
+    telling.reached(last - 1)
+    assert telling.lookout.place(telling.course) == telling.course.end - 1
+    telling.reached(last)
+    assert telling.lookout.place(telling.course) == telling.course.end
+    telling.current(1, UNKNOWN)
+    assert telling.lookout.place(telling.course) == 0
+    telling.current(last, COMPLETE)
+    assert telling.lookout.place(telling.course) == telling.course.end
+
+
+def test_local_metres_are_exact_and_degrees_a_step_off() -> None:
+    telling = Telling()
+    bearing = bearing_deg(telling.site, 0.0)
+    place = to_geodetic(telling.site, (3.0, 4.0), "ardupilot")
+    lat, lon = round(place.lat * STEPS_PER_DEGREE), round(place.lon * STEPS_PER_DEGREE)
+    yaw = (bearing - 360.0 if bearing > 180 else bearing) / 57.29577951308232
+    telling.tell(
+        dialect.MAVLink_attitude_message(1, 0, 0, yaw, 0, 0, 0),
+        dialect.MAVLink_global_position_int_message(1, lat, lon, 0, 0, 30, 40, 0, 0),
+    )
+    fix = telling.lookout.fix
+    assert fix is not None and fix.speed == pytest.approx(0.5)
+    assert (fix.pose.x, fix.pose.y) == pytest.approx((3.0, 4.0), abs=0.008)
+    assert fix.pose.heading == pytest.approx(0.0, abs=1e-6)
+    telling.origin()
+    telling.tell(dialect.MAVLink_local_position_ned_message(2, 4.0, 3.0, 0, 0, 0, 0))
+    assert (telling.lookout.fix.pose.x, telling.lookout.fix.pose.y) == pytest.approx((3.0, 4.0), abs=0.001)  # type: ignore[union-attr]
+
+
+def test_a_pose_is_of_the_item_only_if_it_was_told_after_it() -> None:
+    telling = Telling()
+    telling.origin()
+    telling.tell(dialect.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0))
+    telling.tell(dialect.MAVLink_local_position_ned_message(2, 0, 1.0, 0, 0, 0, 0))
+    telling.current(3)
+    before = telling.lookout.sight(AT_S1, telling.course)
+    telling.current(3)
+    telling.tell(dialect.MAVLink_local_position_ned_message(3, 0, 1.0, 0, 0, 0, 0))
+    after = telling.lookout.sight(AT_S1, telling.course)
+    assert before is not None and before.pose is None
+    assert after is not None and after.pose is not None and after.still
+
+
+def test_a_scan_belongs_to_the_stop_where_it_was_made_and_counts_once() -> None:
+    telling = Telling()
+    telling.current(4)
+    telling.captured(1, at=(2.0, 1.0))
+    assert telling.scan() is None
+    telling.captured(2, at=(1.0, 0.0))
+    telling.captured(2, at=(1.0, 0.0))
+    assert telling.scan() == ScanResult(file="scan-1.e57", size=1600, points=100, sha256="ab" * 32)
+    assert telling.scan(after=(2, 2000)) is None
+    telling.captured(3, at=(1.0, 0.0), result=0)
+    assert isinstance(telling.scan(after=(2, 2000)), ScanFailed)
+
+
+@pytest.mark.parametrize(
+    "url", [b"", b"scan.e57", b"x?size=-1&points=1e9", b"?size=9&points=9&sha256=zz", b"\xff%%"]
+)
+def test_a_file_that_is_not_told_in_full_is_no_scan(url: bytes) -> None:
+    from bridge.run import what_is_wrong
+
+    telling = Telling()
+    telling.current(4)
+    telling.captured(1, at=(1.0, 0.0), url=url)
+    scan = telling.scan()
+    assert isinstance(scan, ScanResult) and what_is_wrong(scan)
+
+
+def test_a_battery_that_is_not_told_changes_nothing() -> None:
+    telling = Telling()
+    for remaining in (40, -1):
+        telling.tell(dialect.MAVLink_sys_status_message(0, 0, 0, 0, 0, 0, remaining, 0, 0, 0, 0, 0, 0))
+    assert telling.lookout.battery == 0.4
+
+
+def test_a_number_of_items_that_is_not_told_is_not_taken_for_one() -> None:
+    telling = Telling()
+    told = []
+    for total in (0, 65_535, 7):
+        telling.current(1, total=total)
+        told.append(telling.lookout.items)
+    assert told == [None, None, 7]
