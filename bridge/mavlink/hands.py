@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 
 from bridge.clock import Clock
 from bridge.commands import Refused
@@ -98,10 +99,10 @@ class Hands:
         self._order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, float(armed), what=what)
         self._shown(lambda: self._lookout.armed == armed, what)
 
-    def speed(self, metres_per_s: float) -> bool:
-        """Set the speed that the mission's first item sets; false if the vehicle does not take it."""
-        number = dialect.MAV_CMD_DO_CHANGE_SPEED
-        return self._peer.command(number, 1.0, metres_per_s, -1.0).accepted
+    def speed(self, metres_per_s: float) -> None:
+        """Set the speed that the mission's first item sets; not every firmware takes it from elsewhere."""
+        with suppress(OutcomeUnknown):
+            self._peer.command(dialect.MAV_CMD_DO_CHANGE_SPEED, 1.0, metres_per_s, -1.0)
 
     def _mode(self, name: str) -> None:
         asked_ns = self._clock.now_ns()

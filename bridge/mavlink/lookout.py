@@ -150,8 +150,11 @@ class Lookout:
     def items(self) -> int | None:
         """How many items the vehicle says it holds, without home; `None` if it does not say."""
         seen = self._newest.get("MISSION_CURRENT")
-        told = 0 if seen is None else seen.message.total
-        return told if 0 < told < UNKNOWN_TOTAL else None
+        if seen is None:
+            return None
+        if seen.message.mission_state == dialect.MISSION_STATE_NO_MISSION:
+            return 0
+        return seen.message.total if 0 < seen.message.total < UNKNOWN_TOTAL else None
 
     def sight(
         self, run: Run, course: Course, arrived: Arrived | None = None, *, after: CaptureName = NONE_YET

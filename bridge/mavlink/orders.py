@@ -222,14 +222,20 @@ class Orders:
         return NOWHERE if self._lookout.fix is None else self._lookout.fix.pose
 
     def _ready(self, course: Course) -> None:
-        """Whether the vehicle may drive this mission: it holds it, and is armed."""
+        """Whether the vehicle may drive this mission: it holds it, and is armed.
+
+        In AUTO it would drive off as soon as it is armed, and a mode that is on is not begun anew.
+        """
         unfit = why_unfit(self._peer)
         if unfit:
             raise Denied(Refused("unsupported", unfit))
         self._check_mission(course)
-        if not self._lookout.armed:
-            if not self._consent.arm:
-                raise Denied(Refused("not_armed", "the vehicle is disarmed; arm it, or add --arm"))
+        armed = self._lookout.armed
+        if not armed and not self._consent.arm:
+            raise Denied(Refused("not_armed", "the vehicle is disarmed; arm it, or add --arm"))
+        if self._lookout.mode == AUTO:
+            self._hands.hold()
+        if not armed:
             self._hands.arm()
 
     def _check_mission(self, course: Course) -> None:
@@ -241,16 +247,12 @@ class Orders:
             )
 
     def _go(self, course: Course, place: int, sight: Sight | None) -> None:
-        """AUTO, from an item on; where it lets the first ones out, at the speed that they would set.
-
-        A mode that is on is not begun again, so a vehicle whose mission is over is taken out of AUTO first.
-        """
-        if self._lookout.mode == AUTO:
-            self._hands.hold()
-        if sight is None or place != sight.place or sight.place >= course.end:
+        """AUTO, from an item on; where that leaves the first ones out, at the speed that they would set."""
+        jumps = sight is None or place != sight.place or sight.place >= course.end
+        if jumps:
             self._hands.jump(course.sequence(place))
         self._hands.auto()
-        if place > 0 and course.speed is not None:
+        if jumps and place > 0 and course.speed is not None:
             self._hands.speed(course.speed)
 
     # Storing

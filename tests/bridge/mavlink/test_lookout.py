@@ -155,3 +155,5 @@ def test_a_number_of_items_that_is_not_told_is_not_taken_for_one() -> None:
         telling.current(1, total=total)
         told.append(telling.lookout.items)
     assert told == [None, None, 7]
+    telling.current(0, dialect.MISSION_STATE_NO_MISSION, total=65_535)
+    assert telling.lookout.items == 0

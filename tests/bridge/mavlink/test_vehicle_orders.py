@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from bridge.mavlink.peer import Peer
+from bridge.mavlink.peer import reached as found_peer
+from bridge.mavlink.wire import dialect
 from mission.document import SiteOrigin
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import Aborted, Pose, Resumed, Started
@@ -198,3 +202,22 @@ def test_a_signed_vehicle_obeys_its_key_and_is_not_heard_without(tmp_path: Path)
             site.reached(signing_key=bytes(32), timeout_s=1.5),
         ):
             pass
+
+
+def test_a_vehicle_in_auto_is_not_armed_before_it_is_put_on_hold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = Site(tmp_path, "ardupilot")
+    ordered: list[int] = []
+    obeyed = Peer.command
+
+    def noted(peer: Peer, number: int, *params: float, **details: Any) -> Any:
+        ordered.append(number)
+        return obeyed(peer, number, *params, **details)
+
+    with site.up(), found_peer(site.url, vehicle=1) as peer:
+        peer.order(dialect.MAV_CMD_DO_SET_MODE, 1, 10)
+        monkeypatch.setattr(Peer, "command", noted)
+        assert site.order("start").outcome == "ok"
+    mode, arm = dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_COMPONENT_ARM_DISARM
+    assert ordered == [mode, arm, dialect.MAV_CMD_DO_SET_MISSION_CURRENT, mode]
