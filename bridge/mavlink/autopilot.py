@@ -226,7 +226,7 @@ class Autopilot:
         try:
             ack = self.peer.command(command, *params, patience_s=ORDER_S)
         except OutcomeUnknown:
-            return f"the autopilot did not answer {what}"
+            return f"the autopilot did not answer {what}{self.peer.why_silent()}"
         if ack.accepted:
             return ""
         text = self._heard.newest("STATUSTEXT", ORDER_S)

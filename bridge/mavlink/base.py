@@ -170,13 +170,14 @@ class MavlinkBase:
     def _drive(self, point: Point, limits: RobotSpec, interrupt: Event) -> None:
         target = self._frame().north_east(point)
         course = self._course(point, limits)
-        told_s = -math.inf
+        told_s = self._now_s()
+        self.autopilot.aim(target)
         while True:
-            due = self._now_s() - told_s >= AGAIN_S and self.autopilot.still()
-            if due or self.autopilot.driving.streams:
+            self._tick(interrupt)
+            lost = self.autopilot.still() and self._now_s() - told_s >= AGAIN_S
+            if lost or self.autopilot.driving.streams:
                 self.autopilot.aim(target)
                 told_s = self._now_s()
-            self._tick(interrupt)
             here = self.pose()
             verdict = course.judge((here.x, here.y), still=self.autopilot.still(), now_s=self._now_s())
             if verdict == "arrived":

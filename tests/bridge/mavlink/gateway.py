@@ -55,7 +55,9 @@ class Rover:
         *,
         faults: VehicleFaults = NO_FAULTS,
         origin: SiteOrigin | None = SITE,
+        signing_key: bytes | None = None,
     ) -> None:
+        self._key = signing_key
         start = site_mission().start
         level = None if origin is None else msgspec.structs.replace(origin, heading_deg=0.0)
         self.profile = profile
@@ -71,14 +73,16 @@ class Rover:
     def on(self, setting: Setting | None = None) -> None:
         """Switch it on; it stands where it stood."""
         url = Url("udpin", self.url.host, self.url.number)
-        self._life.enter_context(vehicle_on(url, setting or self._again, speed_up=FAST))
+        self._life.enter_context(
+            vehicle_on(url, setting or self._again, speed_up=FAST, signing_key=self._key)
+        )
 
     def off(self) -> None:
         self._life.close()
 
     @contextmanager
     def operator(self) -> Iterator[Operator]:
-        with reached(self.url, vehicle=1) as peer:
+        with reached(self.url, vehicle=1, signing_key=self._key) as peer:
             yield Operator(peer, self.profile)
 
 
