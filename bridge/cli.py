@@ -361,6 +361,9 @@ def turning(own: Transform | None, mission: Mission) -> str:
 
 
 Arm = Annotated[bool, typer.Option("--arm", help="Arm a vehicle that is disarmed.")]
+OtherOrigin = Annotated[
+    bool, typer.Option("--any-origin", help="Do not compare origins: it has satellite positions.")
+]
 
 
 @by_way()
@@ -373,6 +376,7 @@ def start(
         bool, typer.Option("--from-here", help="Start at the nearest point of the route.")
     ] = False,
     arm: Arm = False,
+    any_origin: OtherOrigin = False,
     json_: Json = False,
 ) -> None:
     """Start the mission that the robot holds.
@@ -381,7 +385,7 @@ def start(
 
     Example: stopgo start --mavlink udpout:127.0.0.1:14550 --arm
     """
-    with in_time(way.to_drive(arm=arm)) as station:
+    with in_time(way.to_drive(arm=arm, any_origin=any_origin)) as station:
         answer = station.command("start", again=again, from_here=from_here, take_over=take_over)
     report_answer(answer, station.keys.robot, json_)
 
@@ -405,15 +409,16 @@ def order_of(verb: Verb) -> Callable[..., None]:
         stop: StopId = None,
         take_over: TakeOver = False,
         arm: Arm = False,
+        any_origin: OtherOrigin = False,
         disarm: Annotated[bool, typer.Option("--disarm", help="Disarm a vehicle that stands.")] = False,
         json_: Json = False,
     ) -> None:
-        with in_time(way.to_drive(arm=arm, disarm=disarm)) as station:
+        with in_time(way.to_drive(arm=arm, disarm=disarm, any_origin=any_origin)) as station:
             answer = station.command(verb, stop=stop, take_over=take_over)
         report_answer(answer, station.keys.robot, json_)
 
     command.__doc__ = f"{ABOUT[verb]}\n\nExample: stopgo {verb} --robot r1 --connect {DEFAULT_ENDPOINT}"
-    without = () if verb in ("resume", "retry", "skip") else ("arm",)
+    without = () if verb in ("resume", "retry", "skip") else ("arm", "any_origin")
     return by_way(without=without if verb == "abort" else (*without, "disarm"))(command)
 
 

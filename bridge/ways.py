@@ -67,6 +67,8 @@ class Mavlink:
     arm: bool = False
     """It may be armed."""
     disarm: bool = False
+    any_origin: bool = False
+    """It finds its place by satellites."""
     looks_only: bool = False
     compares: bool = False
 
@@ -87,12 +89,13 @@ class Way:
     """For each piece of a mission that is pushed."""
     mavlink: Mavlink | None = field(default=None)
 
-    def to_drive(self, *, arm: bool = False, disarm: bool = False) -> Way:
-        """The same way, for an order that may arm or disarm a vehicle."""
+    def to_drive(self, *, arm: bool = False, disarm: bool = False, any_origin: bool = False) -> Way:
+        """The same way, for an order and what it may do to a vehicle, or overlook."""
         if self.mavlink is None:
-            _foreign("--robot", {"--arm": arm, "--disarm": disarm})
+            _foreign("--robot", {"--arm": arm, "--disarm": disarm, "--any-origin": any_origin})
             return self
-        return replace(self, mavlink=replace(self.mavlink, arm=arm, disarm=disarm))
+        given = replace(self.mavlink, arm=arm, disarm=disarm, any_origin=any_origin)
+        return replace(self, mavlink=given)
 
     def to_look(self, *, compares: bool = False) -> Way:
         """The same way: to look at a vehicle and do no more, or to follow one whose mission is compared."""
@@ -188,7 +191,7 @@ def _vehicle(way: Way, mavlink: Mavlink) -> AbstractContextManager[Station]:
     check_guarded(url, signed=key is not None, insecure=way.insecure)
     options = Options(
         vehicle=mavlink.vehicle, signing_key=key, state=mavlink.state, timeout_s=way.timeout_s,
-        commander=way.who, consent=Consent(arm=mavlink.arm, disarm=mavlink.disarm),
+        commander=way.who, consent=Consent(mavlink.arm, mavlink.disarm, mavlink.any_origin),
         looks_only=mavlink.looks_only, compares=mavlink.compares,
     )  # fmt: skip
     return connect(url, options)

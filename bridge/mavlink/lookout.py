@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 from bridge.clock import Clock
 from bridge.mavlink.captures import Capture, capture_of
-from bridge.mavlink.local import LocalFrame, local_frame
+from bridge.mavlink.local import FAR_DEG, LocalFrame, local_frame
 from bridge.mavlink.modes import Modes
 from bridge.mavlink.peer import Origin
 from bridge.mavlink.progress import Sight
 from bridge.mavlink.visits import Course
 from bridge.mavlink.wire import Message, dialect
 from bridge.run import Run
+from mission.document import SiteOrigin
 from mission.events import Arrived, Pose
 from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic, heading_of
 from mission.mavlink.autopilots import autopilot_named
@@ -239,16 +240,23 @@ class Lookout:
             self._captures.append(capture)
 
     def _local_frame(self, course: Course | None) -> LocalFrame | None:
-        """The vehicle's local metres in the site; `None` before its origin is known."""
+        """The vehicle's local metres in the site; `None` before its origin is known, or if it is far away."""
         told = self._newest.get("GPS_GLOBAL_ORIGIN")
         if course is None or told is None:
             return None
         steps, message = STEPS_PER_DEGREE, told.message
         origin = Origin(message.latitude / steps, message.longitude / steps, message.altitude / 1000)
+        if apart_deg(course.sent.origin, origin) > FAR_DEG:
+            return None
         if self._frame is None or self._frame[:2] != (course, origin):
             rule = autopilot_named(course.sent.autopilot).rule
             self._frame = (course, origin, local_frame(course.sent.origin, origin, rule))
         return self._frame[2]
+
+
+def apart_deg(site: SiteOrigin, origin: Origin) -> float:
+    """The greater of the differences in latitude and longitude, degrees."""
+    return max(abs(origin.lat - site.lat), abs(math.remainder(origin.lon - site.lon, 360.0)))
 
 
 UNKNOWN_TOTAL = 65_535

@@ -47,10 +47,12 @@ HOMEWARD = (
 
 @dataclass(frozen=True)
 class Consent:
-    """What the order may do to the motors; never done unasked."""
+    """What the order may do, or overlook, only if it says so."""
 
     arm: bool = False
     disarm: bool = False
+    any_origin: bool = False
+    """The vehicle finds its place by satellites, whatever its metres count from."""
 
 
 class Orders:
@@ -110,6 +112,8 @@ class Orders:
 
     def _elsewhere(self, course: Course) -> Refused | None:
         """Where the vehicle stands means something only if it counts from the mission's origin."""
+        if self._consent.any_origin:
+            return None
         origin, sent = self._peer.origin(), course.sent
         if origin is None:
             return Refused(
@@ -118,7 +122,8 @@ class Orders:
                 " tell it; set it to the mission's (stopgo push --set-origin)",
             )
         wrong = apart(sent.origin, origin, autopilot_named(sent.autopilot).rule)
-        return Refused("wrong_origin", wrong) if wrong else None
+        satellites = "; or add --any-origin, if it finds its place by satellites"
+        return Refused("wrong_origin", wrong + satellites) if wrong else None
 
     def _decided(self, command: Command) -> Decision | Refused:
         course, run = self._book.course, self._book.run

@@ -95,11 +95,13 @@ class Site:
             yield opened
 
     @contextmanager
-    def reached(self, *, arm: bool = True, disarm: bool = False, **options: Any) -> Iterator[Station]:
+    def reached(
+        self, *, arm: bool = True, disarm: bool = False, any_origin: bool = False, **options: Any
+    ) -> Iterator[Station]:
         """The vehicle, from a process of its own."""
         given: dict[str, Any] = {"state": self.folder / "station", "timeout_s": 5.0}
         given |= {"commander": "test", "vehicle": 1, "signing_key": self.key}
-        consent = Consent(arm=arm, disarm=disarm)
+        consent = Consent(arm, disarm, any_origin)
         with connect(self.url, Options(consent=consent, **(given | options))) as station:
             yield station
 

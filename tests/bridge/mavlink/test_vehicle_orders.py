@@ -117,6 +117,17 @@ def test_a_vehicle_that_counts_from_elsewhere_is_not_started(
     assert word in why and "wrong_origin" in why
 
 
+def test_a_vehicle_with_satellites_may_count_from_anywhere(tmp_path: Path) -> None:
+    """11 m to the south; it stands at the mission's start all the same."""
+    site = Site(tmp_path, "ardupilot", at=Pose(x=0.0, y=11.131884, heading=0.0))
+    site.origin = SiteOrigin(lat=51.4999, lon=7.5, alt=100.0, heading_deg=0.0)
+    with site.up():
+        assert "--any-origin" in refused(site, "start")
+        with site.reached(any_origin=True) as station:
+            assert station.command("start").outcome == "ok"
+            assert station.command("abort").outcome == "ok"
+
+
 def test_a_vehicle_that_stands_elsewhere_is_not_started(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot", at=Pose(x=0.5, y=0.0, heading=0.0))
     with site.up():
