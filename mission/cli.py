@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,16 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 import typer
 
-from mission.document import Mission, Stop, sealed
+from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError
 from mission.files.atomic import write_checked
 from mission.files.mission_json import encode, next_revision, read
-from mission.geometry import frozen, polyline_length
-from mission.planning import Schedule
+from mission.page import identity, json_text, page, report, route_length
 from mission.schedule import schedule
 from mission.sense import Problem, problems_of
 from mission.settings import HOW, read_settings
-from mission.table import duration, printable, table
 
 if TYPE_CHECKING:
     from mission.files.exports.format import FloorDrawing, Supplements
@@ -52,7 +49,7 @@ def show(mission: MissionFile, as_json: AsJson = False) -> None:
     for problem in problems_of(document)[:1]:
         raise AnswerIsNo(f"{mission}: {problem} (stopgo check {mission} lists all)")
     times = schedule(document)
-    typer.echo(_json(_report(document, times)) if as_json else _page(document, times))
+    typer.echo(json_text(report(document, times)) if as_json else page(document, times))
 
 
 def check(mission: MissionFile, floor: Floor = None, as_json: AsJson = False) -> None:
@@ -68,11 +65,11 @@ def check(mission: MissionFile, floor: Floor = None, as_json: AsJson = False) ->
     document = read(mission)
     problems = (*problems_of(document), *(() if floor is None else _floor_problems(document, floor)))
     if as_json:
-        typer.echo(_json(_verdict(mission, document, problems)))
+        typer.echo(json_text(_verdict(mission, document, problems)))
     elif problems:
         typer.echo("\n".join(map(str, problems)))
     else:
-        typer.echo(f"{mission}: in order; {_identity(document)}, {len(document.stops)} stops")
+        typer.echo(f"{mission}: in order; {identity(document)}, {len(document.stops)} stops")
     if problems:
         raise AnswerIsNo(f"{mission}: {len(problems)} problem{'s' * (len(problems) > 1)}")
 
@@ -112,90 +109,6 @@ def _verdict(path: Path, mission: Mission, problems: tuple[Problem, ...]) -> dic
         "stops": len(mission.stops),
         "problems": [{"path": problem.path, "message": problem.message} for problem in problems],
     }
-
-
-def _report(mission: Mission, times: Schedule) -> dict[str, Any]:
-    """What `show` prints, for a program."""
-    stops = [
-        {
-            **{"number": number, "id": stop.id, "x": stop.x, "y": stop.y},
-            **{"heading_deg": math.degrees(stop.heading), "doorway": stop.doorway},
-            **{"approach_m": _length(stop.approach), "units": stop.sees.units},
-            **{"new_units": stop.sees.new_units, "arrival_s": float(arrival)},
-        }
-        for number, (stop, arrival) in enumerate(zip(mission.stops, times.arrival_s, strict=True), 1)
-    ]
-    return {
-        **{"id": mission.id, "revision": mission.revision, "digest": mission.digest, "name": mission.name},
-        **{"floor": mission.origin.floor, "robot": mission.robot, "scanner": mission.scanner},
-        **{"start": mission.start, "stops": stops},
-        **{"route": {"length_m": _route_length(mission), "returns": mission.return_ is not None}},
-        "schedule": {
-            **{"drive_s": times.drive_s, "turn_s": times.turn_s, "settle_s": times.settle_s},
-            **{"scan_s": times.scan_s, "total_s": times.total_s},
-        },
-    }
-
-
-def _page(mission: Mission, times: Schedule) -> str:
-    header = ("no", "stop", "x m", "y m", "heading °", "doorway", "approach m", "units", "new", "arrives")
-    rows = [
-        _row(number, stop, arrival)
-        for number, (stop, arrival) in enumerate(zip(mission.stops, times.arrival_s, strict=True), 1)
-    ]
-    return "\n\n".join((_head(mission), table(header, rows), _totals(mission, times)))
-
-
-def _head(mission: Mission) -> str:
-    robot, scanner, start = mission.robot, mission.scanner, mission.start
-    lines = {
-        "mission": f"{mission.name}, {_identity(mission)}",
-        "digest": mission.digest,
-        "floor": f"{mission.origin.floor}, sha256 {mission.origin.floor_digest[:12]}…",
-        "robot": f"radius {robot.radius:g} m, {robot.speed:g} m/s, {robot.acceleration:g} m/s², "
-        f"turns {math.degrees(robot.turn_rate):g} °/s",
-        "scanner": f"profile {scanner.profile}, range {scanner.range:g} m, {scanner.fov_deg:g}°",
-        "start": f"({start.x:.3f}, {start.y:.3f}) facing {math.degrees(start.heading):.1f}° ({start.reason})",
-        "made by": f"stopgo {mission.origin.stopgo}",
-    }
-    return "\n".join(f"{name:8} {printable(value)}" for name, value in lines.items())
-
-
-def _identity(mission: Mission) -> str:
-    return f"id {mission.id} revision {mission.revision}"
-
-
-def _row(number: int, stop: Stop, arrival: float) -> tuple[str, ...]:
-    return (
-        *(str(number), stop.id, f"{stop.x:.3f}", f"{stop.y:.3f}", f"{math.degrees(stop.heading):.1f}"),
-        *("yes" if stop.doorway else "", f"{_length(stop.approach):.2f}"),
-        *(str(stop.sees.units), str(stop.sees.new_units), duration(arrival)),
-    )
-
-
-def _totals(mission: Mission, times: Schedule) -> str:
-    doorways = sum(stop.doorway for stop in mission.stops)
-    units = sum(stop.sees.new_units for stop in mission.stops)
-    ends = "and back to the start" if mission.return_ is not None else "ending at the last stop"
-    return (
-        f"{len(mission.stops)} stops, {doorways} of them in doorways; {units} units seen; "
-        f"route {_route_length(mission):.2f} m {ends}\n"
-        f"driving {duration(times.drive_s)}, turning {duration(times.turn_s)}, "
-        f"settling {duration(times.settle_s)}, scanning {duration(times.scan_s)}: "
-        f"in all {duration(times.total_s)}"
-    )
-
-
-def _route_length(mission: Mission) -> float:
-    return sum(map(_length, (*(stop.approach for stop in mission.stops), mission.return_ or ())))
-
-
-def _length(leg: tuple[tuple[float, float], ...]) -> float:
-    return polyline_length(frozen(leg).reshape(-1, 2))
-
-
-def _json(document: dict[str, Any]) -> str:
-    return msgspec.json.format(msgspec.json.encode(document), indent=2).decode()
 
 
 OriginOption = Annotated[
@@ -242,10 +155,11 @@ def export(
     Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
     """
     from mission.files.exports import FORMATS, check_uses, exported, format_named
-    from mission.files.exports.placing import placed
+    from mission.files.exports.placing import moved, placed
 
     document = read(mission)
-    for problem in problems_of(document)[:1]:
+    there = placed(document, origin=origin, to_map=map_)
+    for problem in problems_of(there)[:1]:
         raise AnswerIsNo(f"{mission}: {problem} (stopgo check {mission} lists all)")
     name = format_named(to, out)
     writing = {"autopilot": autopilot, "trigger": trigger, "scan-wait": scan_wait, "settle": settle}
@@ -253,10 +167,9 @@ def export(
     check_uses(name, {**drawn, **writing, "origin": origin, "map": map_})
     _keep(out, {"the mission": mission, "the floor": floor, "the coverage": coverage})
     supplements = _supplements(document, floor, coverage, writing)
-    there = placed(document, origin=origin, to_map=map_)
     data = exported(there, name, supplements)
     write_checked(out, data)
-    notes = FORMATS[name].notes(there, supplements)
+    notes = (*moved(document, there), *FORMATS[name].notes(there, supplements))
     report = {"mission": str(mission), "file": str(out), "format": name, "stops": len(there.stops)}
     _say_export({**report, "bytes": len(data), "notes": notes}, FORMATS[name].title, as_json)
 
@@ -303,7 +216,7 @@ def _say_export(report: dict[str, Any], title: str, as_json: bool) -> None:
     for note in report["notes"]:
         typer.echo(f"stopgo: {note}", err=True)
     line = f"{report['file']}: {title}, {report['stops']} stops, read back"
-    typer.echo(_json(report) if as_json else line)
+    typer.echo(json_text(report) if as_json else line)
 
 
 def import_command(
@@ -351,8 +264,8 @@ def _say_import(mission: Mission, out: Path, notes: tuple[str, ...], as_json: bo
         typer.echo(f"stopgo: {note}", err=True)
     report = {
         **{"mission": str(out), "id": mission.id, "revision": mission.revision, "digest": mission.digest},
-        **{"imported": mission.origin.floor, "stops": len(mission.stops), "route_m": _route_length(mission)},
+        **{"imported": mission.origin.floor, "stops": len(mission.stops), "route_m": route_length(mission)},
         **{"georeference": mission.georeference, "notes": notes},
     }
-    line = f"{out}: {len(mission.stops)} stops, route {_route_length(mission):.2f} m, {_identity(mission)}"
-    typer.echo(_json(report) if as_json else line)
+    line = f"{out}: {len(mission.stops)} stops, route {route_length(mission):.2f} m, {identity(mission)}"
+    typer.echo(json_text(report) if as_json else line)
