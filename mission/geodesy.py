@@ -20,6 +20,8 @@ ARDUPILOT_M_PER_DEGREE = 0.011131884502145034 * STEPS_PER_DEGREE
 PX4_RADIUS_M = 6_371_000.0
 WGS84_A = 6_378_137.0
 WGS84_E2 = 6.69437999014e-3
+REACH_M = 20_000.0
+"""Metres from the origin beyond which a site's plane is no map of the earth any more."""
 _CLOSE = 1e-13
 """Degrees (0.01 µm) within which an inverse is exact."""
 
@@ -58,6 +60,17 @@ def from_geodetic(origin: SiteOrigin, place: Geodetic, rule: str = "wgs84") -> P
         north += d_lat * metres_per_degree
         east += d_lon * metres_per_degree * math.cos(math.radians(here.lat))
     return _turned((east, north), -math.radians(origin.heading_deg))
+
+
+def out_of_reach(point: Point) -> str:
+    """Why a point of the site has no latitude and longitude; empty if it has."""
+    away = math.hypot(*point)
+    if away <= REACH_M:
+        return ""
+    return (
+        f"({point[0]:.0f}, {point[1]:.0f}) lies {away / 1000:.0f} km from the drawing's 0,0, and that is what"
+        " --origin places on the earth; move the drawing near its 0,0"
+    )
 
 
 def bearing_deg(origin: SiteOrigin, heading: float) -> float:

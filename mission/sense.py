@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mission.document import Mission, Point, Start, Stop
+from mission.geodesy import out_of_reach
 
 JOIN = 1e-3
 """Metres within which the ends of two legs are the same place."""
@@ -51,6 +52,9 @@ def _georeference(mission: Mission) -> Iterator[Problem]:
     place = mission.georeference
     if place is not None and not (abs(place.lat) <= 90 and abs(place.lon) <= 180):
         yield Problem("$.georeference", f"lat {place.lat}, lon {place.lon} is no place on earth")
+    far = out_of_reach((mission.start.x, mission.start.y))
+    if place is not None and far:
+        yield Problem("$.georeference", f"the start {far}")
     turn = mission.frame.to_map
     if turn is not None:
         yield from _pose("$.frame.to_map", (turn.x, turn.y), turn.heading)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mission.errors import AnswerIsNo
+from mission.errors import AnswerIsNo, InputError
 from mission.floor import FloorPlan
+from mission.geodesy import out_of_reach
 from mission.geometry import FloatArray, frozen
 from mission.planning import NavigableSpace
 from mission.settings import Settings
@@ -21,6 +22,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     """Everything later stages need to know about the floor, for this robot and these clearances."""
     floor = floor if settings.targets is None else floor.with_targets(settings.targets)
     origin = local_origin(floor)
+    _check_georeference(floor, origin, settings)
     ground = Ground.of(floor, settings)
     drive_area, gaps = drivable(ground, settings)
     states, findings = opening_states(ground, drive_area, gaps, settings)
@@ -43,6 +45,13 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         ground=to_polygons(ground.outline, origin),
         findings=(*floor.findings, *findings),
     )
+
+
+def _check_georeference(floor: FloorPlan, corner: FloatArray, settings: Settings) -> None:
+    """Refuse to place on the earth, by its 0,0, a floor that lies far from there."""
+    far = out_of_reach((float(corner[0]), float(corner[1])))
+    if settings.origin is not None and far:
+        raise InputError(f"{floor.name}: its corner {far}, or plan without --origin")
 
 
 def _kinds(floor: FloorPlan) -> str:

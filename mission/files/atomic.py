@@ -45,6 +45,8 @@ def write_checked(path: Path | str, data: bytes) -> None:
 
 
 def _check_target(target: Path, shown: Path | str) -> None:
+    if str(shown) == "-":
+        raise InputError("-: results are written to files, checked and whole; give a file's name")
     if not target.parent.is_dir():
         raise InputError(f"{shown}: the folder {target.parent} does not exist; create it first")
     if target.exists() and not target.is_file():

@@ -54,3 +54,8 @@ def test_a_fault_leaves_the_old_file_and_no_other(
         assert "No space left" in str(raised.value)
     assert (tmp_path / "a.json").read_bytes() == b"old"
     assert os.listdir(tmp_path) == ["a.json"]
+
+
+def test_a_dash_is_no_file() -> None:
+    with pytest.raises(InputError, match="results are written to files"):
+        write_atomic("-", b"x")

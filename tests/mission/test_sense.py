@@ -106,7 +106,11 @@ def test_a_mission_in_survey_coordinates_is_sound() -> None:
         for item, leg in zip(mission.stops, legs, strict=True)
     )
     back = tuple((px + x, py + y) for px, py in mission.return_ or ())
-    assert problems_of(change(mission, start=start, stops=stops, return_=back)) == ()
+    moved = change(mission, start=start, stops=stops, return_=back)
+    assert problems_of(change(moved, georeference=None)) == ()
+    (problem,) = problems_of(moved)
+    assert problem.path == "$.georeference"
+    assert "5423 km from the drawing's 0,0" in problem.message
 
 
 def test_the_rest_of_the_document_is_looked_at() -> None:

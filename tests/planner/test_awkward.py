@@ -46,7 +46,7 @@ def refused(
     floor: FloorPlan, options: Settings | None = None, *, kind: type[StopgoError] = StopgoError
 ) -> str:
     with pytest.raises(kind) as error:
-        planned(floor)
+        planned(floor, options)
     assert "\n" not in str(error.value)
     return str(error.value)
 
@@ -200,6 +200,12 @@ def test_a_floor_far_from_the_origin_is_planned_as_here(by: tuple[float, float])
     assert len(here.stops) == len(there.stops)
     for one, other in zip(here.stops, there.stops, strict=True):
         assert np.allclose((one.x + by[0], one.y + by[1]), (other.x, other.y), atol=1e-5)
+
+
+def test_a_floor_far_from_its_zero_is_not_placed_on_the_earth() -> None:
+    floor = moved(hall(6, 4), shifted(2_600_000.0, 1_200_000.0))
+    said = refused(floor, Settings(origin=(47.0, 8.0, 400.0, 0.0)), kind=InputError)
+    assert "2864 km from the drawing's 0,0" in said
 
 
 def test_a_floor_of_half_a_metre_has_no_candidate() -> None:

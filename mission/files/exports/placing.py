@@ -30,6 +30,17 @@ def placed(mission: Mission, *, origin: str | None, to_map: str | None) -> Missi
     return mission
 
 
+def moved(mission: Mission, there: Mission) -> tuple[str, ...]:
+    """A line if `there` is placed elsewhere on the earth than the mission itself says."""
+    own = mission.georeference
+    if own is None or own == there.georeference:
+        return ()
+    return (
+        f"--origin differs from the mission's own georeference {own.lat:.7f},{own.lon:.7f},{own.alt:g},"
+        f"{own.heading_deg:g}, which push goes by; plan with it to change that",
+    )
+
+
 def numbers(text: str, option: str, how: str) -> tuple[float, ...]:
     """The numbers in `1,2.5,-3`, given for an option; `how` says how to write them."""
     try:

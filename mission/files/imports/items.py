@@ -14,7 +14,7 @@ from itertools import takewhile
 from mission.document import SiteOrigin
 from mission.errors import InputError
 from mission.files.imports import track
-from mission.files.imports.track import Track
+from mission.files.imports.track import Given, Track
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.back import GLOBAL_FRAMES, PLACES, TRIGGERS, WAITS, recognise
@@ -82,6 +82,16 @@ def autopilot_for(given: str | None, firmware: int | None = None) -> str:
     if given is not None:
         return autopilot_named(given).name
     return "ardupilot" if firmware is None else {3: "ardupilot", 12: "px4"}.get(firmware, "generic")
+
+
+def assumptions(given: Given, *, heading: bool, firmware: bool) -> tuple[str, ...]:
+    """What was taken for granted, a line each: `heading`, `firmware` tell what the file itself says."""
+    lines = []
+    if given.origin is None and not heading:
+        lines.append("no --origin: the site's origin is the file's home, its +y axis north")
+    if given.autopilot is None and not firmware:
+        lines.append("no --autopilot: degrees are read by ArduPilot's rule; PX4's differs by mm per metre")
+    return tuple(lines)
 
 
 def _check_items(items: Sequence[Listed], source: str) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 from mission.document import SiteOrigin
 from mission.errors import InputError
-from mission.files.imports.items import Listed, autopilot_for, track_of
+from mission.files.imports.items import Listed, assumptions, autopilot_for, track_of
 from mission.files.imports.track import Given, Track
 
 NAN = float("nan")
@@ -39,7 +40,8 @@ def read(data: bytes, source: str, given: Given) -> Track:
     firmware = mission.get("firmwareType")
     autopilot = autopilot_for(given.autopilot, firmware if isinstance(firmware, int) else 0)
     track = track_of(named, origin=origin, autopilot=autopilot, source=source)
-    return _noted(track, plan)
+    told = isinstance(ours, dict) and _is_number(ours.get("heading_deg"))
+    return _noted(track, plan, assumptions(given, heading=told, firmware=True))
 
 
 def _parsed(data: bytes, source: str) -> object:
@@ -123,12 +125,12 @@ def _named(item: Listed, ours: object) -> Listed:
     return Listed(item.number, item.command, item.frame, item.params, name if isinstance(name, str) else None)
 
 
-def _noted(track: Track, plan: dict[str, Any]) -> Track:
+def _noted(track: Track, plan: dict[str, Any], assumed: tuple[str, ...]) -> Track:
     left = [
         name for name, key in (("geofence", "geoFence"), ("rally points", "rallyPoints")) if _holds(plan, key)
     ]
     notes = tuple(f"the plan's {name} is not taken over: a mission has none" for name in left)
-    return Track(track.visits, track.back, track.start, track.origin, track.speed, notes)
+    return replace(track, notes=(*assumed, *notes))
 
 
 def _holds(plan: dict[str, Any], key: str) -> bool:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from mission.document import SiteOrigin
 from mission.errors import InputError
-from mission.files.imports.items import Listed, autopilot_for, track_of
+from mission.files.imports.items import Listed, assumptions, autopilot_for, track_of
 from mission.files.imports.qgc_plan import LARGEST_CODE
 from mission.files.imports.track import Given, Track
 
@@ -26,7 +27,8 @@ def read(data: bytes, source: str, given: Given) -> Track:
     if not rows:
         raise InputError(f"{source}: has no row after '{HEAD}'")
     origin = given.origin or _home(rows[0], source)
-    return track_of(rows[1:], origin=origin, autopilot=autopilot_for(given.autopilot), source=source)
+    track = track_of(rows[1:], origin=origin, autopilot=autopilot_for(given.autopilot), source=source)
+    return replace(track, notes=assumptions(given, heading=False, firmware=False))
 
 
 def _rows(data: bytes, source: str) -> list[Listed]:

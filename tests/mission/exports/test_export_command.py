@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from mission.__main__ import main
-from mission.document import Mission
+from mission.document import Mission, SiteOrigin
 from mission.files import mission_json
 from mission.files.exports import FORMATS
 from mission.files.mission_json import read
@@ -159,3 +159,11 @@ def test_without_a_floor_a_line_says_so(office: Path, tmp_path: Path, capsys: Ca
     code, _, err = exit_of([str(office / "mission.json"), "-o", str(tmp_path / "site.dxf")], capsys)
     assert code == 0
     assert "no --floor: the layers stand alone, in metres" in err
+
+
+def test_an_origin_that_is_not_the_missions_own_is_said(path: str, tmp_path: Path, capsys: Captured) -> None:
+    placed = tmp_path / "placed.json"
+    here = SiteOrigin(lat=47.0, lon=8.0, alt=0.0, heading_deg=30.0)
+    mission_json.write(msgspec.structs.replace(read(path), georeference=here), placed)
+    said = exit_of([str(placed), "-o", str(tmp_path / "a.plan"), "--origin", ZURICH], capsys)[2]
+    assert "differs from the mission's own georeference 47.0000000,8.0000000,0,30" in said

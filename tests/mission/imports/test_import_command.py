@@ -120,3 +120,18 @@ def test_what_cannot_be_imported_is_one_line_and_2(
     assert err.count("\n") == 1
     assert words in err
     assert not (folder / "m.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["site.plan"], ["no --origin"]),
+        (["site.waypoints"], ["no --origin", "no --autopilot"]),
+        (["site.waypoints", "--origin", "47,8,400,30", "--autopilot", "px4"], []),
+    ],
+)
+def test_what_is_taken_for_granted_is_said(
+    arguments: list[str], said: list[str], folder: Path, capsys: Captured
+) -> None:
+    _, _, err = run([str(folder / arguments[0]), *arguments[1:], "-o", str(folder / "m.json")], capsys)
+    assert [word for word in ("no --origin", "no --autopilot") if word in err] == said

@@ -98,7 +98,7 @@ def test_what_a_plan_has_besides_items_is_told_of() -> None:
     fence = {"circles": [], "polygons": [{"path": []}], "version": 2}
     rally = {"points": [[47.0, 8.0, 0]], "version": 2}
     notes = track(waypoint(hold=5), geoFence=fence, rallyPoints=rally).notes
-    assert ["geofence" in notes[0], "rally points" in notes[1]] == [True, True]
+    assert ["geofence" in notes[-2], "rally points" in notes[-1]] == [True, True]
 
 
 REFUSED: dict[str, tuple[tuple[Row, ...], str]] = {
