@@ -186,7 +186,10 @@ _PROMPTS = {
 
 
 def _label(insert: Insert, number: int, stop: Stop, size: float) -> None:
-    """Attributes upright, whichever way the block is turned; the id below the disc."""
+    """Attributes upright, whichever way the block is turned: the number beside the disc, the id below it.
+
+    Inside the disc the route would run through the number.
+    """
     from ezdxf.enums import TextEntityAlignment as Align
 
     values = {
@@ -195,12 +198,19 @@ def _label(insert: Insert, number: int, stop: Stop, size: float) -> None:
         **{"PROFILE": printable(stop.scan.profile), "SCAN_S": f"{stop.scan.duration_s:g}"},
     }
     below = _at((stop.x, stop.y - DISC - TEXT), size)
+    beside = _at((stop.x + _free_side(stop.heading) * (DISC + 0.5 * TEXT), stop.y + DISC + 0.4 * TEXT), size)
+    places = {"ID": below, "NUMBER": beside}
     for tag, value in values.items():
         height = TEXT * size * (0.6 if tag == "ID" else 1.0)
-        place = below if tag == "ID" else insert.dxf.insert
+        place = places.get(tag, insert.dxf.insert)
         attribute = insert.add_attrib(tag, value, place, dxfattribs={"layer": STOPS, "height": height})
         attribute.set_placement(place, align=Align.MIDDLE_CENTER)
         attribute.is_invisible = tag not in _SHOWN
+
+
+def _free_side(heading: float) -> int:
+    """Above a disc, the side (1 right, -1 left) to which its arrow does not point."""
+    return -1 if math.cos(heading) > 0 and math.sin(heading) > -0.2 else 1
 
 
 def _arrowhead(at: float) -> list[Point]:
