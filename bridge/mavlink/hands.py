@@ -45,6 +45,8 @@ class Hands:
 
     def __init__(self, peer: Peer, modes: Modes, lookout: Lookout, clock: Clock) -> None:
         self.news = threading.Condition()
+        self.working: Callable[[], None] = lambda: None
+        """Called before each command."""
         self._peer = peer
         self._modes = modes
         self._lookout = lookout
@@ -83,10 +85,15 @@ class Hands:
         """Let it follow its mission."""
         self._mode(AUTO)
 
-    def jump(self, sequence: int) -> None:
-        """Make an item the one it works on; a command that is no NAV command is passed at once."""
+    def jump(self, sequence: int, *, anew: bool = False) -> None:
+        """Make an item the one it works on; a command that is no NAV command is passed at once.
+
+        `anew` also takes a mission that is complete out of that state.
+        """
         asked_ns = self._clock.now_ns()
-        self._order(dialect.MAV_CMD_DO_SET_MISSION_CURRENT, float(sequence), 0.0, what=f"item {sequence}")
+        self._order(
+            dialect.MAV_CMD_DO_SET_MISSION_CURRENT, float(sequence), float(anew), what=f"item {sequence}"
+        )
         near = range(sequence, sequence + 3)
         self._shown(
             lambda: self._lookout.current_ns > asked_ns and self._lookout.sequence in near,
@@ -112,6 +119,7 @@ class Hands:
         )
 
     def _order(self, number: int, *params: float, what: str) -> None:
+        self.working()
         ack = self._peer.command(number, *params)
         if not ack.accepted:
             text = self._peer.newest("STATUSTEXT")

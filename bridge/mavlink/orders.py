@@ -36,7 +36,7 @@ from mission.events import Pose
 from mission.mavlink.autopilots import autopilot_named, differences
 
 ORDERING_NS = 20 * 10**9
-"""An order takes no longer; then what the vehicle does counts as somebody else's again."""
+"""One step of an order takes no longer; then what the vehicle does counts as somebody else's again."""
 DRIVING = ("start", "resume", "retry")
 NOWHERE = Pose(x=math.inf, y=math.inf, heading=0.0)
 HOMEWARD = (
@@ -253,9 +253,10 @@ class Orders:
 
     def _go(self, course: Course, place: int, sight: Sight | None) -> None:
         """AUTO, from an item on; where that leaves the first ones out, at the speed that they would set."""
-        jumps = sight is None or place != sight.place or sight.place >= course.end
+        anew = sight is None or sight.place >= course.end
+        jumps = anew or sight is None or place != sight.place
         if jumps:
-            self._hands.jump(course.sequence(place))
+            self._hands.jump(course.sequence(place), anew=anew)
         self._hands.auto()
         if jumps and place > 0 and course.speed is not None:
             self._hands.speed(course.speed)
@@ -264,10 +265,8 @@ class Orders:
 
     def _ordering(self, command: Command) -> _Ordering:
         mode = HOLD if command.verb in FREE_VERBS else AUTO
-        until_ns = self._book.clock.now_ns() + ORDERING_NS
-        return _Ordering(
-            self._book, Ordered(verb=command.verb, by=command.commander, mode=mode, until_ns=until_ns)
-        )
+        ordered = Ordered(verb=command.verb, by=command.commander, mode=mode, until_ns=0)
+        return _Ordering(self._book, self._hands, ordered)
 
     def _stored(self, command: Command, outcome: Change | Refused, lease: Lease | None) -> Answer:
         """The answer, stored together with what the order has changed."""
@@ -287,18 +286,26 @@ class Orders:
 class _Ordering:
     """Shows in the journal that an order is being carried out; one whose outcome is unknown stays there."""
 
-    def __init__(self, book: Logbook, ordered: Ordered) -> None:
+    def __init__(self, book: Logbook, hands: Hands, ordered: Ordered) -> None:
         self._book = book
+        self._hands = hands
         self._ordered = ordered
 
     def __enter__(self) -> None:
-        self._book.journal.store_fact("ordered", self._ordered)
+        self._hands.working = lambda: self._last(ORDERING_NS)
+        self._hands.working()
 
     def __exit__(self, kind: object, *exception: object) -> None:
+        self._hands.working = lambda: None
         if kind is None:
-            return self._book.journal.forget_fact("ordered")
-        ended = msgspec.structs.replace(self._ordered, until_ns=self._book.clock.now_ns())
-        return self._book.journal.store_fact("ordered", ended)
+            self._book.journal.forget_fact("ordered")
+        else:
+            self._last(0)
+
+    def _last(self, ns: int) -> None:
+        """It is being carried out for so much longer."""
+        until_ns = self._book.clock.now_ns() + ns
+        self._book.journal.store_fact("ordered", msgspec.structs.replace(self._ordered, until_ns=until_ns))
 
 
 VERBS: dict[str, Callable[[Orders, Command, Course, Decision], Change]] = {

@@ -16,9 +16,8 @@ from recordings.review import review
 from tests.bridge.mavlink.site import ALL, Site, told, tour, until, watched
 
 
-@pytest.mark.parametrize("profile", ["ardupilot", "px4", "strict"])
-def test_a_run_is_told_from_start_to_finish(profile: str, tmp_path: Path) -> None:
-    site = Site(tmp_path, profile)
+def test_a_run_is_told_from_start_to_finish(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
     with site.up(), watched(site) as seen:
         assert site.order("start").outcome == "ok"
     assert told(site.events) == ALL
@@ -27,14 +26,15 @@ def test_a_run_is_told_from_start_to_finish(profile: str, tmp_path: Path) -> Non
     assert all(event.deviation_m < 0.02 for event in site.events if isinstance(event, Arrived))
 
 
-def test_a_recording_of_a_run_is_reviewed_as_any_other(tmp_path: Path) -> None:
+@pytest.mark.parametrize("profile", ["ardupilot", "px4", "strict"])
+def test_a_recording_of_a_run_is_reviewed_as_any_other(profile: str, tmp_path: Path) -> None:
     from bridge.watch import watch_run
 
-    site = Site(tmp_path, "ardupilot")
-    with site.up():
-        site.order("start")
-        with FieldRecording(tmp_path / "field.rrd", None) as record, site.reached() as station:
-            assert watch_run(station, record, say=print).state == "FINISHED"
+    site = Site(tmp_path, profile)
+    with site.up(), FieldRecording(tmp_path / "field.rrd", None) as record, site.reached() as station:
+        station.command("start")
+        assert watch_run(station, record, say=print).state == "FINISHED"
+    assert told(site.events) == ALL
     (run,) = review(tmp_path / "field.rrd").runs
     assert (run.scanned, run.unconfirmed, run.ended) == (["S1", "S2", "S3"], [], "Finished")
     assert set(run.deviation_m) == {"S1", "S2", "S3"}

@@ -10,7 +10,7 @@ import pytest
 from bridge.mavlink.peer import Peer
 from bridge.mavlink.peer import reached as found_peer
 from bridge.mavlink.wire import dialect
-from mission.document import SiteOrigin
+from mission.document import Scan, SiteOrigin
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import Aborted, Pose, Resumed, Started
 from mission.mavlink.translate import translate
@@ -232,3 +232,30 @@ def test_a_vehicle_in_auto_is_not_armed_before_it_is_put_on_hold(
         assert site.order("start").outcome == "ok"
     mode, arm = dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_COMPONENT_ARM_DISARM
     assert ordered == [mode, arm, dialect.MAV_CMD_DO_SET_MISSION_CURRENT, mode]
+
+
+def test_a_pause_lets_the_scan_under_way_finish_and_no_stop_is_scanned_twice(tmp_path: Path) -> None:
+    long = Scan(profile="default", duration_s=10.0, timeout_s=20.0)
+    site = Site(tmp_path, "ardupilot", mission=tour(scan=long))
+    with site.up(), site.reached() as station:
+        station.command("start")
+        until(site, lambda events, run: "Settled S1" in told(events))
+        assert station.command("pause").state == "PAUSED"
+        until(site, lambda events, run: "Scanned S1" in told(events))
+        assert site.run.state == "PAUSED" and site.run.done == ("S1",)
+        assert station.command("resume").outcome == "ok"
+        until(site, lambda events, run: "Arrived S2" in told(events))
+        station.command("abort")
+    words = told(site.events)
+    assert words.index("Paused") < words.index("Scanned S1") < words.index("Resumed")
+    assert words.count("Scanned S1") == words.count("Arrived S1") == 1
+
+
+def test_a_stop_that_failed_is_driven_to_again_when_somebody_says_so(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot", faults=["beside@7=0.3"])
+    with site.up(), site.reached() as station:
+        station.command("start")
+        until(site, lambda events, run: run.state == "HELD")
+        assert station.command("retry").state == "RUNNING"
+        until(site, lambda events, run: told(events).count("Failed S2") == 2)
+        assert station.command("abort").state == "ABORTED"
