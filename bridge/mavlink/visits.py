@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from mission.document import Mission
 from mission.errors import InputError
 from mission.mavlink.autopilots import autopilot_named
@@ -61,7 +63,13 @@ def course_of(mission: Mission, sent: ItemList) -> Course:
     InputError
         If a stop of the mission is not in the list.
     """
-    return Course(mission, sent, tuple(_visit(stop.id, sent.placed) for stop in mission.stops))
+    return Course(_forward(mission), sent, tuple(_visit(stop.id, sent.placed) for stop in mission.stops))
+
+
+def _forward(mission: Mission) -> Mission:
+    """The mission as AUTO can do it, forward only: where a stop says "home", somebody must decide."""
+    stops = (replace(stop, on_failure="ask") if stop.on_failure == "home" else stop for stop in mission.stops)
+    return replace(mission, stops=tuple(stops))
 
 
 def _visit(stop: str, placed: tuple[Placed, ...]) -> Visit:

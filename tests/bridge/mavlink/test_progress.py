@@ -162,3 +162,9 @@ def test_a_vehicle_that_ends_its_mission_in_another_mode_was_not_taken_over() ->
     assert taken_over(going(at=2), mine, ended) is None
     paused = taken_over(going(at=2, state="PAUSED"), mine, ended)
     assert paused is not None and paused.run.state == "RUNNING"
+
+
+def test_home_is_no_answer_of_a_vehicle_that_drives_forward_only() -> None:
+    mine, visit = course(on_failure="home"), course().visits[1]
+    far = Pose(x=2.3, y=1.0, heading=0.0)
+    assert after(going(), mine, seen(visit.at + 1, pose=far, still=True))[0] == ["Failed S2", "Held"]
