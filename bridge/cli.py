@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -13,41 +13,34 @@ import typer
 
 from bridge.console import Bar, print_json, say
 from bridge.key_commands import key_commands
+from bridge.order_commands import Json, TakeOver, add_orders, status_json
 from bridge.tunnel_commands import tunnel_commands
 from bridge.ways import (
     DEFAULT_ENDPOINT,
-    Connect,
     Insecure,
     KeyFolder,
-    MavlinkUrl,
     SigningKey,
     Site,
-    StateFolder,
     Timeout,
     VehicleId,
     Way,
     by_way,
-    in_time,
     reached,
-    way_of,
 )
 from mission.errors import InputError
 
 if TYPE_CHECKING:
     from bridge.mavlink.scanner import Trigger
-    from bridge.protocol import Answer, Verb
     from bridge.revision import RevisionPolicy
     from bridge.watch import Recording
     from mission.document import Mission, Transform
-    from mission.events import Pose, StateReport
+    from mission.events import Pose
 
 PushTimeout = Annotated[
     float | None,
     typer.Option("--timeout", min=0.1, metavar="S", help="How long to go on without an answer, in seconds; "
                  "if not given, 5 to find the robot and 20 for each piece."),
 ]  # fmt: skip
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
-TakeOver = Annotated[bool, typer.Option("--take-over", help="Command it though somebody else does.")]
 NeededMavlink = Annotated[
     str,
     typer.Option(
@@ -63,7 +56,6 @@ AutopilotKind = Annotated[
 WhileRunning = Annotated[
     bool, typer.Option("--while-running", help="Even though the vehicle is armed and follows its mission.")
 ]
-StopId = Annotated[str | None, typer.Option("--stop", metavar="ID", help="The stop that is meant.")]
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -72,10 +64,7 @@ def add_commands(app: typer.Typer) -> None:
     app.command()(push)
     app.command("fetch-mission")(fetch_mission)
     app.command()(clear)
-    app.command()(start)
-    for verb in ABOUT:
-        app.command(name=verb)(order_of(verb))
-    app.command()(status)
+    add_orders(app)
     app.command()(watch)
     app.add_typer(key_commands(), name="keys")
     app.add_typer(tunnel_commands(), name="tunnel")
@@ -360,118 +349,6 @@ def turning(own: Transform | None, mission: Mission) -> str:
     return f"on the robot's map, places are turned by {turned} ({whose})"
 
 
-Arm = Annotated[bool, typer.Option("--arm", help="Arm a vehicle that is disarmed.")]
-OtherOrigin = Annotated[
-    bool, typer.Option("--any-origin", help="Do not compare origins: it has satellite positions.")
-]
-
-
-@by_way()
-def start(
-    way: Way,
-    *,
-    take_over: TakeOver = False,
-    again: Annotated[bool, typer.Option("--again", help="Run a mission that was run before.")] = False,
-    from_here: Annotated[
-        bool, typer.Option("--from-here", help="Start at the nearest point of the route.")
-    ] = False,
-    arm: Arm = False,
-    any_origin: OtherOrigin = False,
-    json_: Json = False,
-) -> None:
-    """Start the mission that the robot holds.
-
-    Example: stopgo start --robot r1 --connect tcp/127.0.0.1:7447
-
-    Example: stopgo start --mavlink udpout:127.0.0.1:14550 --arm
-    """
-    with in_time(way.to_drive(arm=arm, any_origin=any_origin)) as station:
-        answer = station.command("start", again=again, from_here=from_here, take_over=take_over)
-    report_answer(answer, station.keys.robot, json_)
-
-
-ABOUT: dict[Verb, str] = {
-    "pause": "Let the robot stand still; a scan under way is finished. Any station may.",
-    "resume": "Let a paused robot go on, from where it stands.",
-    "skip": "Leave out the stop that the robot works on; its way is still driven.",
-    "retry": "Let a robot that is held try again.",
-    "abort": "End the run where the robot stands. Any station may.",
-    "home": "End the run and drive back along the legs that were driven.",
-}
-
-
-def order_of(verb: Verb) -> Callable[..., None]:
-    """The command that gives the order `verb`."""
-
-    def command(
-        way: Way,
-        *,
-        stop: StopId = None,
-        take_over: TakeOver = False,
-        arm: Arm = False,
-        any_origin: OtherOrigin = False,
-        disarm: Annotated[bool, typer.Option("--disarm", help="Disarm a vehicle that stands.")] = False,
-        json_: Json = False,
-    ) -> None:
-        with in_time(way.to_drive(arm=arm, disarm=disarm, any_origin=any_origin)) as station:
-            answer = station.command(verb, stop=stop, take_over=take_over)
-        report_answer(answer, station.keys.robot, json_)
-
-    command.__doc__ = f"{ABOUT[verb]}\n\nExample: stopgo {verb} --robot r1 --connect {DEFAULT_ENDPOINT}"
-    without = () if verb in ("resume", "retry", "skip") else ("arm", "any_origin")
-    return by_way(without=without if verb == "abort" else (*without, "disarm"))(command)
-
-
-def status(
-    *,
-    robot: Annotated[
-        str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot; all if not given.")
-    ] = None,
-    connect: Connect = DEFAULT_ENDPOINT,
-    site: Site = None,
-    mavlink: MavlinkUrl = None,
-    vehicle: VehicleId = None,
-    signing_key: SigningKey = None,
-    state: StateFolder = None,
-    timeout: Timeout = 5.0,
-    insecure: Insecure = False,
-    keys: KeyFolder = None,
-    json_: Json = False,
-) -> None:
-    """Tell what the robot is doing, or what all robots of the site are.
-
-    Example: stopgo status --robot r1 --json
-
-    Example: stopgo status --mavlink udpout:127.0.0.1:14550
-    """
-    from bridge.station import fleet
-
-    if robot is None and mavlink is None:
-        reports = fleet(connect, site=site, timeout_s=timeout, insecure=insecure, keys=keys)
-        as_json: dict[str, Any] = {"robots": [status_json(report) for report in reports]}
-    else:
-        way = way_of(
-            robot=robot, connect=connect, site=site, mavlink=mavlink, vehicle=vehicle,
-            signing_key=signing_key, state=state, timeout=timeout, insecure=insecure, keys=keys,
-        )  # fmt: skip
-        with in_time(way.to_look()) as station:
-            reports = (station.status(),)
-        as_json = status_json(reports[0])
-    if json_:
-        print_json(as_json)
-    else:
-        typer.echo("\n".join(state_line(report) for report in reports))
-
-
-def status_json(report: StateReport) -> dict[str, Any]:
-    return {key: getattr(report, key) for key in STATUS_KEYS}
-
-
-STATUS_KEYS = (
-    "robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop", "done", "skipped", "battery",
-)  # fmt: skip
-
-
 @by_way(without=("who",))
 def watch(
     way: Way,
@@ -522,29 +399,6 @@ def recording(path: Path | None, *, view: bool) -> AbstractContextManager[Record
 def pushing(way: Way, timeout_s: float | None) -> Way:
     """The way for a push, which takes as long as it takes: its timeout is that without an answer."""
     return way if timeout_s is None else replace(way, timeout_s=timeout_s, patience_s=timeout_s)
-
-
-def report_answer(answer: Answer, robot: str, json_: bool) -> None:
-    if json_:
-        print_json({"robot": robot, "verb": answer.verb, "outcome": answer.outcome,
-                    "run_id": answer.run_id, "state": answer.state})  # fmt: skip
-    else:
-        typer.echo(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
-
-
-def state_line(report: StateReport) -> str:
-    """The state as one line a person reads."""
-    mission = (
-        f"mission {report.mission_id[:12]} revision {report.revision}" if report.mission_id else "no mission"
-    )
-    stop = f", {report.stop_state} at {report.stop}" if report.stop else ""
-    skipped = f", {len(report.skipped)} skipped" if report.skipped else ""
-    if report.next_revision is not None:
-        mission += f" (revision {report.next_revision} from the next stop on)"
-    return (
-        f"{report.robot}: {report.state}{stop}; {mission}; {len(report.done)} done{skipped};"
-        f" battery {report.battery:.0%}"
-    )
 
 
 def read_map(text: str | None) -> Transform | None:
