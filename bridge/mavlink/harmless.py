@@ -6,7 +6,7 @@ commander's lease would count. To stop a vehicle must always be possible.
 
 from __future__ import annotations
 
-from bridge.mavlink.driving import DRIVING
+from bridge.mavlink.driving import DRIVING, Driving
 from bridge.mavlink.peer import autopilot_of, enum_name
 from bridge.mavlink.wire import Message, dialect
 
@@ -56,22 +56,24 @@ class Harmless:
             return bool(first == 0)
         if message.command == dialect.MAV_CMD_DO_FLIGHTTERMINATION:
             return bool(first >= 0.5)
-        if message.command != dialect.MAV_CMD_DO_SET_MODE or not (_whole(main) and _whole(sub)):
+        if message.command != dialect.MAV_CMD_DO_SET_MODE:
             return False
-        packed = DRIVING.get(self._kinds.get(message.target_system, ""))
-        custom = int(sub) << 24 | int(main) << 16 if packed and packed.packed else int(main)
-        return self._holds(message.target_system, custom)
+        meant = self._meant(message.target_system)
+        return bool(meant) and all(
+            driving.hold.main == main and driving.hold.sub in (0, sub) for driving in meant
+        )
 
     def _holds(self, system: int, custom_mode: int) -> bool:
-        driving = DRIVING.get(self._kinds.get(system, ""))
-        return driving is not None and driving.mode_of(custom_mode) == driving.hold
+        meant = self._meant(system)
+        return bool(meant) and all(driving.mode_of(custom_mode) == driving.hold for driving in meant)
+
+    def _meant(self, system: int) -> list[Driving]:
+        """How the vehicle is driven, or, for 0, all that were heard; empty if one is of an unknown kind."""
+        kinds = [kind for known, kind in self._kinds.items() if system in (0, known)]
+        return [DRIVING[kind] for kind in kinds] if all(kind in DRIVING for kind in kinds) else []
 
 
 def described(message: Message) -> str:
     """What a message is, for people: the name of its command if it is one."""
     name: str = message.get_type()
     return f"{enum_name('MAV_CMD', message.command)} ({name})" if name in COMMANDS else name
-
-
-def _whole(value: float) -> bool:
-    return 0 <= value <= 255 and value == int(value)

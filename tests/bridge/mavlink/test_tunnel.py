@@ -147,6 +147,7 @@ def test_without_raw_orders_one_can_look_and_stop_and_nothing_else() -> None:
     assert command(arm, 0, 21196)
     assert command(dialect.MAV_CMD_REQUEST_MESSAGE, 148)
     assert judge.lets_through(dialect.MAVLink_set_mode_message(1, 1, 4))
+    assert judge.lets_through(dialect.MAVLink_set_mode_message(0, 1, 4))
     assert judge.lets_through(dialect.MAVLink_mission_request_list_message(1, 1))
     assert not command(mode, 1, 10)
     assert not command(mode, 1, float("nan"))
