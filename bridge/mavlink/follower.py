@@ -54,6 +54,7 @@ class Follower:
         self._due = threading.Event()
         self._differs: str | None = None
         """How the vehicle's mission differs from what it was sent; `None` while nobody has compared them."""
+        self._compare_due = False
         self.looking = False
         """Nothing is made of what comes in before all is known that can be asked for."""
         self._left: tuple[tuple[str, int, int], int] | None = None
@@ -102,6 +103,9 @@ class Follower:
             waiting = self.run.at == before.at and self.run.stop_state in EARLY
             if capture is not None and self.run != before and not waiting:
                 self._book.use(*capture.name)
+        if self.run.state == "RUNNING" and before.state in ("READY", "PAUSED", "HELD"):
+            self._compare_due = True  # somebody else let it go on, perhaps with another mission
+            self._due.set()
 
     def _sight(self, course: Course) -> Sight | None:
         """The vehicle as it is seen now; asked once more for a scan of a stop that it has left."""
@@ -214,6 +218,9 @@ class Follower:
         while not self._closing.is_set():
             self._due.wait()
             self._due.clear()
+            if self._compare_due:
+                self._compare_due = False
+                self.compare()
             owed, course = self._book.owed, self._book.course
             if owed is None or course is None or self._looks_only:
                 continue

@@ -24,6 +24,7 @@ from mission.mavlink.autopilots import autopilot_named
 STILL_M_PER_S = 0.05
 """An estimator's speed of a robot that stands is not zero."""
 CAPTURES_KEPT = 100
+STALE_NS = 3 * 10**9
 CLOCK_NS = 3 * 10**9
 """A vehicle that has not told its time for so long does not tell it at all."""
 TOLD = (
@@ -103,6 +104,13 @@ class Lookout:
         newest = self._clock_told()
         told = newest is not None and min(newest.ns, self.current_ns) > self._mode_began_ns
         return told or self._clock.now_ns() > self._mode_began_ns + CLOCK_NS
+
+    @property
+    def pose(self) -> Pose | None:
+        """Where it stands, unless it has not told so for a while."""
+        fix = self.fix
+        stale = fix is None or fix.ns < self._clock.now_ns() - STALE_NS
+        return None if fix is None or stale else fix.pose
 
     def _clock_told(self) -> Seen | None:
         told = [self._newest[name] for name in CLOCKS if name in self._newest]

@@ -130,10 +130,10 @@ class Orders:
         elsewhere = None if course is None or command.verb not in DRIVING else self._elsewhere(course)
         if elsewhere is not None:
             return elsewhere
-        here = self._lookout.fix.pose if self._lookout.fix is not None else None
+        here = self._lookout.pose
         mission = None if course is None else course.mission
         if here is None and mission is not None and command.verb not in FREE_VERBS:
-            return Refused("no_position", "the vehicle does not tell where it is; has it a position at all?")
+            return Refused("no_position", "the vehicle does not tell where it is; does its navigation run?")
         if here is not None and course is not None and command.verb != "start":
             here = on_way(run, course, here)
         return decide(command, self._situation(run, mission, here or NOWHERE))
@@ -224,7 +224,7 @@ class Orders:
         return sight
 
     def _here(self) -> Pose:
-        return NOWHERE if self._lookout.fix is None else self._lookout.fix.pose
+        return self._lookout.pose or NOWHERE
 
     def _ready(self, course: Course) -> None:
         """Whether the vehicle may drive this mission: it holds it, and is armed.

@@ -203,3 +203,21 @@ def test_a_journal_that_cannot_be_written_ends_the_watch_and_says_why(tmp_path: 
                                              " RAISE(FAIL, 'disk full'); END")  # fmt: skip
         for _ in station.reports():
             pass
+
+
+def test_a_mission_of_as_many_items_is_seen_to_be_another_when_somebody_starts_it(tmp_path: Path) -> None:
+    from bridge.mavlink.upload import upload
+
+    site = Site(tmp_path, "ardupilot")
+    other = translate(tour(settle_s=1.5), "ardupilot")
+    assert len(other.placed) == len(site.sent.placed)
+    with site.up(), site.reached() as station, found_peer(site.url, vehicle=1) as peer:
+        station.command("start")
+        until(site, lambda events, run: "Arrived S1" in told(events))
+        station.command("pause")
+        upload(peer, other)
+        by_hand(peer, (10, 0))
+        until(site, lambda events, run: run.state == "HELD")
+        assert "settle of S1" in site.run.reason
+        assert peer.in_auto
+        station.command("abort")
