@@ -19,6 +19,8 @@ from bridge.run import Change, Run, changed
 from mission.document import Stop
 from mission.events import Paused, Pose, Resumed, Settled, Started, Unconfirmed
 
+HEADING_RAD = math.radians(5.0)
+"""How far a heading may be missed by a mission whose scanner does not see all around."""
 SOMEBODY = "the vehicle's operator"
 """Who gives orders that were not given here."""
 
@@ -93,14 +95,13 @@ def _driven(run: Run, course: Course, sight: Sight, visit: Visit) -> Change | No
     if pose is None:
         reason = "nobody saw where the vehicle stood"
         return _unconfirmed(run, course, None, reason) if left else None
-    stop = course.mission.stops[run.at]
-    away = deviation(pose, stop)
-    if away <= stop.tolerance_m:
-        return runs.reached(changed(run, leg=run.at), course.mission, pose, away)
+    stop, wrong = course.mission.stops[run.at], misplaced(pose, run, course)
+    if not wrong:
+        return runs.reached(changed(run, leg=run.at), course.mission, pose, deviation(pose, stop))
     if left:
-        return runs.failed(_last_try(run, stop), course.mission, _beside(away, stop))
+        return runs.failed(_last_try(run, stop), course.mission, wrong)
     if sight.still or sight.place >= visit.scan:
-        return runs.failed(run, course.mission, _beside(away, stop))
+        return runs.failed(run, course.mission, wrong)
     return None
 
 
@@ -111,11 +112,10 @@ def _settled(run: Run, course: Course, sight: Sight, visit: Visit) -> Change | N
         return None
     if sight.place >= visit.after or sight.pose is None:
         return Change(changed(run, stop_state="SCANNING")) if sight.place >= visit.after else None
-    stop = course.mission.stops[run.at]
-    away = deviation(sight.pose, stop)
-    if away > stop.tolerance_m:
-        return runs.failed(run, course.mission, f"moved while it settled: {_beside(away, stop)}")
-    settled = partial(Settled, stop=stop.id, pose=sight.pose)
+    wrong = misplaced(sight.pose, run, course)
+    if wrong:
+        return runs.failed(run, course.mission, f"moved while it settled: {wrong}")
+    settled = partial(Settled, stop=visit.stop, pose=sight.pose)
     return Change(changed(run, stop_state="SCANNING"), (settled,))
 
 
@@ -221,5 +221,14 @@ def deviation(pose: Pose, stop: Stop) -> float:
     return math.hypot(pose.x - stop.x, pose.y - stop.y)
 
 
-def _beside(away: float, stop: Stop) -> str:
-    return f"{away:.3f} m from the stop, tolerance is {stop.tolerance_m:g} m; the vehicle calls it reached"
+def misplaced(pose: Pose, run: Run, course: Course) -> str:
+    """How the robot stands elsewhere than at its stop, or turned away; empty if it stands there."""
+    stop, away = course.mission.stops[run.at], deviation(pose, course.mission.stops[run.at])
+    if away > stop.tolerance_m:
+        return (
+            f"{away:.3f} m from the stop, tolerance is {stop.tolerance_m:g} m; the vehicle calls it reached"
+        )
+    turned = abs(math.remainder(pose.heading - stop.heading, math.tau))
+    if course.mission.scanner.fov_deg < 360 and turned > HEADING_RAD:
+        return f"turned {math.degrees(turned):.1f}° from the heading that its scanner needs"
+    return ""

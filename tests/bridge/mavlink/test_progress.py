@@ -10,6 +10,7 @@ from bridge.mavlink.progress import Sight, passed_by, steps, taken_over
 from bridge.mavlink.visits import Course, course_of
 from bridge.robots import ScanFailed, ScanResult
 from bridge.run import Run
+from mission.document import ScannerSpec
 from mission.events import AnyEvent, Pose
 from mission.mavlink.translate import translate
 from tests.bridge.mavlink.site import told, tour
@@ -168,3 +169,13 @@ def test_home_is_no_answer_of_a_vehicle_that_drives_forward_only() -> None:
     mine, visit = course(on_failure="home"), course().visits[1]
     far = Pose(x=2.3, y=1.0, heading=0.0)
     assert after(going(), mine, seen(visit.at + 1, pose=far, still=True))[0] == ["Failed S2", "Held"]
+
+
+def test_a_scanner_that_does_not_see_all_around_must_face_the_right_way() -> None:
+    mission = msgspec.structs.replace(tour(), scanner=ScannerSpec(profile="default", range=5.0, fov_deg=90.0))
+    mine = course_of(mission, translate(mission, "generic"))
+    visit, faces = mine.visits[1], mission.stops[1].heading
+    right, wrong = (Pose(x=2.0, y=1.0, heading=faces + off) for off in (0.05, 0.2))
+    assert after(going(), mine, seen(visit.at + 1, pose=right))[0] == ["Arrived S2"]
+    words, run = after(going(), mine, seen(visit.at + 1, pose=wrong, still=True))
+    assert words == ["Failed S2", "Held"] and "11.5°" in run.reason
