@@ -20,8 +20,10 @@ Progress = Callable[[int, int], None]
 
 ONE_BY_ONE = frozenset({"px4"})
 """Source: PX4 ends a transfer when an item is asked for that is neither the next nor the last."""
-STUCK = 8
-"""After so many tries without any item it is asked one by one, in order, as MAVSDK's vehicle wants it."""
+ANY_ORDER = frozenset({"ardupilot"})
+"""Measured: it gives whatever item is asked for."""
+STUCK = 12
+"""After so many tries without any item others are asked one by one, in order, as MAVSDK's vehicle wants it."""
 REFUSALS = 3
 """So many tries that end with one are meant; fewer may have met late answers to something else."""
 LAST_WORDS = 3
@@ -99,8 +101,9 @@ class _Reading:
     @property
     def _stuck(self) -> bool:
         """Whether a vehicle that wants its items asked for in order seems to wait for another one."""
-        since_s = time.monotonic() - self._moved_s
-        return self._pace.window > 1 and self._count is not None and since_s > STUCK * self._pace.again_s
+        if self._pace.window == 1 or self._count is None or self._peer.autopilot in ANY_ORDER:
+            return False
+        return time.monotonic() - self._moved_s > STUCK * self._pace.again_s
 
     def _take(self, message: Message) -> None:
         name = message.get_type()

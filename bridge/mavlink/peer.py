@@ -25,6 +25,8 @@ AGAIN_S = 0.3
 """Between two tries of the same question or order."""
 OTHERS_S = 1.3
 """Every vehicle beats once a second: so long one waits for a second one after the first."""
+KNOCK_S = 0.3
+"""So often a vehicle that is not heard is asked for a heartbeat."""
 BACK_MS = 1_000
 """A clock that goes back by more was started again; by less, two messages changed places."""
 UNSET_ANSWERS = 8
@@ -354,7 +356,7 @@ def found(
     """
     with wire.box("HEARTBEAT") as box:
         wire.beat(beat or station_beat)
-        heard = _heard(box, vehicle, timeout_s)
+        heard = _heard(box, vehicle, timeout_s, lambda: _knock(wire, vehicle, beat or station_beat))
     heartbeat = _meant(wire, heard, vehicle, timeout_s)
     newest = Newest(sender(heartbeat))
     newest.put(heartbeat)
@@ -388,12 +390,15 @@ def enum_name(enum: str, number: int) -> str:
     return str(number) if entry is None else entry.name.removeprefix(f"{enum}_")
 
 
-def _heard(box: Box, vehicle: int | None, timeout_s: float) -> dict[int, Message]:
+def _heard(box: Box, vehicle: int | None, timeout_s: float, knock: Callable[[], None]) -> dict[int, Message]:
     """Heartbeats of autopilots by system id: of the one that is meant, or of all until no other can come."""
     heard: dict[int, Message] = {}
     until = time.monotonic() + timeout_s
-    while (message := box.get(until - time.monotonic())) is not None:
-        if not _of_autopilot(message):
+    while (left_s := until - time.monotonic()) > 0:
+        message = box.get(min(KNOCK_S, left_s))
+        if message is None and not heard:
+            knock()
+        if message is None or not _of_autopilot(message):
             continue
         if not heard and vehicle is None:
             until = min(until, time.monotonic() + OTHERS_S)
@@ -401,6 +406,17 @@ def _heard(box: Box, vehicle: int | None, timeout_s: float) -> dict[int, Message
         if message.get_srcSystem() == vehicle:
             break
     return heard
+
+
+def _knock(wire: Wire, vehicle: int | None, beat: Callable[[], Message]) -> None:
+    """Show that we are here, and ask for a heartbeat: on a bad line one a second may be too few."""
+    wire.send(beat())
+    wire.send(
+        dialect.MAVLink_command_long_message(
+            vehicle or 0, dialect.MAV_COMP_ID_AUTOPILOT1, dialect.MAV_CMD_REQUEST_MESSAGE, 0,
+            dialect.MAVLINK_MSG_ID_HEARTBEAT, 0, 0, 0, 0, 0, 0,
+        )
+    )  # fmt: skip
 
 
 def _of_autopilot(heartbeat: Message) -> bool:

@@ -80,8 +80,10 @@ class UdpOut:
             return []
         try:
             data = self._socket.recv(READ_BYTES)
-        except ConnectionRefusedError:
-            self.gone = "nothing listens there"
+        except BlockingIOError:  # what was ready was an error, and a writer has met it
+            return []
+        except OSError as error:
+            self.gone = _why(error)
             return []
         self.gone = ""
         return [(self._peer, data)]
@@ -89,10 +91,10 @@ class UdpOut:
     def write(self, data: bytes, to: Address | None = None) -> None:
         try:
             self._socket.send(data)
-        except ConnectionRefusedError:
-            self.gone = "nothing listens there"
+        except BlockingIOError:  # there is no room: it is lost, as on any line
+            pass
         except OSError as error:
-            self.gone = error.strerror or str(error)
+            self.gone = _why(error)
 
     def close(self) -> None:
         self._socket.close()
@@ -114,7 +116,7 @@ class UdpIn:
             return []
         try:
             data, peer = self._socket.recvfrom(READ_BYTES)
-        except ConnectionError:  # an earlier datagram came back refused
+        except OSError:  # an earlier datagram came back refused, or the network went down
             return []
         self._peers.pop(peer, None)
         self._peers[peer] = None
@@ -202,6 +204,7 @@ class TcpIn:
     def __init__(self, url: Url) -> None:
         self.gone = ""
         self._listening = socket.socket(_family(url), socket.SOCK_STREAM)
+        self._listening.setblocking(False)
         self._listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         _bind(self._listening, url)
         self._listening.listen()
@@ -340,6 +343,7 @@ def _family(url: Url) -> socket.AddressFamily:
 
 def _datagrams(url: Url) -> socket.socket:
     made = socket.socket(_family(url), socket.SOCK_DGRAM)
+    made.setblocking(False)  # what `select` saw may be gone when it is read
     made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
     return made
 
@@ -351,6 +355,11 @@ def _bind(made: socket.socket, url: Url) -> None:
         made.close()
         why = error.strerror or str(error)
         raise InputError(f"{url}: cannot listen there ({why}); is the port free, the address ours?") from None
+
+
+def _why(error: OSError) -> str:
+    refused = isinstance(error, ConnectionRefusedError)
+    return "nothing listens there" if refused else error.strerror or str(error)
 
 
 def _end(stream: socket.socket) -> None:

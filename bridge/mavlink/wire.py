@@ -108,6 +108,7 @@ class Wire:
         self.dropped: Counter[str] = Counter()
         """What was not for us or no message at all, by reason."""
         self._transport = transport
+        self._ended = ""
         self._key = signing_key
         self._seen = SeenStreams()
         self._sending = self._mav()
@@ -124,7 +125,7 @@ class Wire:
     @property
     def gone(self) -> str:
         """Why nothing passes at the moment; empty if all is well."""
-        return self._transport.gone
+        return self._ended or self._transport.gone
 
     def send(self, message: Message) -> None:
         """Send to the one the message is for, if it is known where that is; else to all."""
@@ -175,10 +176,13 @@ class Wire:
                 self.send(self._beat())
 
     def _read(self) -> None:
-        while not self._closing.is_set():
-            for address, data in self._transport.read(READ_S):
-                for message in self._messages(address, data):
-                    self._take(address, message)
+        try:
+            while not self._closing.is_set():
+                for address, data in self._transport.read(READ_S):
+                    for message in self._messages(address, data):
+                        self._take(address, message)
+        except Exception as error:  # noqa: BLE001 (the end of a thread)
+            self._ended = f"reading ended: {error!r}; please report this"
 
     def _messages(self, address: Address, data: bytes) -> Iterator[Message]:
         parser = self._parsers.get(address)
