@@ -10,14 +10,16 @@ from __future__ import annotations
 import ipaddress
 import json
 import re
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import timedelta
 from typing import Any
 
 import zenoh
 
-from bridge.keys import Keys
+from bridge.keys import Keys, now_utc
 from bridge.link import Answering, Hearing, Presence, Publish, Request
 from mission.errors import InputError
 
@@ -49,8 +51,8 @@ COMMON: dict[str, Any] = {
     "adminspace/enabled": False,
 }
 RETRY = {"period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 1.5}
-RETRY_WITH_KEYS = {"period_init_ms": 1100, "period_max_ms": 1100, "period_increase_factor": 1.0}
-"""A certificate is still taken in the very second it ends in, and a link opened then is not closed again."""
+LAST_SECOND = timedelta(seconds=1)
+"""In which a certificate that has ended is still taken for a new link, which zenoh does not close again."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ def joining(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
     The robot is a router too: a router does not carry between two peers that it takes for neighbours.
     """
     check_endpoint(endpoint, guard, option="--connect")
-    with _opened({"mode": "router", **_reaching(endpoint, guard)}, endpoint, guard) as link:
+    with _opened({"mode": "router", **_reaching(endpoint)}, endpoint, guard) as link:
         yield link
 
 
@@ -94,13 +96,12 @@ def connecting(endpoint: str, guard: Guard = UNGUARDED, *, open_s: float = OPEN_
     """
     check_endpoint(endpoint, guard, option="--connect")
     opening = {"transport/unicast/open_timeout": round(max(LEAST_OPEN_S, open_s) * 1e3)}
-    with _opened({"mode": "peer", **_reaching(endpoint, guard), **opening}, endpoint, guard) as link:
+    with _opened({"mode": "peer", **_reaching(endpoint), **opening}, endpoint, guard) as link:
         yield link
 
 
-def _reaching(endpoint: str, guard: Guard) -> dict[str, Any]:
-    retry = RETRY if guard.keys is None else RETRY_WITH_KEYS
-    return {"connect/endpoints": [endpoint], "listen/endpoints": [], "connect/retry": retry,
+def _reaching(endpoint: str) -> dict[str, Any]:
+    return {"connect/endpoints": [endpoint], "listen/endpoints": [], "connect/retry": RETRY,
             "connect/exit_on_failure": False}  # fmt: skip
 
 
@@ -135,9 +136,26 @@ def _opened(settings: dict[str, Any], endpoint: str, guard: Guard) -> Iterator[Z
     with session:
         link = ZenohLink(session)
         try:
-            yield link
+            with _silent_after(link, guard.keys):
+                yield link
         finally:
             link.close()
+
+
+@contextmanager
+def _silent_after(link: ZenohLink, keys: Keys | None) -> Iterator[None]:
+    """Whoever's keys have ended says and hears nothing more, also on a link of the last second."""
+    if keys is None:
+        yield
+        return
+    left = keys.holder.not_after + LAST_SECOND - now_utc()
+    timer = threading.Timer(left.total_seconds(), link.fall_silent)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 class ZenohLink:
@@ -147,6 +165,15 @@ class ZenohLink:
         self._session = session
         # A token or subscriber that nobody refers to is collected, and gone.
         self._declared: list[Any] = []
+        self._publishers: list[zenoh.Publisher] = []
+        self._lock = threading.Lock()
+        self._silent = False
+
+    def fall_silent(self) -> None:
+        """Be gone for the others, while the session stays open."""
+        self._silent = True
+        with self._lock:
+            _undeclare(self._declared)
 
     def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
         priority = BULK if bulk else PROMPT
@@ -168,8 +195,13 @@ class ZenohLink:
         publisher = self._session.declare_publisher(
             key, encoding=JSON, congestion_control=control, priority=BULK if bulk else PROMPT
         )
-        self._declared.append(publisher)
-        return publisher.put
+        self._publishers.append(publisher)
+
+        def publish(payload: bytes) -> None:
+            if not self._silent:
+                publisher.put(payload)
+
+        return publish
 
     def announce(self, key: str) -> None:
         self._declared.append(self._session.liveliness().declare_token(key))
@@ -184,6 +216,8 @@ class ZenohLink:
         bulk: bool = False,
         signature: bytes = b"",
     ) -> bytes | None:
+        if self._silent:
+            return None
         selector = zenoh.Selector(key, dict(parameters or {}))
         priority = zenoh.Priority.BACKGROUND if bulk else zenoh.Priority.INTERACTIVE_HIGH
         replies = self._session.get(
@@ -225,9 +259,14 @@ class ZenohLink:
         self._declared.append(self._session.liveliness().declare_subscriber(key, noticed, history=True))
 
     def close(self) -> None:
-        for declared in reversed(self._declared):
-            declared.undeclare()
-        self._declared.clear()
+        with self._lock:
+            _undeclare(self._declared)
+            _undeclare(self._publishers)
+
+
+def _undeclare(declared: list[Any]) -> None:
+    while declared:
+        declared.pop().undeclare()
 
 
 def check_endpoint(endpoint: str, guard: Guard, *, option: str) -> None:
