@@ -74,7 +74,8 @@ def robot(
     *,
     name: Annotated[str | None, typer.Option("--name", help="Name of this robot.")] = None,
     state: Annotated[
-        Path | None, typer.Option("--state", metavar="DIR", help="Its journal; one per robot.")
+        Path | None,
+        typer.Option("--state", metavar="DIR", help="Its journal, or a vehicle's items; one per robot."),
     ] = None,
     listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where to listen.")] = DEFAULT_ENDPOINT,
     connect: Annotated[
@@ -113,7 +114,10 @@ def robot(
     ] = None,
     profile: Annotated[
         str | None,
-        typer.Option(metavar="strict|ardupilot|px4", help="The autopilot whose habits the vehicle has."),
+        typer.Option(
+            metavar="strict|ardupilot|px4",
+            help="The autopilot whose habits the vehicle has; strict if not given.",
+        ),
     ] = None,
     origin: Annotated[
         str | None,
