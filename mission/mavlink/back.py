@@ -7,6 +7,7 @@ something is waited for or triggered are stops, those between are corners of the
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -81,8 +82,9 @@ def recognise(
     ids = dict(zip(stops, _ids([groups[at] for at in stops], mission), strict=True))
     placed: list[Placed] = []
     for at, group in enumerate(groups):
-        ahead = next((stop for stop in stops if stop >= at), None)
-        placed.extend(_placed(group, here=at in ids, stop=None if ahead is None else ids[ahead]))
+        ahead = bisect_left(stops, at)
+        stop = ids[stops[ahead]] if ahead < len(stops) else None
+        placed.extend(_placed(group, here=at in ids, stop=stop))
     return tuple(placed)
 
 

@@ -98,7 +98,7 @@ def _int16(value: int) -> int:
 
 def _centimetres(metres: float) -> float:
     """Measured: z is truncated to whole centimetres, in float32 (metres × 100, then × 0.01)."""
-    if not math.isfinite(metres):
+    if not math.isfinite(float32(metres * 100.0)):
         return metres
     return float32(int(float32(metres * 100.0)) * float32(0.01))
 

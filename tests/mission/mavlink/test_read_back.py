@@ -113,7 +113,9 @@ def test_ardupilot_maps_frames(sent, kept):
     assert ardupilot_keeps(waypoint(0, 0, 0, 0, frame=sent)).frame == kept
 
 
-@pytest.mark.parametrize(("sent", "kept"), [(1.239, 1.23), (-1.239, -1.23), (0.0, 0.0), (488.0, 488.0)])
+@pytest.mark.parametrize(
+    ("sent", "kept"), [(1.239, 1.23), (-1.239, -1.23), (0.0, 0.0), (488.0, 488.0), (3.4e37, 3.4e37)]
+)
 def test_ardupilot_keeps_whole_centimetres(sent, kept):
     assert ardupilot_keeps(waypoint(0, 0, 0, 0, z=sent)).z == pytest.approx(kept, rel=1e-6)
 
