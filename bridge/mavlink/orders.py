@@ -39,6 +39,10 @@ ORDERING_NS = 20 * 10**9
 """One step of an order takes no longer; then what the vehicle does counts as somebody else's again."""
 DRIVING = ("start", "resume", "retry")
 NOWHERE = Pose(x=math.inf, y=math.inf, heading=0.0)
+UNREMEMBERED = (
+    "nothing is remembered of a mission pushed to this vehicle; push one by this very URL,"
+    " or name the folder of that push with --state"
+)
 HOMEWARD = (
     "an autopilot in AUTO drives its list forward only, and nobody planned a way back from here; the"
     " return of a mission is driven at its end. Run by stopgo robot --controller mavlink:URL it can"
@@ -126,23 +130,23 @@ class Orders:
         return Refused("wrong_origin", wrong + satellites) if wrong else None
 
     def _decided(self, command: Command) -> Decision | Refused:
-        course, run = self._book.course, self._book.run
-        elsewhere = None if course is None or command.verb not in DRIVING else self._elsewhere(course)
+        course, run, here = self._book.course, self._book.run, self._lookout.pose
+        if course is None:
+            return Refused("no_mission", UNREMEMBERED)
+        elsewhere = self._elsewhere(course) if command.verb in DRIVING else None
         if elsewhere is not None:
             return elsewhere
-        here = self._lookout.pose
-        mission = None if course is None else course.mission
-        if here is None and mission is not None and command.verb not in FREE_VERBS:
+        if here is None and command.verb not in FREE_VERBS:
             return Refused("no_position", "the vehicle does not tell where it is; does its navigation run?")
-        if here is not None and course is not None and command.verb != "start":
+        if here is not None and command.verb != "start":
             here = on_way(run, course, here)
-        return decide(command, self._situation(run, mission, here or NOWHERE))
+        return decide(command, self._situation(run, course.mission, here or NOWHERE))
 
-    def _situation(self, run: Run, mission: Mission | None, pose: Pose) -> Situation:
+    def _situation(self, run: Run, mission: Mission, pose: Pose) -> Situation:
         journal = self._book.journal
         return Situation(
             run=run, mission=mission,
-            has_run=mission is not None and journal.has_run(mission.id, mission.revision),
+            has_run=journal.has_run(mission.id, mission.revision),
             pose=pose, now_ns=self._book.clock.now_ns(), command_ns=self._wall.now_ns(),
             new_run_id=uuid.uuid4().hex[:12], lease=journal.fact("lease", Lease),
             battery=self._lookout.battery, endurance_s=None,
