@@ -23,7 +23,7 @@ ONE_BY_ONE = frozenset({"px4"})
 ANY_ORDER = frozenset({"ardupilot"})
 """Measured: it gives whatever item is asked for."""
 STUCK = 12
-"""After so many tries without any item others are asked one by one, in order, as MAVSDK's vehicle wants it."""
+"""After so many tries without an item others are asked one by one, in order: MAVSDK's vehicle wants it so."""
 REFUSALS = 3
 """So many tries that end with one are meant; fewer may have met late answers to something else."""
 LAST_WORDS = 3

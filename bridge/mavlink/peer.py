@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 
@@ -27,6 +27,7 @@ OTHERS_S = 1.3
 """Every vehicle beats once a second: so long one waits for a second one after the first."""
 KNOCK_S = 0.3
 """So often a vehicle that is not heard is asked for a heartbeat."""
+CLOCKS = (dialect.MAVLINK_MSG_ID_SYSTEM_TIME, dialect.MAVLINK_MSG_ID_ATTITUDE)
 BACK_MS = 1_000
 """A clock that goes back by more was started again; by less, two messages changed places."""
 UNSET_ANSWERS = 8
@@ -81,6 +82,8 @@ class Newest(Box):
         self.boots = 0
         self.heard_s = time.monotonic()
         self.messages: dict[str, Message] = {}
+        self.clock: int | None = None
+        """Number of the message that last told the time since its boot."""
         self._boot_ms = 0
 
     def put(self, message: Message) -> None:
@@ -88,6 +91,7 @@ class Newest(Box):
         self.messages[message.get_type()] = message
         now_ms = getattr(message, "time_boot_ms", None)
         if now_ms is not None:
+            self.clock = message.get_msgId()
             self._count_boots(now_ms)
 
     def _count_boots(self, now_ms: int) -> None:
@@ -138,6 +142,17 @@ class Peer:
     def boots(self) -> int:
         """How often it was started again since it was found, as far as its clock tells."""
         return self._newest.boots
+
+    def ask_clock(self) -> None:
+        """Ask for its clock, by the messages of which most have one; `boots` follows."""
+        for number in CLOCKS:
+            self.request(number)
+
+    def clock_seen(self, *, patience_s: float) -> None:
+        """Wait for the time since its boot, of a vehicle that has told it before."""
+        if self._newest.clock is not None:
+            with suppress(RobotUnreachable):
+                self.ask(self._newest.clock, patience_s=patience_s)
 
     def newest(self, name: str) -> Message | None:
         """Its last message of a type, whenever that came."""

@@ -96,7 +96,6 @@ class _Sending:
 
     def run(self) -> Ended:
         with self._peer.box(*HEARD) as box:
-            self._ask_time()
             self._send_count()
             while (ended := self._over()) is None:
                 message = box.get(self._moved_s + self._pace.again_s - time.monotonic())
@@ -203,15 +202,11 @@ class _Sending:
             return
         self._unanswered += 1
         if self._unanswered % TIME_EACH == 0:
-            self._ask_time()
+            self._peer.ask_clock()  # was it started again?
         self._send_window()
         if self._all_sent and (self._silence.seconds > PROBE_S or self._unanswered >= PROBE_AFTER):
             self._probed = True
             self._peer.send(list_request(self._peer.who))
-
-    def _ask_time(self) -> None:
-        """Its clock tells whether it was started again; nobody waits for the answer."""
-        self._peer.request(dialect.MAVLINK_MSG_ID_SYSTEM_TIME)
 
     def _send_count(self) -> None:
         self._note_sent(-1)

@@ -23,6 +23,8 @@ from mission.mavlink.items import Item, ItemList
 
 ATTEMPTS = 4
 """Whole transfers, where the vehicle ended one or the read-back was not what was sent."""
+CLOCK_S = 2.0
+"""For the vehicle's clock after an upload."""
 SHOWN = 3
 """Differences that an error names."""
 
@@ -75,6 +77,8 @@ def upload(
         If what it holds is not known.
     """
     check_standing(peer, while_running)
+    peer.ask_clock()
+    boots = peer.boots
     before = download(peer)
     if not differences(sent, before):
         return Uploaded(len(sent.items), already=True)
@@ -85,9 +89,15 @@ def upload(
         if tell is not None:
             tell(f"the upload was cancelled; {left_on(peer, before).words}")
         raise
-    if failure is None:
-        return Uploaded(len(sent.items), already=False)
-    raise _error(peer, failure, before)
+    if failure is not None:
+        raise _error(peer, failure, before)
+    peer.clock_seen(patience_s=CLOCK_S)
+    if peer.boots != boots:
+        raise AnswerIsNo(
+            f"{peer} was started again during the upload, and may have lost its origin; it holds the "
+            "mission: push it again to have the origin checked"
+        )
+    return Uploaded(len(sent.items), already=False)
 
 
 def clear(peer: Peer, *, while_running: bool = False) -> int:
