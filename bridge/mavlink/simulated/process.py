@@ -54,13 +54,22 @@ def run_vehicle(options: VehicleOptions, ready: Callable[[Url], None]) -> None:
     with vehicle_on(url, setting_of(options), speed_up=options.speed_up, signing_key=key) as stopped:
         ready(url)
         stopped.wait()
+    if stopped.error is not None:
+        raise stopped.error
     raise SystemExit(1)  # its thread has told why
+
+
+class Stopped(threading.Event):
+    """Set when a vehicle has stopped, by itself or because it was to."""
+
+    error: OSError | None = None
+    """What the disk said when its state could not be kept."""
 
 
 @contextmanager
 def vehicle_on(
     url: Url, setting: Setting, *, speed_up: float = 1.0, signing_key: bytes | None = None
-) -> Iterator[threading.Event]:
+) -> Iterator[Stopped]:
     """A vehicle at `url` while the block runs; the event tells that it has stopped by itself.
 
     Raises
@@ -72,7 +81,7 @@ def vehicle_on(
     line = on_line(open_transport(url), setting.faults)
     with closing(Wire(line, me=VEHICLE, signing_key=key)) as wire:
         vehicle = Vehicle(setting, clock=WallClock(speed_up=speed_up), wall=WallClock(), say=wire.send)
-        stop, stopped = threading.Event(), threading.Event()
+        stop, stopped = threading.Event(), Stopped()
         thread = threading.Thread(target=_live, args=(vehicle, wire, stop, stopped), daemon=True)
         thread.start()
         try:
@@ -82,7 +91,7 @@ def vehicle_on(
             thread.join()
 
 
-def _live(vehicle: Vehicle, wire: Wire, stop: threading.Event, stopped: threading.Event) -> None:
+def _live(vehicle: Vehicle, wire: Wire, stop: threading.Event, stopped: Stopped) -> None:
     try:
         with wire.box() as box:
             while not stop.is_set():
@@ -91,8 +100,10 @@ def _live(vehicle: Vehicle, wire: Wire, stop: threading.Event, stopped: threadin
                     vehicle.advance()
                 else:
                     vehicle.receive(message)
-    finally:
         vehicle.rest()
+    except OSError as error:
+        stopped.error = error
+    finally:
         stopped.set()
 
 

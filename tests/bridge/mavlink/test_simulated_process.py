@@ -111,6 +111,21 @@ def test_a_vehicle_that_is_killed_and_started_again_keeps_its_items(tmp_path: Pa
             assert running.wait(PATIENCE_S) == 0
 
 
+def test_a_vehicle_that_cannot_keep_its_state_ends_and_says_so(tmp_path: Path) -> None:
+    port, state = free_udp_port(), tmp_path / "v"
+    with (
+        wire(there(port)) as station,
+        process("--mavlink-vehicle", str(here(port)), "--state", str(state)) as running,
+    ):
+        state.rmdir()
+        state.touch()
+        station.send(dialect.MAVLink_mission_clear_all_message(1, 1, 0))
+        assert running.wait(PATIENCE_S) == 2
+        assert running.stderr is not None
+        (line,) = running.stderr.read().splitlines()
+        assert str(state) in line
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
