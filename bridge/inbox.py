@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import sqlite3
 from collections.abc import Iterator
+from itertools import islice
 
 import msgspec
 
@@ -29,9 +29,10 @@ from bridge.protocol import (
     decode,
 )
 from mission.document import Mission, digest_of
+from mission.sense import problems_of
 
-ON_LEG_M = 0.01
-"""How far the end of an approach may lie from its stop."""
+MOST_REASONS = 20
+"""Reasons told of one mission that cannot be run."""
 
 
 class Inbox:
@@ -160,39 +161,17 @@ class Inbox:
             manifest.mission_id, manifest.revision, manifest.digest,
         ):  # fmt: skip
             return _no("digest", "the document's id, revision or digest is not the manifest's")
-        wrong = tuple(what_is_wrong(mission, self._profiles))
+        wrong = tuple(islice(what_is_wrong(mission, self._profiles), MOST_REASONS))
         return Rejected(reason="infeasible", messages=wrong) if wrong else mission
 
 
 def what_is_wrong(mission: Mission, profiles: tuple[str, ...] | None) -> Iterator[str]:
     """Why this robot cannot run the mission; nothing if it can."""
-    if not mission.stops:
-        yield "the mission has no stops"
-    seen: set[str] = set()
-    before = (mission.start.x, mission.start.y)
+    yield from map(str, problems_of(mission))
     for stop in mission.stops:
-        if stop.id in seen:
-            yield f"stop {stop.id} is there twice"
-        seen.add(stop.id)
         if profiles is not None and stop.scan.profile not in profiles:
             known = ", ".join(profiles)
             yield f"stop {stop.id}: scan profile {stop.scan.profile!r} is unknown; known: {known}"
-        if not stop.approach:
-            yield f"stop {stop.id} has no approach"
-            continue
-        if (
-            math.dist(stop.approach[0], before) > ON_LEG_M
-            or math.dist(stop.approach[-1], (stop.x, stop.y)) > ON_LEG_M
-        ):
-            yield f"stop {stop.id}: its approach does not lead from the place before to it"
-        before = (stop.x, stop.y)
-    if mission.return_ is not None and (
-        not mission.return_ or math.dist(mission.return_[0], before) > ON_LEG_M
-    ):
-        yield "the return does not begin at the last stop"
-    robot = mission.robot
-    if min(robot.speed, robot.turn_rate, robot.acceleration) <= 0:
-        yield "speed, turn rate and acceleration must be greater than 0"
 
 
 def _no(reason: Reason, message: str) -> Rejected:

@@ -6,7 +6,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 from bridge.follow import Report, Silence
 from bridge.station import Station
@@ -62,10 +62,13 @@ def watch_showing(station: Station, record: Recording | None, showing: Showing) 
         If the run is over and the robot's last state was never heard.
     """
     state: StateReport | None = None
+    known: tuple[str | None, int | None] = (None, None)
     for report in station.reports():
+        plan = _plan_of(report)
+        if plan is not None and plan != known:
+            known = plan
+            _introduce(station, report, record, showing)
         if isinstance(report, StateReport):
-            if report.run_id and (state is None or _other_plan(state, report)):
-                _introduce(station, report, record, showing)
             state = report
         if record is not None:
             hand_over(record, report)
@@ -75,14 +78,19 @@ def watch_showing(station: Station, record: Recording | None, showing: Showing) 
     return state
 
 
-def _other_plan(before: StateReport, now: StateReport) -> bool:
-    """Whether another run has begun, or the run goes on by a new revision."""
-    return (before.run_id, before.revision) != (now.run_id, now.revision)
+def _plan_of(report: Report) -> tuple[str | None, int | None] | None:
+    """Run and revision that a state or an event is of; none before a run.
+
+    Events tell of every revision in turn; a state may come when two have passed.
+    """
+    if isinstance(report, PoseReport | Silence) or not report.run_id:
+        return None
+    return report.run_id, report.revision
 
 
-def _introduce(station: Station, state: StateReport, record: Recording | None, showing: Showing) -> None:
+def _introduce(station: Station, report: Any, record: Recording | None, showing: Showing) -> None:
     """Fetch the mission that is run, so that it can be drawn and counted down."""
-    mission = station.mission(state.mission_id or "", state.revision or 0)
+    mission = station.mission(report.mission_id or "", report.revision or 0)
     showing.mission(mission)
     if record is not None:
         record.mission(mission)
@@ -217,4 +225,4 @@ def event_line(event: AnyEvent) -> str:
         detail = f"{event.deviation_m * 1000:.0f} mm beside"
     if isinstance(event, Scanned):
         detail = f"{event.file}, {event.points / 1e6:.1f} million points"
-    return f"{event.mission_time_s:8.1f} s  {name:9} {about:6} {detail}".rstrip()
+    return f"{event.mission_time_s:8.1f} s  {name:15} {about:6} {detail}".rstrip()

@@ -107,7 +107,7 @@ def moved(index: int, **details: Any) -> Mission:
 @pytest.mark.parametrize(
     ("revision", "why"),
     [
-        (moved(0, x=2.005), "stop s1 or the way to it"),
+        (moved(0, x=2.0005), "stop s1 or the way to it"),
         (moved(0, id="t1"), "stop s1 or the way to it"),
         (moved(0, approach=((0.0, 0.0), (1.0, 0.5), (2.0, 0.0))), "stop s1 or the way to it"),
         (changed(frame=TURNED), "frame"),

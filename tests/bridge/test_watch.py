@@ -19,9 +19,10 @@ from bridge.link import Switchboard
 from bridge.protocol import Keys
 from bridge.simulator import SimulatedBase, SimulatedScanner
 from bridge.station import Station
-from bridge.watch import Lines, Table, clock, remaining_s, table_lines
+from bridge.watch import Lines, Table, clock, remaining_s, table_lines, watch_showing
+from mission.document import Mission
 from mission.errors import OutcomeUnknown
-from mission.events import PoseReport, Scanned, StateReport
+from mission.events import AnyEvent, PoseReport, Scanned, StateReport
 from mission.schedule import schedule
 from tests.bridge.world import Field, corridor
 
@@ -161,3 +162,32 @@ def test_a_robot_whose_work_has_failed_does_not_look_alive() -> None:
     with agents.on_link(agent), pytest.raises(ZeroDivisionError):
         field.order("start")
         agent.wait()
+
+
+class Taken:
+    """A recording that keeps the revisions it is handed."""
+
+    def __init__(self) -> None:
+        self.revisions: list[int] = []
+
+    def mission(self, mission: Mission) -> None:
+        self.revisions.append(mission.revision)
+
+    def state(self, report: StateReport) -> None: ...
+
+    def pose(self, report: PoseReport) -> None: ...
+
+    def event(self, event: AnyEvent) -> None: ...
+
+
+def test_a_recording_is_handed_every_revision_in_turn_also_when_it_comes_late() -> None:
+    field, record = Field(), Taken()
+    field.station().push(corridor(stops=2))
+    field.order("start")
+    for revision in (2, 3):
+        field.station().push(corridor(stops=1 + revision, revision=revision))
+        while field.controller.run.revision != revision:
+            field.controller.step()
+    field.work()
+    watch_showing(field.station(), record, Lines(lambda line: None))
+    assert record.revisions == [1, 2, 3]
