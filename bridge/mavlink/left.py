@@ -84,6 +84,8 @@ def cancel(peer: Peer) -> None:
 def emptied(peer: Peer) -> bool:
     """Take everything off the vehicle; whether it was seen empty."""
     send_items(peer, (), window=1)
+    if peer.silent_s > peer.patience_s:
+        return False
     if _holds(peer, ()):
         return True
     with peer.box("MISSION_ACK") as box:
