@@ -12,7 +12,7 @@ from bridge import run as runs
 from bridge.mavlink import progress
 from bridge.mavlink.download import download
 from bridge.mavlink.hands import Denied, Hands
-from bridge.mavlink.logbook import Logbook, Ordered, Owed
+from bridge.mavlink.logbook import BACK_NS, Logbook, Ordered, Owed
 from bridge.mavlink.lookout import CLOCKS, Lookout
 from bridge.mavlink.modes import AUTO
 from bridge.mavlink.peer import Peer
@@ -131,9 +131,10 @@ class Follower:
 
     def _look_at_clock(self) -> None:
         """A vehicle that was started anew stands, and has forgotten its mode, origin and item."""
+        began_ns, before_ms = self._lookout.began_ns, self._book.boot_ms
         self._book.boot_ms = self._lookout.boot_ms
-        began_ns = self._lookout.began_ns
-        if self._looks_only or began_ns is None or not self._book.booted(began_ns):
+        went_back = self._book.boot_ms * 10**6 + BACK_NS < before_ms * 10**6
+        if self._looks_only or began_ns is None or not self._book.booted(began_ns, went_back=went_back):
             return
         self._hands.ask_for_telemetry()
         self.run = self._book.move(_rebooted)

@@ -34,6 +34,10 @@ REBOOT_NS = 5 * 10**9
 """A vehicle whose clock began so much later than it was known to was started anew."""
 
 
+BACK_NS = 10**9
+"""By so much its clock goes back only when it is started anew."""
+
+
 class Sent(msgspec.Struct, frozen=True, kw_only=True):
     """The list by which the vehicle was sent its mission."""
 
@@ -125,14 +129,17 @@ class Logbook:
         boot = self.journal.fact("boot", Boot)
         return boot.boot_id if boot else "unknown"
 
-    def booted(self, began_ns: int) -> bool:
-        """Told when the vehicle's clock began: whether it was started anew since anybody last looked."""
-        boot = self.journal.fact("boot", Boot)
-        if boot is not None and boot.began_ns <= began_ns <= boot.began_ns + REBOOT_NS:
+    def booted(self, began_ns: int, *, went_back: bool = False) -> bool:
+        """Told when the vehicle's clock began: whether it was started anew since anybody last looked.
+
+        A clock that was seen to go back is believed sooner.
+        """
+        boot, slack_ns = self.journal.fact("boot", Boot), BACK_NS if went_back else REBOOT_NS
+        if boot is not None and boot.began_ns <= began_ns <= boot.began_ns + slack_ns:
             return False
         with self.journal.transaction():
             boot = self.journal.fact("boot", Boot)
-            anew = boot is None or began_ns > boot.began_ns + REBOOT_NS
+            anew = boot is None or began_ns > boot.began_ns + slack_ns
             boot_id = uuid.uuid4().hex[:12] if boot is None or anew else boot.boot_id
             self.journal.store_fact("boot", Boot(boot_id=boot_id, began_ns=began_ns))
         return anew and boot is not None
