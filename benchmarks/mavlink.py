@@ -32,6 +32,7 @@ from tests.bridge.mavlink.scripted import free_udp_port
 
 DELAY_S = 0.02
 RATES = (0.0, 0.05, 0.1, 0.2, 0.3)
+LONG_RATES = (0.0, 0.1, 0.3)
 KINDS = {"ardupilot": "ardupilot", "px4": "px4", "strict": "generic"}
 """Autopilot of each profile of the simulated vehicle."""
 HEAD = ("vehicle", "items", "loss each way", "succeeded", "median s", "least s", "most s")
@@ -45,6 +46,8 @@ class Outcome:
     seconds: float
 
 
+Row = list[Any]
+"""A row of the tables, as in `HEAD`."""
 Run = Callable[[str, ItemList, float, int], Outcome]
 """Of a profile, with a list, at a rate of loss and from a seed."""
 
@@ -56,26 +59,41 @@ def main() -> None:
     given = options.parse_args()
     seeds, few = range(given.seeds), range(given.peer_seeds)
     ours = [row for profile in KINDS for row in rows(profile, sent, 50, RATES, seeds)]
-    ours += rows("ardupilot", sent, 325, (0.0, 0.1, 0.3), few)
-    read = rows("ardupilot", fetched, 50, RATES, seeds) + rows(
-        "ardupilot", fetched, 325, (0.0, 0.1, 0.3), few
-    )
+    long = rows("ardupilot", sent, 325, LONG_RATES, few)
+    read = rows("ardupilot", fetched, 50, RATES, seeds) + rows("ardupilot", fetched, 325, LONG_RATES, few)
     theirs = rows("strict", sent_by_mavsdk, 50, RATES, few)
+    print(written(ours + long, read, theirs))
+
+
+def written(ours: list[Row], read: list[Row], theirs: list[Row]) -> str:
+    """The section of the README, which is also put there."""
+    beside = [(*row, share_of(row, ours)) for row in theirs]
     text = "\n\n".join((
-        "`push`: what the vehicle held is read, the mission sent, read back and compared.",
+        "Lists of waypoint and delay over UDP, 20 ms each way, the simulated vehicle in the same process; each "
+        "run has a seed and an empty vehicle of its own. A run has succeeded if the vehicle, asked over a clean "
+        "line, then holds every item as its kind keeps it; seconds are of the runs that did. "
+        + versions("mavsdk", "pymavlink"),
+        "`push` reads what the vehicle held, sends, reads back and compares:",
         table(HEAD, ours),
-        "`fetch-mission`:",
+        "PX4 gives its items only one after another, so a read-back takes a round trip for each (4 s here).",
+        "`fetch-mission` reads:",
         table(HEAD, read),
-        f"MAVSDK's client, {given.peer_seeds} runs each, on the same lines: it sends and does not read back.",
-        table(HEAD, theirs),
-        versions("mavsdk", "pymavlink"),
+        "MAVSDK's own client (`mission_raw`) on the same lines in the same run; it sends, and does not read back. "
+        "The last column is our median for the same vehicle and loss, read-back included, over its median:",
+        table((*HEAD, "ours ÷ theirs"), beside),
     ))  # fmt: skip
     put("mavlink", text)
+    return text
 
 
-def rows(
-    profile: str, run: Run, stop_count: int, rates: Sequence[float], seeds: Sequence[int]
-) -> list[list[object]]:
+def share_of(row: Row, ours: list[Row]) -> object:
+    """Our median over theirs, for the same vehicle, items and loss."""
+    same = next(one for one in ours if one[:3] == row[:3])
+    both = isinstance(same[4], float) and isinstance(row[4], float)
+    return f"{same[4] / row[4]:.2f}" if both else "-"
+
+
+def rows(profile: str, run: Run, stop_count: int, rates: Sequence[float], seeds: Sequence[int]) -> list[Row]:
     """One row of the table for each rate of loss."""
     made = []
     for rate in rates:
@@ -87,7 +105,7 @@ def rows(
     return made
 
 
-def told(outcomes: Sequence[Outcome]) -> list[object]:
+def told(outcomes: Sequence[Outcome]) -> Row:
     right = [outcome.seconds for outcome in outcomes if outcome.right]
     share = f"{len(right)} of {len(outcomes)}"
     if not right:
