@@ -70,13 +70,13 @@ class _Reading:
         self._next = 0
         self._lists = 0
         """How often the list was asked for."""
-        self._began_s = self._moved_s = time.monotonic()
+        self._listed_s = self._moved_s = time.monotonic()
         """When the last item came that was not there."""
         self._asked_s: dict[int, float] = {}
         """When each item that is under way was asked for last."""
         self._asked_again: set[int] = set()
         self._refused = False
-        """Whether something was refused since the last item came; one by one, since the last try."""
+        """Whether something was refused since the last try, or, if items may be wanted in order, item."""
         self._refusals = 0
         self._result = dialect.MAV_MISSION_ACCEPTED
 
@@ -101,9 +101,13 @@ class _Reading:
     @property
     def _stuck(self) -> bool:
         """Whether a vehicle that wants its items asked for in order seems to wait for another one."""
-        if self._pace.window == 1 or self._count is None or self._peer.autopilot in ANY_ORDER:
-            return False
-        return time.monotonic() - self._moved_s > STUCK * self._pace.again_s
+        late = time.monotonic() - self._moved_s > STUCK * self._pace.again_s
+        return late and self._may_want_order
+
+    @property
+    def _may_want_order(self) -> bool:
+        several = self._pace.window > 1 and self._count is not None
+        return several and self._peer.autopilot not in ANY_ORDER
 
     def _take(self, message: Message) -> None:
         name = message.get_type()
@@ -122,8 +126,9 @@ class _Reading:
         if self._count == count:
             return
         self._silence.heard(went_on=True)
-        if self._lists == 1 and self._count is None:
-            self._pace.saw(time.monotonic() - self._began_s)
+        if self._count is None:
+            see = self._pace.saw if self._lists == 1 else self._pace.guessed
+            see(time.monotonic() - self._listed_s)
         self._moved_s = time.monotonic()
         self._count = count
         self.items.clear()
@@ -146,6 +151,7 @@ class _Reading:
 
     def _ask_count(self) -> None:
         self._lists += 1
+        self._listed_s = time.monotonic()
         self._peer.send(list_request(self._peer.who))
 
     def _ask_more(self) -> None:
@@ -165,7 +171,7 @@ class _Reading:
 
     def _again(self) -> None:
         self._refusals += self._refused
-        self._refused = self._refused and self._pace.window > 1
+        self._refused = self._refused and self._may_want_order
         if self._count is None:
             self._pace.waited()
             self._ask_count()

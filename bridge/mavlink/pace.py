@@ -45,6 +45,10 @@ class Pace:
         """A round trip was seen, of something that was sent only once."""
         self._trips.saw(round_trip_s)
 
+    def guessed(self, round_trip_s: float) -> None:
+        """As `saw`, of something that was sent again: better than nothing, and only until better is seen."""
+        self._trips.guess(round_trip_s)
+
     def waited(self) -> None:
         """Nothing came in time: the line may be full, not lossy."""
         self._waits += 1

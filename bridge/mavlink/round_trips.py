@@ -10,6 +10,7 @@ class RoundTrips:
         self.shortest_s: float | None = None
         self._smooth_s = 0.0
         self._deviation_s = 0.0
+        self._guessed = True
 
     @property
     def expected_s(self) -> float | None:
@@ -18,11 +19,20 @@ class RoundTrips:
             return None
         return self._smooth_s + max(4.0 * self._deviation_s, self._smooth_s / 2.0)
 
-    def saw(self, seconds: float) -> None:
+    def guess(self, seconds: float) -> None:
+        """Of something that was sent more than once, since the last time; only until one is seen."""
         if self.shortest_s is None:
-            self.shortest_s, self._smooth_s, self._deviation_s = seconds, seconds, seconds / 2.0
-            return
+            self._begin(seconds)
+
+    def saw(self, seconds: float) -> None:
+        if self._guessed:
+            self._guessed = False
+            return self._begin(seconds)
+        assert self.shortest_s is not None
         self.shortest_s = min(self.shortest_s, seconds)
         off_s = seconds - self._smooth_s
         self._deviation_s += (abs(off_s) - self._deviation_s) / 4.0
         self._smooth_s += off_s / 8.0
+
+    def _begin(self, seconds: float) -> None:
+        self.shortest_s, self._smooth_s, self._deviation_s = seconds, seconds, seconds / 2.0

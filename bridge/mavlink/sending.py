@@ -157,8 +157,9 @@ class _Sending:
         self._push()
 
     def _see_round_trip(self, seq: int) -> None:
-        if seq in self._sent_s and seq not in self._sent_again:
-            self._pace.saw(time.monotonic() - self._sent_s[seq])
+        if seq in self._sent_s:
+            see = self._pace.guessed if seq in self._sent_again else self._pace.saw
+            see(time.monotonic() - self._sent_s[seq])
 
     def _lacks_base(self) -> None:
         """The vehicle says what it waits for: a hint that this was lost, if it can have arrived."""
