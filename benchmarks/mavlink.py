@@ -16,13 +16,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.table import put, table, versions
-from bridge.mavlink.download import download
-from bridge.mavlink.peer import Peer, reached
+from bridge.mavlink.line.peer import Peer, reached
+from bridge.mavlink.line.url import Url
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.upload import upload
-from bridge.mavlink.url import Url
+from bridge.mavlink.transfer.download import download
+from bridge.mavlink.transfer.upload import upload
 from mission.errors import StopgoError
 from mission.mavlink.autopilots import differences, upload_of
 from mission.mavlink.items import ItemList

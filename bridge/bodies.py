@@ -17,7 +17,7 @@ from mission.errors import InputError
 from mission.events import Pose
 
 if TYPE_CHECKING:
-    from bridge.mavlink.scanner import Trigger
+    from bridge.mavlink.gateway.scanner import Trigger
 
 MAVLINK = "mavlink:"
 
@@ -79,11 +79,11 @@ class AutopilotBody:
 
     @contextmanager
     def __call__(self, clock: Clock) -> Iterator[Body]:
-        from bridge.mavlink.autopilot import on_board
-        from bridge.mavlink.base import MavlinkBase
-        from bridge.mavlink.scanner import MavlinkScanner
-        from bridge.mavlink.url import check_guarded, read_url
-        from bridge.mavlink.wire import read_signing_key
+        from bridge.mavlink.gateway.autopilot import on_board
+        from bridge.mavlink.gateway.base import MavlinkBase
+        from bridge.mavlink.gateway.scanner import MavlinkScanner
+        from bridge.mavlink.line.url import check_guarded, read_url
+        from bridge.mavlink.line.wire import read_signing_key
 
         url = read_url(self.url, "--controller")
         key = None if self.signing_key is None else read_signing_key(self.signing_key)

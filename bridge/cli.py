@@ -30,7 +30,7 @@ from bridge.ways import (
 from mission.errors import InputError
 
 if TYPE_CHECKING:
-    from bridge.mavlink.scanner import Trigger
+    from bridge.mavlink.gateway.scanner import Trigger
     from bridge.revision import RevisionPolicy
     from bridge.watch import Recording
     from mission.document import Mission, Transform
@@ -211,7 +211,7 @@ def read_revisions(text: str) -> RevisionPolicy:
 
 def read_trigger(text: str) -> Trigger:
     """What makes an autopilot's scanner scan."""
-    from bridge.mavlink.scanner import TRIGGERS
+    from bridge.mavlink.gateway.scanner import TRIGGERS
 
     known = next((trigger for trigger in TRIGGERS if trigger == text), None)
     if known is None:

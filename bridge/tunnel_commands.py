@@ -12,9 +12,9 @@ from bridge.console import say
 from bridge.ways import DEFAULT_ENDPOINT, Connect, Insecure, KeyFolder, RobotName, Site
 
 if TYPE_CHECKING:
-    from bridge.mavlink.transport import Transport
+    from bridge.mavlink.line.transport import Transport
+    from bridge.mavlink.line.wire import Message
     from bridge.mavlink.tunnel import Tunnel
-    from bridge.mavlink.wire import Message
 
 SAY_EVERY_S = 1.0
 """A ground program that asks again and again need not be told each time."""
@@ -58,8 +58,8 @@ def tunnel_robot(
     """
     from bridge.access import access_control
     from bridge.mavlink.harmless import Harmless
+    from bridge.mavlink.line.url import read_url
     from bridge.mavlink.tunnel import open_tunnel
-    from bridge.mavlink.url import read_url
     from bridge.protocol import Keys
     from bridge.robot import robots_keys
     from bridge.zenoh_link import Guard, joining, listening
@@ -126,7 +126,7 @@ class Refusals:
     def told(self, message: Message) -> bytes:
         """A STATUSTEXT that tells of it, or nothing if that was told a moment ago."""
         from bridge.mavlink.harmless import described
-        from bridge.mavlink.wire import dialect
+        from bridge.mavlink.line.wire import dialect
 
         what, now = described(message), time.monotonic()
         if now - self._said.get(what, -SAY_EVERY_S) < SAY_EVERY_S:
@@ -142,8 +142,8 @@ class Refusals:
 
 def _transport(mavlink: str, insecure: bool) -> Transport:
     """The MAVLink side: on this machine, or elsewhere if that is wanted, for nothing is signed here."""
-    from bridge.mavlink.transport import open_transport
-    from bridge.mavlink.url import check_guarded, read_url
+    from bridge.mavlink.line.transport import open_transport
+    from bridge.mavlink.line.url import check_guarded, read_url
 
     url = read_url(mavlink)
     check_guarded(url, signed=False, insecure=insecure)

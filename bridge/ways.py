@@ -181,10 +181,10 @@ def reached(way: Way) -> AbstractContextManager[Station]:
 
 
 def _vehicle(way: Way, mavlink: Mavlink) -> AbstractContextManager[Station]:
-    from bridge.mavlink.desk import Options, connect
-    from bridge.mavlink.orders import Consent
-    from bridge.mavlink.url import check_guarded, read_url
-    from bridge.mavlink.wire import read_signing_key
+    from bridge.mavlink.desk.desk import Options, connect
+    from bridge.mavlink.desk.orders import Consent
+    from bridge.mavlink.line.url import check_guarded, read_url
+    from bridge.mavlink.line.wire import read_signing_key
 
     url = read_url(mavlink.url)
     key = None if mavlink.signing_key is None else read_signing_key(mavlink.signing_key)

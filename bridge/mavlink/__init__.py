@@ -1,4 +1,6 @@
-"""MAVLink: the mission protocol, a run of it by an autopilot, and a vehicle that exists only as numbers.
+"""MAVLink, by what is done over it.
 
-`url` and `wire` are the edge: bytes, sockets, signatures. Everything behind them speaks in messages.
+`line` reaches a vehicle; `transfer` puts a mission onto it; `desk` follows and orders the autopilot that runs
+it; `gateway` drives an autopilot as a robot's base; `tunnel` carries frames elsewhere; `simulated` is a
+vehicle that exists only as numbers.
 """

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from bridge.console import Bar, print_json, say
-from bridge.mavlink.download import download
-from bridge.mavlink.left import own_items
-from bridge.mavlink.logbook import logbook, remember
-from bridge.mavlink.origin import check_origin
-from bridge.mavlink.peer import Origin, Peer, reached
-from bridge.mavlink.upload import Uploaded, check_standing, clear, upload
-from bridge.mavlink.url import Url, check_guarded, read_url
-from bridge.mavlink.wire import read_signing_key
+from bridge.mavlink.desk.logbook import logbook, remember
+from bridge.mavlink.line.origin import check_origin
+from bridge.mavlink.line.peer import Origin, Peer, reached
+from bridge.mavlink.line.url import Url, check_guarded, read_url
+from bridge.mavlink.line.wire import read_signing_key
+from bridge.mavlink.transfer.download import download
+from bridge.mavlink.transfer.left import own_items
+from bridge.mavlink.transfer.upload import Uploaded, check_standing, clear, upload
 from mission.document import Mission, SiteOrigin
 from mission.errors import InputError
 from mission.files.atomic import write_atomic

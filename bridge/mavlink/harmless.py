@@ -6,9 +6,9 @@ commander's lease would count. To stop a vehicle must always be possible.
 
 from __future__ import annotations
 
-from bridge.mavlink.driving import DRIVING, Driving
-from bridge.mavlink.peer import autopilot_of, enum_name
-from bridge.mavlink.wire import Message, dialect
+from bridge.mavlink.gateway.driving import DRIVING, Driving
+from bridge.mavlink.line.peer import autopilot_of, enum_name
+from bridge.mavlink.line.wire import Message, dialect
 
 LOOKS = frozenset({
     "HEARTBEAT", "PING", "TIMESYNC", "SYSTEM_TIME", "COMMAND_CANCEL",

@@ -17,8 +17,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from bridge.link import Link
-from bridge.mavlink.transport import Address, Transport
-from bridge.mavlink.wire import Message, dialect
+from bridge.mavlink.line.transport import Address, Transport
+from bridge.mavlink.line.wire import Message, dialect
 
 QUEUE = 500
 """Frames that wait in one direction: some seconds of a talkative vehicle."""

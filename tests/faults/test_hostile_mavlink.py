@@ -7,11 +7,11 @@ import socket
 
 import pytest
 
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import Message, Wire, dialect, wire
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.url import Url
-from bridge.mavlink.wire import Message, Wire, dialect, wire
 from tests.bridge.mavlink.bench import ACCEPTED, ORIGIN, Bench, delay, waypoint
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.scripted import free_udp_port

@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from bridge.mavlink.line.wire import Message
 from bridge.mavlink.simulated.faults import Mishaps
 from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.scanner import Captured, Scanner
 from bridge.mavlink.simulated.store import Store
-from bridge.mavlink.wire import Message
 
 
 class Camera:

@@ -7,7 +7,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from bridge.mavlink.wire import Message, Who
+from bridge.mavlink.line.wire import Message, Who
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.items import Item
 from mission.mavlink.keeping import PLACED

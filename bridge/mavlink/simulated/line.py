@@ -8,8 +8,8 @@ import random
 import threading
 import time
 
+from bridge.mavlink.line.transport import Address, Transport
 from bridge.mavlink.simulated.faults import FaultKind, VehicleFaults
-from bridge.mavlink.transport import Address, Transport
 
 
 class RoughLine:

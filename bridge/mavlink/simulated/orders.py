@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from bridge.mavlink.line.wire import Message, Who
 from bridge.mavlink.simulated import telemetry
 from bridge.mavlink.simulated.profile import CUSTOM, ModeName
 from bridge.mavlink.simulated.rover import FAR_M
-from bridge.mavlink.wire import Message, Who
 from mission.document import SiteOrigin
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.items import Command

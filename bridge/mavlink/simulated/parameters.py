@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from bridge.mavlink.line.wire import Message, Who
 from bridge.mavlink.simulated.scanner import DEFAULT_S, LONGEST_S
-from bridge.mavlink.wire import Message, Who
 
 SCAN_TIME = "SIM_SCAN_TIME"
 """Seconds that a scan takes if its trigger does not say."""

@@ -10,15 +10,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge.clock import WallClock
+from bridge.mavlink.line.transport import open_transport
+from bridge.mavlink.line.url import Url, check_guarded, read_url
+from bridge.mavlink.line.wire import Who, Wire, read_signing_key
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.line import on_line
 from bridge.mavlink.simulated.orders import NORTHMOST
 from bridge.mavlink.simulated.profile import profile_named
 from bridge.mavlink.simulated.rover import to_east
 from bridge.mavlink.simulated.vehicle import Setting, Vehicle
-from bridge.mavlink.transport import open_transport
-from bridge.mavlink.url import Url, check_guarded, read_url
-from bridge.mavlink.wire import Who, Wire, read_signing_key
 from mission.document import SiteOrigin
 from mission.errors import InputError
 from mission.events import Pose

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.clock import Clock
+from bridge.mavlink.line.wire import Message
 from bridge.mavlink.simulated.profile import ARMED, CUSTOM
 from bridge.mavlink.simulated.rover import bearing
-from bridge.mavlink.wire import Message
 
 if TYPE_CHECKING:
     from bridge.mavlink.simulated.vehicle import Vehicle

@@ -9,12 +9,12 @@ import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.clock import Clock
+from bridge.mavlink.line.wire import Message, Who
 from bridge.mavlink.simulated.carried import float_message, int_message, item_of
 from bridge.mavlink.simulated.faults import Mishaps
 from bridge.mavlink.simulated.profile import Profile
 from bridge.mavlink.simulated.store import ALL, FENCE, MISSION, RALLY, Items, Store
 from bridge.mavlink.simulated.validate import ACCEPTED, verdict
-from bridge.mavlink.wire import Message, Who
 from mission.mavlink.items import Item
 
 KINDS = (MISSION, FENCE, RALLY)

@@ -9,6 +9,7 @@ from pathlib import Path
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.clock import Clock
+from bridge.mavlink.line.wire import Message, sender
 from bridge.mavlink.simulated import orders, parameters, telemetry
 from bridge.mavlink.simulated.camera import Camera
 from bridge.mavlink.simulated.course import Course, Tells
@@ -19,7 +20,6 @@ from bridge.mavlink.simulated.profile import ModeName, Profile
 from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.store import MISSION, Store
 from bridge.mavlink.simulated.transfers import Transfers
-from bridge.mavlink.wire import Message, sender
 from mission.document import SiteOrigin
 from mission.events import Pose
 from mission.mavlink.autopilots import home_item

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from bridge.clock import SimulatedClock
+from bridge.mavlink.line.wire import Message, Who, dialect
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting, Vehicle
-from bridge.mavlink.wire import Message, Who, dialect
 from mission.document import SiteOrigin
 from mission.events import Pose
 from mission.mavlink.items import Command, Frame, Item

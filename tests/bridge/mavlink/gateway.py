@@ -13,15 +13,15 @@ import msgspec
 from bridge.bodies import AutopilotBody
 from bridge.follow import Report
 from bridge.link import Switchboard
-from bridge.mavlink.driving import DRIVING, Mode
-from bridge.mavlink.peer import Peer, reached
+from bridge.mavlink.gateway.driving import DRIVING, Mode
+from bridge.mavlink.line.peer import Peer, reached
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.simulated.faults import NO_FAULTS, VehicleFaults
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import profile_named
 from bridge.mavlink.simulated.rover import to_east
 from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.url import Url
-from bridge.mavlink.wire import dialect
 from bridge.protocol import Keys
 from bridge.robot import RobotOptions, robot_on
 from bridge.station import Station

@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from bridge.mavlink.url import Url
+from bridge.mavlink.line.url import Url
 
 WAIT_S = 0.05
 

@@ -13,15 +13,15 @@ from typing import Any
 
 import msgspec
 
-from bridge.mavlink.desk import Options, connect
-from bridge.mavlink.logbook import Logbook, logbook, remember
-from bridge.mavlink.orders import Consent
+from bridge.mavlink.desk.desk import Options, connect
+from bridge.mavlink.desk.logbook import Logbook, logbook, remember
+from bridge.mavlink.desk.orders import Consent
+from bridge.mavlink.line.url import Url
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.store import Store
 from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.url import Url
 from bridge.run import Run
 from bridge.station import Station
 from mission.document import Mission, Scan, SiteOrigin, Stop

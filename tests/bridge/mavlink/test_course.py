@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from bridge.mavlink.course import Course, Patience, beside_m
-from bridge.mavlink.local import LocalFrame, apart, local_frame
-from bridge.mavlink.peer import Origin
+from bridge.mavlink.gateway.course import Course, Patience, beside_m
+from bridge.mavlink.gateway.local import LocalFrame, apart, local_frame
+from bridge.mavlink.line.peer import Origin
 from mission.document import SiteOrigin
 
 SITE = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=30.0)

@@ -9,10 +9,10 @@ from typing import Any
 import msgspec
 import pytest
 
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import read_signing_key
 from bridge.mavlink.simulated.faults import VehicleFault, VehicleFaults
 from bridge.mavlink.simulated.rover import Rover as Wheels
-from bridge.mavlink.url import Url
-from bridge.mavlink.wire import read_signing_key
 from mission.document import sealed
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import Arrived, Finished, Held, PoseReport, Scanned

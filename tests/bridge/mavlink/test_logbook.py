@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from bridge.journal import open_journal
-from bridge.mavlink.logbook import Logbook, logbook, name_of, remember, usual_folder
-from bridge.mavlink.url import Url
+from bridge.mavlink.desk.logbook import Logbook, logbook, name_of, remember, usual_folder
+from bridge.mavlink.line.url import Url
 from bridge.run import Change, Run, changed
 from mission.errors import InputError
 from mission.events import Paused

@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from bridge.clock import SimulatedClock
-from bridge.mavlink.driving import DRIVING
-from bridge.mavlink.lookout import Lookout
-from bridge.mavlink.modes import AUTOS, Modes
-from bridge.mavlink.visits import Course, course_of
-from bridge.mavlink.wire import dialect
+from bridge.mavlink.desk.lookout import Lookout
+from bridge.mavlink.desk.visits import Course, course_of
+from bridge.mavlink.gateway.driving import DRIVING
+from bridge.mavlink.line.modes import AUTOS, Modes
+from bridge.mavlink.line.wire import dialect
 from bridge.robots import ScanFailed, ScanResult
 from bridge.run import Run
 from mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic

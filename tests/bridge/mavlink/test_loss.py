@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.mavlink.peer import reached
+from bridge.mavlink.line.peer import reached
+from bridge.mavlink.line.url import Url
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.upload import Uploaded, upload
-from bridge.mavlink.url import Url
+from bridge.mavlink.transfer.upload import Uploaded, upload
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.bridge.mavlink.scripted import free_udp_port

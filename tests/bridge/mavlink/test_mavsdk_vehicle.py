@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.download import download
-from bridge.mavlink.peer import reached
-from bridge.mavlink.upload import Uploaded, clear, upload
-from bridge.mavlink.url import Url
+from bridge.mavlink.line.peer import reached
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.transfer.download import download
+from bridge.mavlink.transfer.upload import Uploaded, clear, upload
 from mission.mavlink.autopilots import differences
 from mission.mavlink.items import Item
 from tests.bridge.mavlink.lists import stops

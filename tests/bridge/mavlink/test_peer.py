@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.mavlink.peer import Origin, found, reached, station_beat
-from bridge.mavlink.url import read_url
-from bridge.mavlink.wire import Message, Who, dialect, wire
+from bridge.mavlink.line.peer import Origin, found, reached, station_beat
+from bridge.mavlink.line.url import read_url
+from bridge.mavlink.line.wire import Message, Who, dialect, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from tests.bridge.mavlink.scripted import Scripted, free_udp_port
 

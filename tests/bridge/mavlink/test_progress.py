@@ -5,9 +5,9 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from bridge.mavlink.onward import onward
-from bridge.mavlink.progress import Sight, passed_by, steps, taken_over
-from bridge.mavlink.visits import Course, course_of
+from bridge.mavlink.desk.onward import onward
+from bridge.mavlink.desk.progress import Sight, passed_by, steps, taken_over
+from bridge.mavlink.desk.visits import Course, course_of
 from bridge.robots import ScanFailed, ScanResult
 from bridge.run import Run
 from mission.document import ScannerSpec

@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.logbook import logbook
-from bridge.mavlink.peer import reached
+from bridge.mavlink.desk.logbook import logbook
+from bridge.mavlink.line.peer import reached
+from bridge.mavlink.line.url import Url
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.url import Url
 from mission.__main__ import main
 from mission.document import Mission, SiteOrigin, sealed
 from mission.files.imports import qgc_plan, qgc_waypoints

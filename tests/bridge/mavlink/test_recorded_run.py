@@ -12,13 +12,13 @@ import pytest
 
 from bridge.clock import SimulatedClock
 from bridge.journal import memory_journal
-from bridge.mavlink.driving import DRIVING
-from bridge.mavlink.follower import Follower
-from bridge.mavlink.logbook import Logbook, remember
-from bridge.mavlink.lookout import Lookout
-from bridge.mavlink.modes import AUTOS, Modes
-from bridge.mavlink.progress import started
-from bridge.mavlink.wire import dialect
+from bridge.mavlink.desk.follower import Follower
+from bridge.mavlink.desk.logbook import Logbook, remember
+from bridge.mavlink.desk.lookout import Lookout
+from bridge.mavlink.desk.progress import started
+from bridge.mavlink.gateway.driving import DRIVING
+from bridge.mavlink.line.modes import AUTOS, Modes
+from bridge.mavlink.line.wire import dialect
 from mission.document import Mission, SiteOrigin
 from mission.events import AnyEvent, Arrived, Failed
 from mission.mavlink.back import recognise

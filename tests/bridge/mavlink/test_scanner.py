@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from bridge.clock import WallClock
-from bridge.mavlink.peer import Ack
-from bridge.mavlink.scanner import MavlinkScanner, read_file_url, stop_of
-from bridge.mavlink.wire import Box, Message, Who, dialect
+from bridge.mavlink.gateway.scanner import MavlinkScanner, read_file_url, stop_of
+from bridge.mavlink.line.peer import Ack
+from bridge.mavlink.line.wire import Box, Message, Who, dialect
 from bridge.robots import ScanFailed, ScanResult
 from mission.document import Scan
 from mission.errors import OutcomeUnknown

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import dialect, wire
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.url import Url
-from bridge.mavlink.wire import dialect, wire
 from mission.mavlink.items import Item
 from tests.bridge.mavlink.bench import HOME, ORIGIN, camera, delay, script, waypoint
 from tests.bridge.mavlink.scripted import free_udp_port

@@ -15,6 +15,9 @@ from pathlib import Path
 
 import pytest
 
+from bridge.mavlink.line.transport import Address
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import Message, Who, Wire, dialect, wire
 from bridge.mavlink.simulated.faults import (
     FAULTS,
     VehicleFault,
@@ -26,9 +29,6 @@ from bridge.mavlink.simulated.process import VehicleOptions, setting_of, vehicle
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.store import Store
 from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.transport import Address
-from bridge.mavlink.url import Url
-from bridge.mavlink.wire import Message, Who, Wire, dialect, wire
 from mission.errors import InputError
 from mission.mavlink.items import Item
 from tests.bridge.mavlink.bench import delay, item_message

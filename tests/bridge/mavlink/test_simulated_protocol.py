@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.simulated.profile import PROFILES
-from bridge.mavlink.wire import dialect
 from mission.mavlink.items import Command, Frame, Item
 from tests.bridge.mavlink.bench import (
     ACCEPTED,

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from bridge.mavlink.line.wire import Message, dialect
 from bridge.mavlink.simulated.process import read_origin
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.rover import to_east
 from bridge.mavlink.simulated.telemetry import MAKERS
-from bridge.mavlink.wire import Message, dialect
 from mission.document import SiteOrigin
 from mission.events import Pose
 from mission.mavlink.items import Command, Frame, Item

@@ -15,11 +15,11 @@ from bridge.keys import init_site, issue, now_utc, read_keys
 from bridge.link import MemoryLink, Switchboard
 from bridge.mavlink import tunnel as tunnels
 from bridge.mavlink.harmless import Harmless
-from bridge.mavlink.peer import Peer, reached
-from bridge.mavlink.transport import Address, open_transport
+from bridge.mavlink.line.peer import Peer, reached
+from bridge.mavlink.line.transport import Address, open_transport
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.tunnel import QUEUE, Frames, Tunnel, open_tunnel
-from bridge.mavlink.url import Url
-from bridge.mavlink.wire import dialect
 from bridge.protocol import Keys
 from bridge.spawn import end_robot, free_port, robot_process, start
 from bridge.zenoh_link import Guard, connecting

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.download import download
-from bridge.mavlink.messages import item_message, item_of
-from bridge.mavlink.origin import check_origin
-from bridge.mavlink.peer import Peer, reached
-from bridge.mavlink.upload import Uploaded, clear, upload
-from bridge.mavlink.wire import Message, Who, dialect
+from bridge.mavlink.line.origin import check_origin
+from bridge.mavlink.line.peer import Peer, reached
+from bridge.mavlink.line.wire import Message, Who, dialect
+from bridge.mavlink.transfer.download import download
+from bridge.mavlink.transfer.messages import item_message, item_of
+from bridge.mavlink.transfer.upload import Uploaded, clear, upload
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import Item

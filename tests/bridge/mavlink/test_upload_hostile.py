@@ -7,14 +7,14 @@ import threading
 
 import pytest
 
-from bridge.mavlink.download import download
-from bridge.mavlink.left import own_items
-from bridge.mavlink.peer import reached
+from bridge.mavlink.line.peer import reached
+from bridge.mavlink.line.url import Url
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.upload import clear, upload
-from bridge.mavlink.url import Url
+from bridge.mavlink.transfer.download import download
+from bridge.mavlink.transfer.left import own_items
+from bridge.mavlink.transfer.upload import clear, upload
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.scripted import free_udp_port

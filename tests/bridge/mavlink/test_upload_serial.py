@@ -13,12 +13,12 @@ from pathlib import Path
 
 import pytest
 
-from bridge.mavlink.peer import reached
+from bridge.mavlink.line.peer import reached
+from bridge.mavlink.line.url import Url
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.upload import Uploaded, upload
-from bridge.mavlink.url import Url
+from bridge.mavlink.transfer.upload import Uploaded, upload
 from mission.errors import OutcomeUnknown
 from tests.bridge.mavlink.lists import stops
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.mavlink.url import Url, check_guarded, read_url
+from bridge.mavlink.line.url import Url, check_guarded, read_url
 from mission.errors import InputError
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.mavlink.url import Url
+from bridge.mavlink.line.url import Url
 from recordings.review import review
 from tests.bridge.mavlink.scripted import free_udp_port
 from tests.bridge.mavlink.site import tour

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from bridge.follow import Silence
-from bridge.mavlink.logbook import remember
-from bridge.mavlink.peer import Peer
-from bridge.mavlink.peer import reached as found_peer
-from bridge.mavlink.wire import dialect
+from bridge.mavlink.desk.logbook import remember
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.peer import reached as found_peer
+from bridge.mavlink.line.wire import dialect
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
 from mission.events import Arrived, Held, Paused, Resumed, Started
 from mission.mavlink.translate import translate
@@ -106,7 +106,7 @@ def test_a_mode_that_somebody_else_chooses_is_told_as_theirs(tmp_path: Path) -> 
 
 
 def test_a_mission_that_somebody_else_changes_holds_the_run(tmp_path: Path) -> None:
-    from bridge.mavlink.upload import upload
+    from bridge.mavlink.transfer.upload import upload
 
     site = Site(tmp_path, "ardupilot")
     short = translate(tour(), "ardupilot", trigger="none")
@@ -206,7 +206,7 @@ def test_a_journal_that_cannot_be_written_ends_the_watch_and_says_why(tmp_path: 
 
 
 def test_a_mission_of_as_many_items_is_seen_to_be_another_when_somebody_starts_it(tmp_path: Path) -> None:
-    from bridge.mavlink.upload import upload
+    from bridge.mavlink.transfer.upload import upload
 
     site = Site(tmp_path, "ardupilot")
     other = translate(tour(settle_s=1.5), "ardupilot")

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.peer import Peer
-from bridge.mavlink.peer import reached as found_peer
-from bridge.mavlink.wire import dialect
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.peer import reached as found_peer
+from bridge.mavlink.line.wire import dialect
 from mission.document import Scan, SiteOrigin
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import Aborted, Pose, Resumed, Started
@@ -153,7 +153,7 @@ def test_the_same_order_again_is_not_carried_out_again(tmp_path: Path) -> None:
 
 
 def test_a_folder_belongs_to_one_vehicle(tmp_path: Path) -> None:
-    from bridge.mavlink.logbook import logbook
+    from bridge.mavlink.desk.logbook import logbook
 
     site = Site(tmp_path, "ardupilot")
     with (

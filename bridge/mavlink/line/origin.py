@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from bridge.mavlink.peer import Origin, Peer
+from bridge.mavlink.line.peer import Origin, Peer
 from mission.document import SiteOrigin
 from mission.errors import AnswerIsNo
 from mission.geodesy import Geodetic, from_geodetic

@@ -18,17 +18,17 @@ from bridge import run as runs
 from bridge.clock import Clock
 from bridge.commands import Decision, Refused, Situation, decide, handed_over
 from bridge.lease import FREE_VERBS
-from bridge.mavlink import progress
-from bridge.mavlink.download import download
-from bridge.mavlink.hands import Denied, Hands
-from bridge.mavlink.local import apart
-from bridge.mavlink.logbook import Logbook, Ordered
-from bridge.mavlink.lookout import Lookout
-from bridge.mavlink.modes import AUTO, HOLD, why_unfit
-from bridge.mavlink.onward import ON_WAY_M, onward, way
-from bridge.mavlink.peer import Peer
-from bridge.mavlink.progress import Sight
-from bridge.mavlink.visits import Course
+from bridge.mavlink.desk import progress
+from bridge.mavlink.desk.hands import Denied, Hands
+from bridge.mavlink.desk.logbook import Logbook, Ordered
+from bridge.mavlink.desk.lookout import Lookout
+from bridge.mavlink.desk.onward import ON_WAY_M, onward, way
+from bridge.mavlink.desk.progress import Sight
+from bridge.mavlink.desk.visits import Course
+from bridge.mavlink.gateway.local import apart
+from bridge.mavlink.line.modes import AUTO, HOLD, why_unfit
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.transfer.download import download
 from bridge.protocol import Answer, Command, Lease, Reason, encode
 from bridge.run import Change, Run
 from mission.document import Mission

@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from bridge.mavlink.url import Kind, Url
+from bridge.mavlink.line.url import Kind, Url
 from mission.errors import InputError, RobotUnreachable
 
 Address = Any

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from bridge import run as runs
-from bridge.mavlink.visits import Course, Visit
+from bridge.mavlink.desk.visits import Course, Visit
 from bridge.robots import ScanFailed, ScanResult
 from bridge.run import Change, Run, changed
 from mission.document import Stop

@@ -8,10 +8,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from bridge.mavlink.messages import ack_message, item_of, item_request, list_request, of_mission, result_name
-from bridge.mavlink.pace import Pace, Silence, window_for
-from bridge.mavlink.peer import Peer
-from bridge.mavlink.wire import Message, dialect
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.wire import Message, dialect
+from bridge.mavlink.transfer.messages import (
+    ack_message,
+    item_of,
+    item_request,
+    list_request,
+    of_mission,
+    result_name,
+)
+from bridge.mavlink.transfer.pace import Pace, Silence, window_for
 from mission.errors import AnswerIsNo, RobotUnreachable
 from mission.mavlink.items import Item
 

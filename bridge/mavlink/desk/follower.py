@@ -9,16 +9,16 @@ from dataclasses import replace
 from functools import partial
 
 from bridge import run as runs
-from bridge.mavlink import progress
-from bridge.mavlink.download import download
-from bridge.mavlink.hands import Denied, Hands
-from bridge.mavlink.logbook import BACK_NS, Logbook, Ordered, Owed
-from bridge.mavlink.lookout import CLOCKS, Lookout
-from bridge.mavlink.modes import AUTO
-from bridge.mavlink.peer import Peer
-from bridge.mavlink.progress import SOMEBODY, Sight, steps, tried_again
-from bridge.mavlink.visits import Course
-from bridge.mavlink.wire import dialect
+from bridge.mavlink.desk import progress
+from bridge.mavlink.desk.hands import Denied, Hands
+from bridge.mavlink.desk.logbook import BACK_NS, Logbook, Ordered, Owed
+from bridge.mavlink.desk.lookout import CLOCKS, Lookout
+from bridge.mavlink.desk.progress import SOMEBODY, Sight, steps, tried_again
+from bridge.mavlink.desk.visits import Course
+from bridge.mavlink.line.modes import AUTO
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.wire import dialect
+from bridge.mavlink.transfer.download import download
 from bridge.run import Change, Run
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.events import Arrived

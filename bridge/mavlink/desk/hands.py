@@ -8,10 +8,10 @@ from contextlib import suppress
 
 from bridge.clock import Clock
 from bridge.commands import Refused
-from bridge.mavlink.lookout import Lookout
-from bridge.mavlink.modes import AUTO, HOLD, Modes
-from bridge.mavlink.peer import Peer
-from bridge.mavlink.wire import dialect
+from bridge.mavlink.desk.lookout import Lookout
+from bridge.mavlink.line.modes import AUTO, HOLD, Modes
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.wire import dialect
 from mission.errors import OutcomeUnknown
 
 SHOWS_S = 5.0

@@ -12,11 +12,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from bridge.mavlink.download import Progress
-from bridge.mavlink.messages import ack_message, count_message, item_message, list_request, of_mission
-from bridge.mavlink.pace import Pace, Silence
-from bridge.mavlink.peer import Peer
-from bridge.mavlink.wire import Message, dialect
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.wire import Message, dialect
+from bridge.mavlink.transfer.download import Progress
+from bridge.mavlink.transfer.messages import (
+    ack_message,
+    count_message,
+    item_message,
+    list_request,
+    of_mission,
+)
+from bridge.mavlink.transfer.pace import Pace, Silence
 from mission.mavlink.items import Item
 
 How = Literal["accepted", "unsure", "refused", "busy", "dropped", "silent", "rebooted"]

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from bridge.mavlink.download import Progress, download
-from bridge.mavlink.left import cancel, emptied, left_on, own_items
-from bridge.mavlink.messages import result_name
-from bridge.mavlink.pace import window_for
-from bridge.mavlink.peer import Peer
-from bridge.mavlink.sending import Ended, send_items
-from bridge.mavlink.wire import dialect
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.wire import dialect
+from bridge.mavlink.transfer.download import Progress, download
+from bridge.mavlink.transfer.left import cancel, emptied, left_on, own_items
+from bridge.mavlink.transfer.messages import result_name
+from bridge.mavlink.transfer.pace import window_for
+from bridge.mavlink.transfer.sending import Ended, send_items
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots import autopilot_named, differences, upload_of
 from mission.mavlink.items import Item, ItemList

@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 from urllib.parse import parse_qs, urlsplit
 
-from bridge.mavlink.visits import Course
-from bridge.mavlink.wire import Message
+from bridge.mavlink.desk.visits import Course
+from bridge.mavlink.line.wire import Message
 from bridge.robots import ScanFailed, ScanResult
 from mission.document import Stop
 from mission.events import Pose

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bridge.mavlink.driving import DRIVING, ROVERS, Driving, Mode
-from bridge.mavlink.peer import Peer
-from bridge.mavlink.wire import Message
+from bridge.mavlink.gateway.driving import DRIVING, ROVERS, Driving, Mode
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.wire import Message
 
 AUTO, HOLD = "AUTO", "HOLD"
 AUTOS = {"ardupilot": Mode(10), "px4": Mode(4, 4)}

@@ -8,13 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bridge.clock import Clock
-from bridge.mavlink.captures import Capture, capture_of
-from bridge.mavlink.local import FAR_DEG, LocalFrame, local_frame
-from bridge.mavlink.modes import Modes
-from bridge.mavlink.peer import Origin
-from bridge.mavlink.progress import Sight
-from bridge.mavlink.visits import Course
-from bridge.mavlink.wire import Message, dialect
+from bridge.mavlink.desk.progress import Sight
+from bridge.mavlink.desk.visits import Course
+from bridge.mavlink.gateway.local import FAR_DEG, LocalFrame, local_frame
+from bridge.mavlink.line.captures import Capture, capture_of
+from bridge.mavlink.line.modes import Modes
+from bridge.mavlink.line.peer import Origin
+from bridge.mavlink.line.wire import Message, dialect
 from bridge.run import Run
 from mission.document import SiteOrigin
 from mission.events import Arrived, Pose

@@ -12,10 +12,10 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from bridge.mavlink.driving import Driving, Mode, driving_of
-from bridge.mavlink.peer import Origin, Peer, found
-from bridge.mavlink.url import Url
-from bridge.mavlink.wire import Box, Message, Who, dialect, wire
+from bridge.mavlink.gateway.driving import Driving, Mode, driving_of
+from bridge.mavlink.line.peer import Origin, Peer, found
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import Box, Message, Who, dialect, wire
 from mission.document import Point
 from mission.errors import OutcomeUnknown, RobotUnreachable
 from mission.geodesy import STEPS_PER_DEGREE

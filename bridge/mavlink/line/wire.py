@@ -23,8 +23,8 @@ from typing import Any, TypeVar
 os.environ.setdefault("MAVLINK20", "1")
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from bridge.mavlink.transport import Address, Transport, open_transport
-from bridge.mavlink.url import Url
+from bridge.mavlink.line.transport import Address, Transport, open_transport
+from bridge.mavlink.line.url import Url
 from mission.errors import InputError
 
 Message = Any

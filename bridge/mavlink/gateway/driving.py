@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bridge.mavlink.wire import dialect
+from bridge.mavlink.line.wire import dialect
 from mission.errors import InputError
 
 CUSTOM_MODE = float(dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from threading import Event
 
 from bridge.clock import Clock
-from bridge.mavlink.autopilot import ORDER_S, Autopilot
-from bridge.mavlink.course import NEAR_M, STALLED_S, Course, Patience
-from bridge.mavlink.local import UNPLACED, LocalFrame, apart, local_frame
-from bridge.mavlink.peer import Origin
+from bridge.mavlink.gateway.autopilot import ORDER_S, Autopilot
+from bridge.mavlink.gateway.course import NEAR_M, STALLED_S, Course, Patience
+from bridge.mavlink.gateway.local import UNPLACED, LocalFrame, apart, local_frame
+from bridge.mavlink.line.peer import Origin
 from bridge.robots import Outcome
 from mission.document import Mission, Point, RobotSpec, SiteOrigin
 from mission.events import Pose

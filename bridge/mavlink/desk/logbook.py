@@ -22,8 +22,8 @@ import msgspec
 from bridge import run as runs
 from bridge.clock import Clock, WallClock
 from bridge.journal import Journal, shared_journal
-from bridge.mavlink.url import Url
-from bridge.mavlink.visits import Course, course_of
+from bridge.mavlink.desk.visits import Course, course_of
+from bridge.mavlink.line.url import Url
 from bridge.protocol import CHUNK_BYTES, Manifest
 from bridge.run import Change, Run
 from mission.document import Mission

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from bridge.mavlink.peer import Origin
+from bridge.mavlink.line.peer import Origin
 from mission.document import Point, SiteOrigin
 from mission.events import Pose
 from mission.geodesy import Geodetic, bearing_deg, from_geodetic, heading_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from bridge.mavlink.progress import Sight, passed_by
-from bridge.mavlink.visits import Course
+from bridge.mavlink.desk.progress import Sight, passed_by
+from bridge.mavlink.desk.visits import Course
 from bridge.run import Run
 from mission.document import Point
 from mission.events import Pose

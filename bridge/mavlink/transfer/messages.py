@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from bridge.mavlink.peer import enum_name
-from bridge.mavlink.wire import Message, Who, dialect
+from bridge.mavlink.line.peer import enum_name
+from bridge.mavlink.line.wire import Message, Who, dialect
 from mission.mavlink.items import Item
 
 MISSION = dialect.MAV_MISSION_TYPE_MISSION

@@ -13,8 +13,8 @@ from typing import Literal
 from urllib.parse import parse_qsl
 
 from bridge.clock import Clock
-from bridge.mavlink.autopilot import Autopilot
-from bridge.mavlink.wire import Box, Message, dialect
+from bridge.mavlink.gateway.autopilot import Autopilot
+from bridge.mavlink.line.wire import Box, Message, dialect
 from bridge.robots import ScanFailed, ScanResult
 from mission.document import Mission, Scan
 from mission.errors import OutcomeUnknown, RobotUnreachable

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bridge.mavlink.download import download
-from bridge.mavlink.messages import MISSION, ack_message
-from bridge.mavlink.pace import window_for
-from bridge.mavlink.peer import Peer
-from bridge.mavlink.sending import send_items
-from bridge.mavlink.wire import dialect
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.wire import dialect
+from bridge.mavlink.transfer.download import download
+from bridge.mavlink.transfer.messages import MISSION, ack_message
+from bridge.mavlink.transfer.pace import window_for
+from bridge.mavlink.transfer.sending import send_items
 from mission.errors import AnswerIsNo, RobotUnreachable
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import Item

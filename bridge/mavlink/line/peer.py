@@ -13,9 +13,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 
-from bridge.mavlink.round_trips import RoundTrips
-from bridge.mavlink.url import Url
-from bridge.mavlink.wire import SIGNATURE, Box, Message, Who, Wire, dialect, sender, wire
+from bridge.mavlink.line.round_trips import RoundTrips
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import SIGNATURE, Box, Message, Who, Wire, dialect, sender, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from mission.geodesy import STEPS_PER_DEGREE
 

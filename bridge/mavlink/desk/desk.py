@@ -20,15 +20,15 @@ import msgspec
 from bridge import run as runs
 from bridge.clock import Clock, WallClock
 from bridge.link import MemoryLink, Request, Switchboard
-from bridge.mavlink.follower import Follower
-from bridge.mavlink.hands import Hands
-from bridge.mavlink.logbook import Logbook, logbook
-from bridge.mavlink.lookout import TOLD, Lookout
-from bridge.mavlink.modes import modes_of
-from bridge.mavlink.orders import Consent, Orders
-from bridge.mavlink.peer import Peer, found
-from bridge.mavlink.url import Url
-from bridge.mavlink.wire import GROUND_STATION, Box, Who, dialect, wire
+from bridge.mavlink.desk.follower import Follower
+from bridge.mavlink.desk.hands import Hands
+from bridge.mavlink.desk.logbook import Logbook, logbook
+from bridge.mavlink.desk.lookout import TOLD, Lookout
+from bridge.mavlink.desk.orders import Consent, Orders
+from bridge.mavlink.line.modes import modes_of
+from bridge.mavlink.line.peer import Peer, found
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import GROUND_STATION, Box, Who, dialect, wire
 from bridge.pages import address_of, events_page, mission_part, poses_page
 from bridge.protocol import (
     CHUNK_BYTES,
