@@ -105,7 +105,7 @@ def go_on(site: Site) -> None:
 def test_a_run_survives_what_befalls_robot_line_and_vehicle(tmp_path: Path, seed: int) -> None:
     chance = random.Random(seed)
     mishap, when = MISHAPS[seed % len(MISHAPS)], moment(chance)
-    brief = Scan(profile="default", duration_s=10.0, timeout_s=4.0)
+    brief = Scan(profile="default", duration_s=4.0, timeout_s=4.0)
     mission = site_mission(scan=brief, retries=3)
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with (

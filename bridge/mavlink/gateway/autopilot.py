@@ -29,6 +29,8 @@ ORDER_S = 3.0
 """How long one order waits for its answer."""
 STOP_S = 2.5
 """How long `stop` waits to see itself obeyed; it goes on being ordered after that."""
+IN_FLIGHT_S = 0.3
+"""A heartbeat that comes so soon after an order may have been sent before it."""
 STILL_M_S = 0.03
 STILL_RAD_S = 0.03
 ASK_ORIGIN_S = 4.0
@@ -112,6 +114,9 @@ class Autopilot:
         self.left: Mode | None = None
         """The mode in which we know it: any other was chosen by somebody else."""
         self._heard = heard
+        self._turns = threading.Lock()
+        """An order to hold and one to be guided are given one after the other, never crossed."""
+        self._guide_asked_s = 0.0
         self._stop_owed = threading.Event()
         self._stop_asked_s = 0.0
         self._closing = threading.Event()
@@ -195,7 +200,8 @@ class Autopilot:
     def changed_hands(self) -> str:
         """What somebody else has switched it to since we left or drove it; empty if nobody did."""
         mode = self.mode()
-        if self.left in (None, mode):
+        ours = self._stop_owed.is_set() and mode == self.driving.hold
+        if ours or self.left in (None, mode):
             return ""
         return f"somebody switched the autopilot to {self.driving.name_of(mode)}"
 
@@ -243,13 +249,20 @@ class Autopilot:
 
     def guide(self) -> str:
         """Why it does not go into the mode in which we drive it; empty if it may (`is_guided`)."""
-        self._stop_owed.clear()
+        with self._turns:
+            self._stop_owed.clear()
+            self._guide_asked_s = time.monotonic()
         self.left = guided = self.driving.guided
         name = self.driving.name_of(guided)
         return self.order(dialect.MAV_CMD_DO_SET_MODE, *guided.params, what=f"the mode {name}")
 
     def is_guided(self) -> bool:
-        return self.mode() == self.driving.guided
+        """Whether a heartbeat has shown it since `guide`; one from before a cut line shows nothing."""
+        beat = self._heard.since("HEARTBEAT", self._guide_asked_s)
+        if beat is None:
+            self._say(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT)
+            return False
+        return self.driving.mode_of(beat.custom_mode) == self.driving.guided
 
     def stop(self) -> None:
         """Order to hold, and wait a moment to see it obeyed; it is ordered on until it is.
@@ -265,13 +278,16 @@ class Autopilot:
 
     def _hold(self) -> None:
         """Order what is still owed, or see that it is no longer."""
-        beat = self._heard.since("HEARTBEAT", self._stop_asked_s)
-        mode = self.mode()
-        if beat is not None and mode != self.driving.guided:
-            self.leave()
-            self._stop_owed.clear()
-        elif mode in (self.driving.guided, self.driving.hold):
-            self._say(dialect.MAV_CMD_DO_SET_MODE, *self.driving.hold.params)
+        with self._turns:
+            if not self._stop_owed.is_set():
+                return
+            beat = self._heard.since("HEARTBEAT", self._stop_asked_s + IN_FLIGHT_S)
+            mode = self.mode()
+            if beat is not None and mode != self.driving.guided:
+                self.leave()
+                self._stop_owed.clear()
+            elif mode in (self.driving.guided, self.driving.hold):
+                self._say(dialect.MAV_CMD_DO_SET_MODE, *self.driving.hold.params)
         self._say(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT)
 
     def _keep(self) -> None:
