@@ -33,7 +33,7 @@ def test_the_mission_stays_as_it_is(name: str, mission: Mission) -> None:
     assert digest_of(mission) == mission.digest
 
 
-@pytest.mark.parametrize("name", set(FORMATS) - VARYING)
+@pytest.mark.parametrize("name", sorted(set(FORMATS) - VARYING))
 def test_equal_missions_give_equal_bytes(name: str, mission: Mission) -> None:
     assert exported(mission, name, Supplements()) == exported(mission, name, Supplements())
 
