@@ -42,6 +42,8 @@ ARDUPILOT_AUTO = {
 """custom_mode of AUTO by type of vehicle; copters and submarines have 3."""
 PX4_AUTO_MISSION = 4 << 16 | 4 << 24
 """Main mode AUTO, sub-mode MISSION."""
+PX4_AUTO_LOITER = 4 << 16 | 3 << 24
+"""Main mode AUTO, in which PX4 holds as well; others that number their modes so do the same."""
 
 UNSAID: tuple[float, ...] = (0.0,) * 7
 
@@ -396,7 +398,8 @@ def in_auto(heartbeat: Message, autopilot: str) -> bool:
         return heartbeat.custom_mode == ARDUPILOT_AUTO.get(heartbeat.type, 3)
     if autopilot == "px4":
         return heartbeat.custom_mode == PX4_AUTO_MISSION
-    return bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_AUTO_ENABLED)
+    holds = heartbeat.custom_mode == PX4_AUTO_LOITER
+    return not holds and bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_AUTO_ENABLED)
 
 
 def enum_name(enum: str, number: int) -> str:

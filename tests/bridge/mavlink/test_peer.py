@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.mavlink.line.peer import Origin, found, reached, station_beat
+from bridge.mavlink.line.peer import Origin, found, in_auto, reached, station_beat
 from bridge.mavlink.line.url import read_url
 from bridge.mavlink.line.wire import Message, Who, dialect, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
@@ -28,6 +28,16 @@ def test_its_mode_is_that_of_its_last_heartbeat() -> None:
         vehicle.base_mode, vehicle.custom_mode = dialect.MAV_MODE_FLAG_SAFETY_ARMED, 10
         with reached(vehicle.url) as peer:
             assert peer.armed and peer.in_auto
+
+
+@pytest.mark.parametrize(
+    ("custom_mode", "follows"), [(4 << 16 | 4 << 24, True), (4 << 16 | 3 << 24, False), (0, True)]
+)
+def test_a_vehicle_on_hold_does_not_follow_its_mission(custom_mode: int, follows: bool) -> None:
+    """PX4 sets the flag of AUTO on hold too, and so do those that number their modes as it does."""
+    flags = dialect.MAV_MODE_FLAG_AUTO_ENABLED | dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    heartbeat = dialect.MAVLink_heartbeat_message(10, 0, flags, custom_mode, 4, 3)
+    assert in_auto(heartbeat, "generic") is follows
 
 
 def test_where_nobody_is_nothing_was_sent() -> None:
