@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bridge.console import Bar, print_json, say
+from bridge.console import Bar, print_json, refusals_in, say
 from bridge.key_commands import key_commands
 from bridge.order_commands import Json, TakeOver, add_orders, status_json
 from bridge.tunnel_commands import tunnel_commands
@@ -21,6 +21,7 @@ from bridge.ways import (
     KeyFolder,
     SigningKey,
     Site,
+    StateFolder,
     Timeout,
     VehicleId,
     Way,
@@ -54,7 +55,8 @@ AutopilotKind = Annotated[
     ),
 ]
 WhileRunning = Annotated[
-    bool, typer.Option("--while-running", help="Even though the vehicle is armed and follows its mission.")
+    bool,
+    typer.Option("--while-running", help="Though the vehicle follows its mission, or its run is not over."),
 ]
 
 
@@ -267,20 +269,18 @@ def push(
     line = Line(
         vehicle.url, vehicle.vehicle, vehicle.signing_key, way.insecure, autopilot, patience or way.timeout_s
     )
-    push_mission(
-        read(mission), line, state=vehicle.state, as_json=json_,
-        writing=Writing(trigger or "auto", scan_wait or "delay", settle or "delay"),
-        leave=Leave(set_origin, any_origin, while_running),
-    )  # fmt: skip
+    with refusals_in(json_):
+        push_mission(
+            read(mission), line, state=vehicle.state, as_json=json_,
+            writing=Writing(trigger or "auto", scan_wait or "delay", settle or "delay"),
+            leave=Leave(set_origin, any_origin, while_running),
+        )  # fmt: skip
 
 
 def push_over_zenoh(document: Mission, way: Way, *, take_over: bool, json_: bool) -> None:
     """Push to a robot of ours, and say what it did with the mission."""
     robot = way.robot
-    with (
-        reached(way) as station,
-        Bar("pushing") as bar,
-    ):
+    with refusals_in(json_), reached(way) as station, Bar("pushing") as bar:
         told = turning(station.info().to_map, document)
         accepted = station.push(document, progress=bar.show, take_over=take_over)
     if told:
@@ -318,7 +318,8 @@ def fetch_mission(
     from bridge.mavlink.commands import Line, fetch_mission
 
     line = Line(mavlink, vehicle, signing_key, insecure, autopilot, timeout)
-    fetch_mission(line, out=out, as_json=json_)
+    with refusals_in(json_):
+        fetch_mission(line, out=out, as_json=json_)
 
 
 def clear(
@@ -326,6 +327,7 @@ def clear(
     mavlink: NeededMavlink,
     vehicle: VehicleId = None,
     signing_key: SigningKey = None,
+    state: StateFolder = None,
     autopilot: AutopilotKind = None,
     while_running: WhileRunning = False,
     timeout: Timeout = 5.0,
@@ -339,7 +341,8 @@ def clear(
     from bridge.mavlink.commands import Line, clear_mission
 
     line = Line(mavlink, vehicle, signing_key, insecure, autopilot, timeout)
-    clear_mission(line, while_running=while_running, as_json=json_)
+    with refusals_in(json_):
+        clear_mission(line, state=state, while_running=while_running, as_json=json_)
 
 
 def turning(own: Transform | None, mission: Mission) -> str:

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
+
+from mission.errors import AnswerIsNo
 
 KILOBYTES = ("kB", 1000)
 
@@ -35,6 +39,17 @@ class Bar:
 def say(line: str) -> None:
     """One line for the person, on stderr."""
     print(line, file=sys.stderr, flush=True)  # noqa: T201
+
+
+@contextmanager
+def refusals_in(as_json: bool) -> Iterator[None]:
+    """A refusal in the block is also printed as JSON, if that is what is printed."""
+    try:
+        yield
+    except AnswerIsNo as no:
+        if as_json:
+            print_json({"outcome": "refused", "reason": no.reason, "message": str(no)})
+        raise
 
 
 def print_json(document: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bridge.console import print_json
+from bridge.console import print_json, refusals_in
 from bridge.ways import (
     DEFAULT_ENDPOINT,
     Connect,
@@ -68,7 +68,8 @@ def start(
 
     Example: stopgo start --mavlink udpout:127.0.0.1:14550 --arm
     """
-    with in_time(way.to_drive(arm=arm, any_origin=any_origin)) as station:
+    driving = way.to_drive(arm=arm, any_origin=any_origin)
+    with refusals_in(json_), in_time(driving) as station:
         answer = station.command("start", again=again, from_here=from_here, take_over=take_over)
     report_answer(answer, station.keys.robot, json_)
 
@@ -96,7 +97,8 @@ def order_of(verb: Verb) -> Callable[..., None]:
         disarm: Annotated[bool, typer.Option("--disarm", help="Disarm a vehicle that stands.")] = False,
         json_: Json = False,
     ) -> None:
-        with in_time(way.to_drive(arm=arm, disarm=disarm, any_origin=any_origin)) as station:
+        driving = way.to_drive(arm=arm, disarm=disarm, any_origin=any_origin)
+        with refusals_in(json_), in_time(driving) as station:
             answer = station.command(verb, stop=stop, take_over=take_over)
         report_answer(answer, station.keys.robot, json_)
 

@@ -285,7 +285,8 @@ class Station:
         reply = self._insist(self.keys.command(order.verb), encode(order), within_s)
         answer = self._answered(reply, Answer, order.verb)
         if answer.outcome == "refused":
-            raise AnswerIsNo(f"{self.keys.robot} refused {order.verb}: {answer.reason}: {answer.message}")
+            why = f"{answer.reason}: {answer.message}"
+            raise AnswerIsNo(f"{self.keys.robot} refused {order.verb}: {why}", reason=answer.reason)
         return answer
 
     def order(self, verb: Verb, **details: Any) -> Command:
@@ -383,7 +384,8 @@ class Station:
                 f"{robot} answered {what} in words this stopgo does not know ({error}); update the older one"
             ) from None
         if isinstance(message, Rejected):
-            raise AnswerIsNo(f"{robot} rejected {what}: {message.reason}: {'; '.join(message.messages)}")
+            why = f"{message.reason}: {'; '.join(message.messages)}"
+            raise AnswerIsNo(f"{robot} rejected {what}: {why}", reason=message.reason)
         if not isinstance(message, kind):
             said = message.message if isinstance(message, Malformed) else type(message).__name__
             raise AnswerIsNo(f"{robot} could not make sense of {what}: {said}")

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from bridge.console import Bar, print_json, say
-from bridge.mavlink.desk.logbook import logbook, remember
+from bridge.mavlink.desk.logbook import forget, logbook, remember
+from bridge.mavlink.desk.standing import check_run_over
 from bridge.mavlink.line.origin import check_origin
 from bridge.mavlink.line.peer import Origin, Peer, reached
 from bridge.mavlink.line.url import Url, check_guarded, read_url
@@ -73,6 +74,9 @@ def push_mission(
     made = None if line.autopilot is None else _translated(mission, line.autopilot, writing)
     with _peer(line) as (url, peer):
         sent = made or _translated(mission, peer.autopilot, writing)
+        if not leave.while_running:
+            with logbook(url, peer.who.system, state) as book:
+                check_run_over(peer, url, book, "a push")
         check_standing(peer, leave.while_running)
         site = sent.origin
         origin = None if leave.any_origin else check_origin(peer, site, set_it=leave.set_origin)
@@ -103,10 +107,13 @@ def fetch_mission(line: Line, *, out: Path | None, as_json: bool) -> None:
         print(_page(peer, own))  # noqa: T201
 
 
-def clear_mission(line: Line, *, while_running: bool, as_json: bool) -> None:
-    """Take the mission off an autopilot, and see that it is gone."""
-    with _peer(line) as (_, peer):
+def clear_mission(line: Line, *, state: Path | None, while_running: bool, as_json: bool) -> None:
+    """Take the mission off an autopilot, see that it is gone, and note down that it is."""
+    with _peer(line) as (url, peer), logbook(url, peer.who.system, state) as book:
+        if not while_running:
+            check_run_over(peer, url, book, "to clear it")
         had = clear(peer, while_running=while_running)
+        forget(book)
     if as_json:
         print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot, "had": had})
     else:

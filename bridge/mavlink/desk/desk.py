@@ -25,6 +25,7 @@ from bridge.mavlink.desk.hands import Hands
 from bridge.mavlink.desk.logbook import Logbook, logbook
 from bridge.mavlink.desk.lookout import TOLD, Lookout
 from bridge.mavlink.desk.orders import Consent, Orders
+from bridge.mavlink.desk.progress import held_by_vehicle
 from bridge.mavlink.line.modes import modes_of
 from bridge.mavlink.line.peer import Peer, found
 from bridge.mavlink.line.url import Url
@@ -185,8 +186,7 @@ class Desk:
             self._follower.compare()
         if not self._follower.run.over:  # what was missed: the scan that was made last
             self._peer.ask(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
-        self._follower.looking = True
-        self._follower.look("HEARTBEAT")
+        self._follower.begin()
 
     # What it hears, and tells
 
@@ -239,7 +239,8 @@ class Desk:
 
     def _state(self) -> StateReport:
         self._seq += 1
-        run, course = self._follower.run, self._book.course
+        course = self._book.course
+        run = held_by_vehicle(self._follower.run, self._lookout.items)
         stop = runs.stop_of(run, None if course is None else course.mission)
         return StateReport(
             robot=self.keys.robot, boot_id=self._book.boot_id, seq=self._seq,

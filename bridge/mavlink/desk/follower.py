@@ -66,6 +66,15 @@ class Follower:
         self._closing.set()
         self._due.set()
 
+    def begin(self) -> None:
+        """All is known that can be asked for: look from now on, first whether it was started anew.
+
+        A reboot changes the mode too, and nobody has chosen that one.
+        """
+        self.looking = True
+        self._look_at_clock()
+        self.look("HEARTBEAT")
+
     def look(self, name: str) -> None:
         """A message of this name has come."""
         self.run = self._book.run

@@ -223,15 +223,24 @@ def remember(book: Logbook, mission: Mission, sent: ItemList) -> None:
     course_of(mission, sent)
     with book.journal.transaction():
         book.journal.store_mission(manifest, document)
-        book.move(lambda run: () if run.over else (_replaced(run),))
+        book.move(lambda run: () if run.over else (_replaced(run, "a mission was pushed to the vehicle"),))
         book.journal.store_fact("run", runs.installed(book.run, mission))
         book.journal.store_fact("sent", told)
         book.journal.store_fact("items", Items(packed))
         book.journal.forget_fact("owed")
 
 
-def _replaced(run: Run) -> Change:
-    over = runs.changed(run, state="ABORTED", reason="a mission was pushed to the vehicle")
+def forget(book: Logbook) -> None:
+    """The vehicle holds no mission any more; a run is over with it."""
+    with book.journal.transaction():
+        book.move(lambda run: () if run.over else (_replaced(run, "the vehicle's mission was cleared"),))
+        book.journal.store_fact("run", Run())
+        for name in ("sent", "items", "owed"):
+            book.journal.forget_fact(name)
+
+
+def _replaced(run: Run, reason: str) -> Change:
+    over = runs.changed(run, state="ABORTED", reason=reason)
     return Change(over, (partial(Aborted, reason=over.reason),))
 
 

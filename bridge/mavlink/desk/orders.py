@@ -43,6 +43,7 @@ UNREMEMBERED = (
     "nothing is remembered of a mission pushed to this vehicle; push one by this very URL,"
     " or name the folder of that push with --state"
 )
+CLEARED = "the vehicle says that it holds no mission: somebody has cleared it; push it again"
 HOMEWARD = (
     "an autopilot in AUTO drives its list forward only, and nobody planned a way back from here; the"
     " return of a mission is driven at its end. Run by stopgo robot --controller mavlink:URL it can"
@@ -133,6 +134,8 @@ class Orders:
         course, run, here = self._book.course, self._book.run, self._lookout.pose
         if course is None:
             return Refused("no_mission", UNREMEMBERED)
+        if command.verb in DRIVING and self._lookout.items == 0:
+            return Refused("no_mission", CLEARED)
         elsewhere = self._elsewhere(course) if command.verb in DRIVING else None
         if elsewhere is not None:
             return elsewhere

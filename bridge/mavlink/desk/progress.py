@@ -216,6 +216,11 @@ def started(run: Run, *, run_id: str, now_ns: int, by: str) -> Change:
     return Change(fresh, (partial(Started, commander=by),))
 
 
+def held_by_vehicle(run: Run, items: int | None) -> Run:
+    """The run as it is told; a mission that lay ready is gone if the vehicle says that it holds none."""
+    return Run() if run.state == "READY" and items == 0 else run
+
+
 def deviation(pose: Pose, stop: Stop) -> float:
     """Metres from the stop."""
     return math.hypot(pose.x - stop.x, pose.y - stop.y)

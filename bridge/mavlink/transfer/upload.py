@@ -108,7 +108,7 @@ def clear(peer: Peer, *, while_running: bool = False) -> int:
     RobotUnreachable, AnswerIsNo, OutcomeUnknown
         As `upload`.
     """
-    check_standing(peer, while_running)
+    check_standing(peer, while_running, "would be left without one")
     before = own_items(peer, download(peer))
     if before and not emptied(peer):
         raise OutcomeUnknown(
@@ -118,11 +118,11 @@ def clear(peer: Peer, *, while_running: bool = False) -> int:
     return len(before)
 
 
-def check_standing(peer: Peer, while_running: bool) -> None:
-    """Refuses to touch the mission that a vehicle is following."""
+def check_standing(peer: Peer, while_running: bool, what: str = "would begin its current item again") -> None:
+    """Refuses to touch the mission that a vehicle is following; `what` is what it would come to."""
     if peer.armed and peer.in_auto and not while_running:
         raise AnswerIsNo(
-            f"{peer} is armed and follows its mission, and would begin its current item again; "
+            f"{peer} is armed and follows its mission, and {what}; "
             "pause it first, or add --while-running; nothing was sent"
         )
 

@@ -9,11 +9,13 @@ from pathlib import Path
 import pytest
 
 from bridge.journal import open_journal
-from bridge.mavlink.desk.logbook import Logbook, logbook, name_of, remember, usual_folder
+from bridge.mavlink.desk.logbook import Logbook, forget, logbook, name_of, remember, usual_folder
+from bridge.mavlink.desk.progress import started
+from bridge.mavlink.desk.standing import check_run_over
 from bridge.mavlink.line.url import Url
 from bridge.run import Change, Run, changed
-from mission.errors import InputError
-from mission.events import Paused
+from mission.errors import AnswerIsNo, InputError
+from mission.events import Aborted, Paused
 from mission.mavlink.translate import translate
 from tests.bridge.mavlink.site import tour
 
@@ -85,3 +87,33 @@ def test_the_usual_folder_is_named_by_url_and_vehicle(
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     folder = usual_folder(Url("serial", "/dev/ttyACM0", 57600), 3)
     assert folder == tmp_path / "stopgo" / "serial-dev-ttyACM0-57600-vehicle-3"
+
+
+def test_a_mission_that_was_cleared_is_forgotten_and_its_run_over(tmp_path: Path) -> None:
+    mission = tour()
+    with logbook(URL, 1, tmp_path) as book:
+        remember(book, mission, translate(mission, "px4"))
+        book.move(lambda run: (started(run, run_id="r", now_ns=0, by="me"),))
+        forget(book)
+        assert (book.run, book.course) == (Run(), None)
+        last = book.journal.events()[-1]
+        assert isinstance(last, Aborted) and (last.run_id, last.mission_id) == ("r", mission.id)
+        assert "cleared" in last.reason
+        assert book.journal.has_run(mission.id, mission.revision)
+
+
+@pytest.mark.parametrize("state", ["RUNNING", "PAUSED", "HELD"])
+def test_a_mission_is_not_taken_from_under_a_run(state: str, tmp_path: Path) -> None:
+    mission = tour()
+    with logbook(URL, 1, tmp_path) as book:
+        check_run_over("it", URL, book, "a push")  # type: ignore[arg-type]
+        remember(book, mission, translate(mission, "px4"))
+        check_run_over("it", URL, book, "a push")  # type: ignore[arg-type]
+        book.move(lambda run: (started(run, run_id="r7", now_ns=0, by="me"),))
+        book.move(lambda run: (Change(changed(run, state=state, done=("S1",))),))  # type: ignore[arg-type]
+        with pytest.raises(AnswerIsNo) as no:
+            check_run_over("it", URL, book, "a push")  # type: ignore[arg-type]
+    said = str(no.value)
+    assert f"run r7 of room (0123456789ab) is {state}, 1 of 3 stops done, and a push would end it" in said
+    assert "stopgo abort --mavlink udpout:127.0.0.1:14550" in said and "--while-running" in said
+    assert "nothing was sent" in said and ("watch" in said) == (state == "RUNNING")

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from bridge.mavlink.desk.onward import onward
-from bridge.mavlink.desk.progress import Sight, passed_by, steps, taken_over
+from bridge.mavlink.desk.progress import Sight, held_by_vehicle, passed_by, steps, taken_over
 from bridge.mavlink.desk.visits import Course, course_of
 from bridge.robots import ScanFailed, ScanResult
 from bridge.run import Run
@@ -179,3 +179,11 @@ def test_a_scanner_that_does_not_see_all_around_must_face_the_right_way() -> Non
     assert after(going(), mine, seen(visit.at + 1, pose=right))[0] == ["Arrived S2"]
     words, run = after(going(), mine, seen(visit.at + 1, pose=wrong, still=True))
     assert words == ["Failed S2", "Held"] and "11.5°" in run.reason
+
+
+def test_a_mission_that_somebody_has_cleared_does_not_lie_ready() -> None:
+    ready = Run(state="READY", mission_id="m", revision=1)
+    assert held_by_vehicle(ready, 0) == Run()
+    for items in (None, 14):
+        assert held_by_vehicle(ready, items) == ready
+    assert held_by_vehicle(going(), 0) == going()

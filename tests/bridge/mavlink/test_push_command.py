@@ -13,18 +13,22 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.desk.logbook import logbook
+from bridge.mavlink.desk.logbook import logbook, remember
+from bridge.mavlink.desk.progress import started
 from bridge.mavlink.line.peer import reached
 from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
 from mission.__main__ import main
 from mission.document import Mission, SiteOrigin, sealed
+from mission.events import Aborted
 from mission.files.imports import qgc_plan, qgc_waypoints
 from mission.files.imports.track import Given
 from mission.files.mission_json import write
+from mission.mavlink.translate import translate
 from tests.bridge.mavlink.lists import held, stops
 from tests.bridge.mavlink.scripted import Scripted, free_udp_port
 from tests.bridge.mavlink.site import tour
@@ -44,8 +48,8 @@ def run(tmp_path: Path, capsys: pytest.CaptureFixture[str], mission: Mission) ->
     write(mission, tmp_path / "mission.json")
 
     def command(*words: str) -> tuple[int, str, str]:
-        pushes = words[0] == "push" and "--mavlink" in words
-        state = ["--state", str(tmp_path / "state")] if pushes else []
+        remembers = words[0] in ("push", "clear") and "--mavlink" in words
+        state = ["--state", str(tmp_path / "state")] if remembers else []
         code = main([word.replace("MISSION", str(tmp_path / "mission.json")) for word in (*words, *state)])
         return code, *capsys.readouterr()
 
@@ -88,6 +92,8 @@ def test_a_mission_is_pushed_read_and_cleared(profile: str, run: Run, tmp_path: 
         assert len(json.loads((tmp_path / "held.json").read_text())["items"]) == 14
         code, printed, _ = run("clear", *to, "--json")
         assert (code, json.loads(printed)["had"]) == (0, 14)
+        with logbook(url, 1, tmp_path / "state") as book:
+            assert (book.run.state, book.course) == ("IDLE", None)
         code, printed, _ = run("fetch-mission", *to)
         assert (code, "holds 0 items" in printed) == (0, True)
 
@@ -119,6 +125,36 @@ def test_another_origin_is_refused(run: Run) -> None:
         assert run("push", "MISSION", "--mavlink", str(url), "--any-origin")[0] == 0
 
 
+def test_a_vehicle_that_follows_its_mission_is_let_be_in_each_commands_words(run: Run) -> None:
+    with Scripted(held(stops(3))) as vehicle:
+        vehicle.base_mode = dialect.MAV_MODE_FLAG_SAFETY_ARMED | dialect.MAV_MODE_FLAG_AUTO_ENABLED
+        to = ("--mavlink", str(vehicle.url), "--vehicle", "1", "--json")
+        for words, harm in (
+            (("push", "MISSION"), "would begin its current item again"),
+            (("clear",), "would be left without one"),
+        ):
+            code, printed, said = run(*words, *to)
+            told = json.loads(printed)
+            assert (code, told["outcome"], told["reason"]) == (1, "refused", None)
+            assert harm in told["message"] and said == f"stopgo: {told['message']}\n"
+        assert vehicle.heard["MISSION_COUNT"] == vehicle.heard["MISSION_CLEAR_ALL"] == 0
+
+
+def test_a_run_that_is_not_over_keeps_its_mission(run: Run, mission: Mission, tmp_path: Path) -> None:
+    with Scripted(held(stops(3))) as vehicle:
+        with logbook(vehicle.url, 1, tmp_path / "state") as book:
+            remember(book, mission, translate(mission, "generic"))
+            book.move(lambda run: (started(run, run_id="r7", now_ns=0, by="me"),))
+        to = ("--mavlink", str(vehicle.url), "--vehicle", "1")
+        for words in (("push", "MISSION"), ("clear",)):
+            code, printed, said = run(*words, *to, "--json")
+            assert (code, json.loads(printed)["reason"], "run r7" in said) == (1, "running", True)
+        assert vehicle.heard["MISSION_REQUEST_LIST"] == vehicle.heard["MISSION_COUNT"] == 0
+        assert run("clear", *to, "--while-running")[0] == 0
+        with logbook(vehicle.url, 1, tmp_path / "state") as book:
+            assert book.run.state == "IDLE" and isinstance(book.journal.events()[-1], Aborted)
+
+
 def test_an_item_that_is_refused_once_is_tried_again(run: Run, mission: Mission) -> None:
     with at_site(mission, "ardupilot", "nack@4=6") as url:
         assert run("push", "MISSION", "--mavlink", str(url))[0] == 0
@@ -146,7 +182,7 @@ def test_a_vehicle_that_falls_silent_leaves_it_unknown(run: Run, mission: Missio
 
 def test_a_key_is_needed_where_the_vehicle_has_one(run: Run, mission: Mission, tmp_path: Path) -> None:
     (tmp_path / "key").write_text(KEY.hex())
-    (tmp_path / "other").write_text("another")
+    (tmp_path / "other").write_text("another one")
     with at_site(mission, key=KEY) as url:
         to = ("push", "MISSION", "--mavlink", str(url), "--timeout", "1.5")
         code, _, said = run(*to, "--signing-key", str(tmp_path / "other"))

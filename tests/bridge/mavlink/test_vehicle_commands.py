@@ -61,8 +61,10 @@ def vehicle(tmp_path: Path) -> Iterator[Vehicle]:
 def test_a_mission_is_pushed_started_and_watched_to_its_end(vehicle: Vehicle, tmp_path: Path) -> None:
     pushed = vehicle.run("push", str(vehicle.mission))
     assert pushed.returncode == 0, pushed.stderr
-    refused = vehicle.run("start")
+    refused = vehicle.run("start", "--json")
     assert refused.returncode == 1 and "--arm" in refused.stderr and refused.stderr.count("\n") == 1
+    told = json.loads(refused.stdout)
+    assert (told["outcome"], told["reason"]) == ("refused", "not_armed") and "--arm" in told["message"]
     begun = vehicle.run("start", "--arm", "--json")
     assert begun.returncode == 0 and json.loads(begun.stdout)["state"] == "RUNNING"
 

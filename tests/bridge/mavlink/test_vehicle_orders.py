@@ -10,6 +10,7 @@ import pytest
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.peer import reached as found_peer
 from bridge.mavlink.line.wire import dialect
+from bridge.mavlink.simulated.store import Store
 from mission.document import Scan, SiteOrigin
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import Aborted, Pose, Resumed, Started
@@ -101,6 +102,16 @@ def test_another_mission_is_never_started(tmp_path: Path) -> None:
     with site.up():
         why = refused(site, "start")
     assert "mission_differs" in why and "settle of S1" in why and "push" in why
+
+
+def test_a_mission_that_another_station_has_cleared_is_not_told_or_started(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    Store(tmp_path / "vehicle").keep(mission=())
+    with site.up(), site.reached() as station:
+        assert (station.status().state, station.status().mission_id) == ("IDLE", None)
+        with pytest.raises(AnswerIsNo, match=r"no_mission: .*cleared") as no:
+            station.command("start")
+    assert no.value.reason == "no_mission"
 
 
 @pytest.mark.parametrize(
