@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
+from bridge.console import refusals_in
 from bridge.lease import Denied, claimed
 from bridge.protocol import LEASE_S, Lease
 from mission.errors import AnswerIsNo
@@ -124,3 +127,14 @@ def test_a_station_sends_orders_for_the_robot_as_it_saw_it() -> None:
     with pytest.raises(AnswerIsNo, match="wrong_state"):
         station.command("resume")
     assert station.command("pause").state == "PAUSED"
+
+
+def test_a_refusal_is_printed_as_json_where_json_is_wanted(capsys: pytest.CaptureFixture[str]) -> None:
+    station = Field().station()
+    station.push(corridor())
+    for as_json in (False, True):
+        with pytest.raises(AnswerIsNo) as no, refusals_in(as_json):
+            station.command("resume")
+        printed = capsys.readouterr().out
+        told = {"outcome": "refused", "reason": "wrong_state", "message": str(no.value)}
+        assert (json.loads(printed) if as_json else printed) == (told if as_json else "")
