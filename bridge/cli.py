@@ -125,9 +125,7 @@ def robot(
         str | None,
         typer.Option(metavar="LAT,LON,ALT[,HEADING]", help="The vehicle's global origin from the start."),
     ] = None,
-    signing_key: Annotated[
-        Path | None, typer.Option("--signing-key", metavar="FILE", help="Sign what is said over MAVLink.")
-    ] = None,
+    signing_key: SigningKey = None,
     controller: Annotated[
         str, typer.Option(metavar="sim|mavlink:URL", help="What carries the scanner: an autopilot at URL.")
     ] = "sim",
@@ -300,9 +298,7 @@ def fetch_mission(
     mavlink: NeededMavlink,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "-o", "--output", metavar="FILE", help="Where to write it: *.json, *.plan, *.waypoints."
-        ),
+        typer.Option("-o", "--out", metavar="FILE", help="Where to write it: *.json, *.plan, *.waypoints."),
     ] = None,
     vehicle: VehicleId = None,
     signing_key: SigningKey = None,

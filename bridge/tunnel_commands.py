@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from bridge.mavlink.line.wire import Message
     from bridge.mavlink.tunnel import Tunnel
 
+MOST_KINDS = 100
+"""More are the sign of nonsense, which is not worth a line each."""
+REFUSED = "tunnel refused "
+"""So begins the STATUSTEXT that tells of it."""
 SAY_EVERY_S = 1.0
 """A ground program that asks again and again need not be told each time."""
 
@@ -108,6 +112,7 @@ def tunnel_station(
     transport = _transport(mavlink, insecure)
     with connecting(connect, Guard(held, insecure)) as link, open_tunnel(
         link, transport, tells=own.mavlink("up") if speaks else None, hears=own.mavlink("down"),
+        wrote=RefusalsHeard(robot).hears,
     ) as tunnel:  # fmt: skip
         end = f"the tunnel's end at {robot}"
         link.watch_presence(
@@ -136,8 +141,28 @@ class Refusals:
         self._said[what] = now
         vehicle = getattr(message, "target_system", 0) or 1
         speaker = dialect.MAVLink(None, srcSystem=vehicle, srcComponent=dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
-        text = f"tunnel refused {what}"[:50].encode()
+        text = f"{REFUSED}{what}"[:50].encode()
         return bytes(dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_WARNING, text).pack(speaker))
+
+
+class RefusalsHeard:
+    """Says at the station, once for each kind of message, what the tunnel's end at the robot refused."""
+
+    def __init__(self, robot: str) -> None:
+        self._robot = robot
+        self._said: set[str] = set()
+
+    def hears(self, message: Message) -> None:
+        """Look at a message that came from the robot's end."""
+        if message.get_type() != "STATUSTEXT" or not message.text.startswith(REFUSED):
+            return
+        what = message.text.removeprefix(REFUSED)
+        if what not in self._said and len(self._said) < MOST_KINDS:
+            self._said.add(what)
+            say(
+                f"the tunnel's end at {self._robot} refused {what}: "
+                "only looking and stopping pass without --raw-orders there"
+            )
 
 
 def _transport(mavlink: str, insecure: bool) -> Transport:

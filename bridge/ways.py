@@ -45,7 +45,12 @@ VehicleId = Annotated[
     typer.Option("--vehicle", metavar="ID", min=1, max=255, help="Its system id, if several are heard."),
 ]
 SigningKey = Annotated[
-    Path | None, typer.Option("--signing-key", metavar="FILE", help="Sign what is said over MAVLink.")
+    Path | None,
+    typer.Option(
+        "--signing-key",
+        metavar="FILE",
+        help="Sign what is said over MAVLink; FILE holds 64 hex digits or a passphrase of 8 characters.",
+    ),
 ]
 StateFolder = Annotated[
     Path | None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -19,7 +19,7 @@ from bridge.mavlink.line.url import Url, check_guarded, read_url
 from bridge.mavlink.line.wire import read_signing_key
 from bridge.mavlink.transfer.download import download
 from bridge.mavlink.transfer.left import own_items
-from bridge.mavlink.transfer.upload import Uploaded, check_standing, clear, upload
+from bridge.mavlink.transfer.upload import NOTHING_SENT, Uploaded, check_standing, clear, if_stopped, upload
 from mission.document import Mission, SiteOrigin
 from mission.errors import InputError
 from mission.files.atomic import write_atomic
@@ -72,14 +72,17 @@ def push_mission(
 ) -> None:
     """Put a mission on an autopilot, see it there, and note down that it is there."""
     made = None if line.autopilot is None else _translated(mission, line.autopilot, writing)
-    with _peer(line) as (url, peer):
+    with ExitStack() as opened:
+        with if_stopped(say, lambda: NOTHING_SENT):
+            url, peer = opened.enter_context(_peer(line))
         sent = made or _translated(mission, peer.autopilot, writing)
         if not leave.while_running:
             with logbook(url, peer.who.system, state) as book:
                 check_run_over(peer, url, book, "a push")
         check_standing(peer, leave.while_running)
         site = sent.origin
-        origin = None if leave.any_origin else check_origin(peer, site, set_it=leave.set_origin)
+        with if_stopped(say, lambda: NOTHING_SENT):
+            origin = None if leave.any_origin else check_origin(peer, site, set_it=leave.set_origin)
         with Bar("pushing", ITEMS) as bar:
             done = upload(peer, sent, while_running=leave.while_running, progress=bar.show, tell=say)
         _note_down(url, peer, mission, sent, state, done)
@@ -112,7 +115,7 @@ def clear_mission(line: Line, *, state: Path | None, while_running: bool, as_jso
     with _peer(line) as (url, peer), logbook(url, peer.who.system, state) as book:
         if not while_running:
             check_run_over(peer, url, book, "to clear it")
-        had = clear(peer, while_running=while_running)
+        had = clear(peer, while_running=while_running, tell=say)
         forget(book)
     if as_json:
         print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot, "had": had})

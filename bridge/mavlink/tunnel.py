@@ -121,7 +121,8 @@ class Echoes:
 class Tunnel:
     """One end: `tells` and `hears` are keys of the link.
 
-    `sees` looks at what comes from the MAVLink side, `passes` judges what goes there, and `refused` gives the
+    `sees` looks at what comes from the MAVLink side, `passes` judges what goes there, `wrote` looks at what
+    went there, and `refused` gives the
     frame, if any, by which those who sent what does not pass are told so. An end that `knocks` sends a
     heartbeat of its own, for one that listens on UDP answers only whom it has heard.
     """
@@ -135,6 +136,7 @@ class Tunnel:
         hears: str,
         sees: Callable[[Message], None] = lambda message: None,
         passes: Callable[[Message], bool] = lambda message: True,
+        wrote: Callable[[Message], None] = lambda message: None,
         refused: Callable[[Message], bytes] = lambda message: b"",
         knocks: bool = False,
         bulk: bool = False,
@@ -144,7 +146,7 @@ class Tunnel:
         self.dropped: Counter[str] = Counter()
         """Frames that did not pass, by reason."""
         self._transport = transport
-        self._sees, self._passes, self._refused = sees, passes, refused
+        self._sees, self._passes, self._wrote, self._refused = sees, passes, wrote, refused
         self._knocks = knocks
         self._echoes = Echoes()
         self._out = Waiting(self.dropped, "to the link")
@@ -214,6 +216,7 @@ class Tunnel:
                 if self._passes(message):
                     self._echoes.wrote(frame)
                     self._transport.write(frame)
+                    self._wrote(message)
                     self.carried["from the link"] += 1
                 else:
                     self.dropped["refused"] += 1

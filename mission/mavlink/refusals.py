@@ -59,13 +59,18 @@ def check_fields(mission: Mission, placed: Sequence[Placed]) -> None:
                 )
 
 
-def check_count(mission: Mission, count: int, vehicle: Autopilot, most: int) -> None:
-    """Refuses more items than the vehicle holds; `count` includes home where it holds that too."""
-    if count > most:
-        raise AnswerIsNo(
-            f"{mission.name}: {len(mission.stops)} stops make {count} items, {vehicle.name} holds {most}; "
-            "settle by hold (one less per stop), allow a larger max_lateral_m, or plan fewer stops at once"
-        )
+def check_count(mission: Mission, placed: Sequence[Placed], vehicle: Autopilot, most: int) -> None:
+    """Refuses more items than the vehicle holds, home included where it holds that too."""
+    count = vehicle.sequence(len(placed))
+    if count <= most:
+        return
+    least = count - sum(one.role == "settle" for one in placed)
+    enough = "which is enough" if least <= most else "which is not enough"
+    by_hold = f"--settle hold makes it {least}, {enough}; or " if least < count else ""
+    raise AnswerIsNo(
+        f"{mission.name}: {len(mission.stops)} stops make {count} items, {vehicle.name} holds {most}; "
+        f"{by_hold}plan fewer stops at once"
+    )
 
 
 def _check_manner(manner: Manner) -> None:

@@ -69,7 +69,7 @@ def translate(
     check(mission, numbers, manner)
     placed = tuple(_without_repeats(_placed(mission, numbers, manner)))
     check_fields(mission, placed)
-    check_count(mission, vehicle.sequence(len(placed)), vehicle, max_items or vehicle.max_items)
+    check_count(mission, placed, vehicle, max_items or vehicle.max_items)
     return ItemList(vehicle.name, manner.origin, placed, notes=notes_of(mission, manner))
 
 

@@ -6,6 +6,7 @@ after so many tries.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -77,7 +78,10 @@ class Origin:
 
 
 class Newest(Box):
-    """The newest message of each type from one vehicle, and how often its clock began again."""
+    """The newest message of each type from one vehicle, and how often its clock began again.
+
+    What is said in words of its other components, or in its name by a tunnel, is kept apart.
+    """
 
     def __init__(self, of: Who) -> None:
         super().__init__(of=of)
@@ -86,9 +90,20 @@ class Newest(Box):
         self.messages: dict[str, Message] = {}
         self.clock: int | None = None
         """Number of the message that last told the time since its boot."""
+        self.text = ""
+        self.text_s = -math.inf
         self._boot_ms = 0
 
+    def wants(self, message: Message) -> bool:
+        assert self.of is not None
+        words = message.get_type() == "STATUSTEXT" and message.get_srcSystem() == self.of.system
+        return words or super().wants(message)
+
     def put(self, message: Message) -> None:
+        if message.get_type() == "STATUSTEXT":
+            self.text, self.text_s = _printable(message.text), time.monotonic()
+        if sender(message) != self.of:
+            return
         self.heard_s = time.monotonic()
         self.messages[message.get_type()] = message
         now_ms = getattr(message, "time_boot_ms", None)
@@ -273,6 +288,8 @@ class Peer:
             return f" ({self.wire.dropped[SIGNATURE]} frames had a {SIGNATURE}: is the signing key its own?)"
         if self.silent_s > OTHERS_S:
             return f" (silent for {self.silent_s:.0f} s)"
+        if self._newest.text_s > time.monotonic() - self.patience_s - OTHERS_S:
+            return f' (it last said "{self._newest.text}")'
         if self.heartbeat.get_header().incompat_flags & dialect.MAVLINK_IFLAG_SIGNED:
             return " (it signs its messages, and may want ours signed: --signing-key FILE)"
         return " (its heartbeats come: does it want signed messages, or is the line one-way?)"
@@ -330,6 +347,10 @@ class Peer:
     def _last_text(self) -> str:
         text = self.newest("STATUSTEXT")
         return f' (it last said "{text.text}")' if text is not None else ""
+
+
+def _printable(text: str) -> str:
+    return "".join(one for one in text if one.isprintable())
 
 
 @contextmanager

@@ -25,7 +25,8 @@ class Url:
     """Port, or baud."""
 
     def __str__(self) -> str:
-        return f"{self.kind}:{self.host}:{self.number}"
+        v6 = self.kind != "serial" and ":" in self.host
+        return f"{self.kind}:{f'[{self.host}]' if v6 else self.host}:{self.number}"
 
     @property
     def listens(self) -> bool:

@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 os.environ.setdefault("MAVLINK20", "1")
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from bridge.console import say
 from bridge.mavlink.line.transport import Address, Transport, open_transport
 from bridge.mavlink.line.url import Url
 from mission.errors import InputError
@@ -43,6 +44,10 @@ SLOW_BAUD = 57_600
 """At this rate eight mission items take 70 ms; telemetry radios are not faster."""
 UNSIGNED_ALLOWED = (dialect.MAVLINK_MSG_ID_RADIO_STATUS,)
 """Radios cannot sign."""
+LEAST_PASSPHRASE = 8
+KEY_FILE = f"64 hexadecimal digits, or a passphrase of {LEAST_PASSPHRASE} characters or more"
+READ_BY_OTHERS = 0o044
+"""Permissions of the group and of everybody."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +102,7 @@ class Wire:
         *,
         me: Who = GROUND_STATION,
         signing_key: bytes | None = None,
+        signs: bool = True,
         name: str = "the link",
         slow: bool = False,
     ) -> None:
@@ -109,7 +115,7 @@ class Wire:
         """What was not for us or no message at all, by reason."""
         self._transport = transport
         self._ended = ""
-        self._key = signing_key
+        self._key, self._signs = signing_key, signs
         self._seen = SeenStreams()
         self._sending = self._mav()
         self._parsers: dict[Address, Any] = {}
@@ -220,7 +226,7 @@ class Wire:
         mav = Coder(self.me, self._seen)
         if self._key is not None:
             mav.signing.secret_key = self._key
-            mav.signing.sign_outgoing = True
+            mav.signing.sign_outgoing = self._signs
             mav.signing.allow_unsigned_callback = lambda _, number: number in UNSIGNED_ALLOWED
             mav.signing.timestamp = signing_time()
         return mav
@@ -288,7 +294,8 @@ def wire(url: Url, *, me: Who = GROUND_STATION, signing_key: bytes | None = None
 def read_signing_key(path: Path) -> bytes:
     """The 32 bytes in a key file: 64 hexadecimal digits, or a passphrase of which they are the SHA-256.
 
-    The latter is how ground stations make a key from what their users type.
+    The latter is how ground stations make a key from what their users type. Whoever may not be alone with
+    the key is told so.
 
     Raises
     ------
@@ -297,12 +304,21 @@ def read_signing_key(path: Path) -> bytes:
     """
     try:
         text = path.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or "not text"
-        raise InputError(f"--signing-key {path}: cannot be read ({why})") from None
+        shared = path.stat().st_mode & READ_BY_OTHERS
+    except OSError as error:
+        raise InputError(f"--signing-key {path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise InputError(
+            f"--signing-key {path}: is not text; write {KEY_FILE}; "
+            f"of a binary key: xxd -p -c 64 {path} > {path}.hex"
+        ) from None
     if not text:
-        raise InputError(f"--signing-key {path}: is empty; write 64 hexadecimal digits or a passphrase")
+        raise InputError(f"--signing-key {path}: is empty; write {KEY_FILE}")
+    if shared:
+        say(f"note: --signing-key {path}: others on this machine can read it; chmod 600 {path}")
     if len(text) == 64:
         with suppress(ValueError):
             return bytes.fromhex(text)
+    if len(text) < LEAST_PASSPHRASE:
+        raise InputError(f"--signing-key {path}: the passphrase is too short to be safe; write {KEY_FILE}")
     return hashlib.sha256(text.encode()).digest()

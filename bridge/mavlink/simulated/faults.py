@@ -15,6 +15,11 @@ FaultKind = Literal[
 ]  # fmt: skip
 
 
+MOST_JITTER_MS = 60_000
+RESULTS = range(15)
+"""MAV_MISSION_RESULT without OPERATION_CANCELLED, by which a vehicle refuses no item."""
+
+
 @dataclass(frozen=True)
 class VehicleFault:
     """Something that goes wrong; what `at` and `amount` mean is in `FAULTS`."""
@@ -36,7 +41,7 @@ FAULTS: dict[FaultKind, str] = {
     "beside": "the vehicle stands AMOUNT metres to the left of item N's waypoint, and says it is reached",
     "finish": "item N's waypoint is said to be reached AMOUNT metres before it, in passing",
     "scanner": "scan N fails",
-    "unsigned": "nothing is signed, though there is a key (N means nothing)",
+    "unsigned": "nothing is signed, though there is a key; only what is signed is heard (N means nothing)",
 }
 
 
@@ -86,4 +91,24 @@ def read_vehicle_fault(text: str) -> VehicleFault:
         raise InputError(f"--fault {text}: write it KIND@N or KIND@N=AMOUNT, KIND of {kinds}") from None
     if not (fault.at >= 0 and 0 <= fault.amount < 1e9):
         raise InputError(f"--fault {text}: N and AMOUNT must be 0 or more")
+    if (wrong := _nonsense(fault)) is not None:
+        raise InputError(f"--fault {text}: {wrong}")
     return fault
+
+
+def _nonsense(fault: VehicleFault) -> str | None:
+    """What a fault must be that could not happen as it is."""
+    kind, at, amount = fault.kind, fault.at, fault.amount
+    if kind in ("loss", "duplicates") and at > 100:
+        return f"N is a percentage, 0 to 100, such as {kind}@20"
+    if kind == "jitter" and at > MOST_JITTER_MS:
+        return f"N is milliseconds, 0 to {MOST_JITTER_MS}, such as jitter@300"
+    if kind in ("lostack", "scanner") and at == 0:
+        return f"N counts from 1: {kind}@1 is the first"
+    if kind in ("beside", "finish") and amount == 0:
+        return f"AMOUNT is metres, more than 0, such as {kind}@{at}=0.4"
+    if kind == "nack" and amount not in RESULTS:
+        return (
+            f"RESULT is a MAV_MISSION_RESULT, {RESULTS[0]} to {RESULTS[-1]} (0: ERROR), such as nack@{at}=5"
+        )
+    return None

@@ -77,9 +77,9 @@ def vehicle_on(
     InputError
         If it cannot be opened there.
     """
-    key = None if setting.faults.any("unsigned") else signing_key
+    signs = setting.faults.any("unsigned") is None
     line = on_line(open_transport(url), setting.faults)
-    with closing(Wire(line, me=VEHICLE, signing_key=key)) as wire:
+    with closing(Wire(line, me=VEHICLE, signing_key=signing_key, signs=signs)) as wire:
         vehicle = Vehicle(setting, clock=WallClock(speed_up=speed_up), wall=WallClock(), say=wire.send)
         stop, stopped = threading.Event(), Stopped()
         thread = threading.Thread(target=_live, args=(vehicle, wire, stop, stopped), daemon=True)

@@ -35,7 +35,7 @@ def left_on(peer: Peer, before: Sequence[Item]) -> Left:
         try:
             held = download(peer)
         except (AnswerIsNo, RobotUnreachable):
-            return _unknown(peer)
+            return unknown(peer)
         if _same(peer, held, before):
             return _as_before(peer, before, "still")
     return _restored(peer, before)
@@ -46,13 +46,13 @@ def _restored(peer: Peer, before: Sequence[Item]) -> Left:
     if own_items(peer, before):
         ended = send_items(peer, before, window=window_for(peer))
         if ended.how == "silent":
-            return _unknown(peer)
+            return unknown(peer)
         if _holds(peer, before):
             return _as_before(peer, before, "again")
     if emptied(peer):
         was = "" if not own_items(peer, before) else "; the mission it had could not be put back"
         return Left(f"it holds no mission{was}")
-    return _unknown(peer)
+    return unknown(peer)
 
 
 def _as_before(peer: Peer, before: Sequence[Item], how: str) -> Left:
@@ -62,7 +62,8 @@ def _as_before(peer: Peer, before: Sequence[Item], how: str) -> Left:
     )
 
 
-def _unknown(peer: Peer) -> Left:
+def unknown(peer: Peer) -> Left:
+    """What is said where it could not be seen."""
     return Left(
         f"what it holds now is unknown{peer.why_silent()}: it may be half a mission, so do not start it "
         "before stopgo fetch-mission, stopgo clear or another push has gone through",

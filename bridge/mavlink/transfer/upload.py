@@ -7,13 +7,14 @@ is put back, or the vehicle emptied.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.transfer.download import Progress, download
-from bridge.mavlink.transfer.left import cancel, emptied, left_on, own_items
+from bridge.mavlink.transfer.left import cancel, emptied, left_on, own_items, unknown
 from bridge.mavlink.transfer.messages import result_name
 from bridge.mavlink.transfer.pace import window_for
 from bridge.mavlink.transfer.sending import Ended, send_items
@@ -25,8 +26,11 @@ ATTEMPTS = 4
 """Whole transfers, where the vehicle ended one or the read-back was not what was sent."""
 CLOCK_S = 2.0
 """For the vehicle's clock after an upload."""
+NOTHING_SENT = "nothing was sent of the mission; the vehicle holds what it held"
 SHOWN = 3
 """Differences that an error names."""
+Tell = Callable[[str], None]
+"""Takes a line for the person."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ def upload(
     *,
     while_running: bool = False,
     progress: Progress | None = None,
-    tell: Callable[[str], None] | None = None,
+    tell: Tell = lambda line: None,
 ) -> Uploaded:
     """Put the items on the vehicle, and see them there as its kind of autopilot keeps them.
 
@@ -65,7 +69,8 @@ def upload(
     progress
         Called with items done and to do: those sent, then those read back.
     tell
-        Takes the one line that says what is on the vehicle when a Ctrl-C has ended the upload.
+        Takes the one line that says what is on the vehicle when a Ctrl-C has ended the upload; a second
+        Ctrl-C does not wait until that was seen, and the line says that it is unknown.
 
     Raises
     ------
@@ -77,21 +82,19 @@ def upload(
         If what it holds is not known.
     """
     check_standing(peer, while_running)
-    peer.ask_clock()
-    boots = peer.boots
-    before = download(peer)
+    with if_stopped(tell, lambda: NOTHING_SENT):
+        peer.ask_clock()
+        boots = peer.boots
+        before = download(peer)
     if not differences(sent, before):
         return Uploaded(len(sent.items), already=True)
-    try:
+    with if_stopped(tell, lambda: _cancelled(peer, before, tell)):
         failure = _attempted(peer, sent, progress or (lambda done, total: None))
-    except (KeyboardInterrupt, SystemExit):
-        cancel(peer)
-        if tell is not None:
-            tell(f"the upload was cancelled; {left_on(peer, before).words}")
-        raise
     if failure is not None:
-        raise _error(peer, failure, before)
-    peer.clock_seen(patience_s=CLOCK_S)
+        with if_stopped(tell, lambda: f"{failure.why}; {unknown(peer).words}"):
+            raise _error(peer, failure, before)
+    with if_stopped(tell, lambda: "all was sent and read back as it should be"):
+        peer.clock_seen(patience_s=CLOCK_S)
     if peer.boots != boots:
         raise AnswerIsNo(
             f"{peer} was started again during the upload, and may have lost its origin; it holds the "
@@ -100,8 +103,27 @@ def upload(
     return Uploaded(len(sent.items), already=False)
 
 
-def clear(peer: Peer, *, while_running: bool = False) -> int:
+@contextmanager
+def if_stopped(tell: Tell, words: Callable[[], str]) -> Iterator[None]:
+    """Whoever stops the block, by Ctrl-C or SIGTERM, is told in a line how things stand."""
+    try:
+        yield
+    except (KeyboardInterrupt, SystemExit):
+        tell(words())
+        raise
+
+
+def _cancelled(peer: Peer, before: Sequence[Item], tell: Tell) -> str:
+    """What a cancelled upload left; that it is unknown, if seeing it is stopped too."""
+    with if_stopped(tell, lambda: f"the upload was cancelled twice; {unknown(peer).words}"):
+        cancel(peer)
+        return f"the upload was cancelled; {left_on(peer, before).words}"
+
+
+def clear(peer: Peer, *, while_running: bool = False, tell: Tell = lambda line: None) -> int:
     """Take the mission off the vehicle, and see that it is gone; gives the number of items it had.
+
+    `tell` takes the line that says how things stand when a Ctrl-C has ended it.
 
     Raises
     ------
@@ -109,8 +131,11 @@ def clear(peer: Peer, *, while_running: bool = False) -> int:
         As `upload`.
     """
     check_standing(peer, while_running, "would be left without one")
-    before = own_items(peer, download(peer))
-    if before and not emptied(peer):
+    with if_stopped(tell, lambda: NOTHING_SENT):
+        before = own_items(peer, download(peer))
+    with if_stopped(tell, lambda: unknown(peer).words):
+        gone = not before or emptied(peer)
+    if not gone:
         raise OutcomeUnknown(
             f"{peer}: told to empty its mission of {len(before)} items, and it was not seen empty"
             f"{peer.why_silent()}: what it holds is unknown; see stopgo fetch-mission"

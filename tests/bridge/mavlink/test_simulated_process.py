@@ -17,7 +17,7 @@ import pytest
 
 from bridge.mavlink.line.transport import Address
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import Message, Who, Wire, dialect, wire
+from bridge.mavlink.line.wire import SIGNATURE, Message, Who, Wire, dialect, wire
 from bridge.mavlink.simulated.faults import (
     FAULTS,
     VehicleFault,
@@ -136,6 +136,7 @@ def test_a_vehicle_that_cannot_keep_its_state_ends_and_says_so(tmp_path: Path) -
         (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--origin", "90,2,3"], "LAT,LON,ALT"),
         (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--fault", "slip@1"], "KIND@N"),
         (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--fault", "nack@-1"], "0 or more"),
+        (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--fault", "loss@200"], "0 to 100"),
         (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--keys", "k"], "--keys has no meaning"),
         (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--signing-key", "none"], "cannot be read"),
         (["--mavlink-vehicle", "udpin:203.0.113.9:14550", "--insecure"], "cannot listen there"),
@@ -224,8 +225,10 @@ def test_a_vehicle_that_should_sign_and_does_not() -> None:
         with wire(there(port), signing_key=KEY) as careful, careful.box() as box:
             careful.send(dialect.MAVLink_mission_request_list_message(1, 1, 0))
             assert box.get(0.5) is None
-        with wire(there(port)) as careless:
-            assert count_of(careless) == 0
+            assert careful.dropped[SIGNATURE] > 0
+        with wire(there(port)) as careless, careless.box("MISSION_COUNT") as box:
+            careless.send(dialect.MAVLink_mission_request_list_message(1, 1, 0))
+            assert box.get(0.5) is None, "it hears only what is signed"
 
 
 @pytest.mark.parametrize("profile", list(PROFILES))
@@ -276,6 +279,19 @@ def test_frames_are_lost_and_doubled_by_chance_and_by_seed(fault: str, least: in
 def test_a_line_without_faults_is_the_line() -> None:
     loop = Loop()
     assert on_line(loop, VehicleFaults((VehicleFault("nack", 1),))) is loop
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("loss@101", "0 to 100"), ("duplicates@200", "0 to 100"), ("jitter@60001", "milliseconds"),
+        ("beside@1", "metres"), ("finish@1=0", "metres"), ("nack@0=99", "MAV_MISSION_RESULT"),
+        ("nack@1=1.5", "MAV_MISSION_RESULT"), ("scanner@0", "from 1"), ("lostack@0", "from 1"),
+    ],
+)  # fmt: skip
+def test_a_fault_that_could_not_happen_is_refused_with_one_that_could(text: str, said: str) -> None:
+    with pytest.raises(InputError, match=f"{text}: .*{said}.*@"):
+        read_vehicle_fault(text)
 
 
 def test_every_fault_can_be_written_and_is_in_the_guide() -> None:

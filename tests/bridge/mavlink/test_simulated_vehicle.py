@@ -615,6 +615,16 @@ def test_a_reboot_in_the_middle_of_the_mission(make: Make) -> None:
     assert bench.reached() == [0, 1]
 
 
+def test_its_time_since_boot_does_not_run_ahead_of_the_messages(make: Make) -> None:
+    """Sped up, messages that overtake each other by 0.3 s must not look like a reboot."""
+    bench = make(faults=["jitter@300"])
+    bench.clock.wait(100.0)
+    bench.pass_time(5.0)
+    assert bench.vehicle.boot_ms == 5_000
+    bench.vehicle.reboot()
+    assert bench.vehicle.boot_ms == 0
+
+
 def test_a_stop_error_is_not_told(make: Make) -> None:
     bench = make(faults=[f"beside@{make().first}=0.5"])
     bench.upload([waypoint(4.0, 0.0)])

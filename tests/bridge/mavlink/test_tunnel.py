@@ -22,10 +22,11 @@ from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.tunnel import QUEUE, Frames, Tunnel, open_tunnel
 from bridge.protocol import Keys
 from bridge.spawn import end_robot, free_port, robot_process, start
+from bridge.tunnel_commands import Refusals, RefusalsHeard
 from bridge.zenoh_link import Guard, connecting
 from mission.errors import OutcomeUnknown, RobotUnreachable
 from tests.bridge.mavlink.gateway import rover
-from tests.bridge.mavlink.scripted import free_udp_port
+from tests.bridge.mavlink.scripted import Scripted, free_udp_port
 from tests.bridge.mavlink.test_simulated_mavsdk import item_of, raw, station, tour
 
 KEYS = Keys("r1")
@@ -224,6 +225,36 @@ def test_without_raw_orders_arming_is_refused_in_words_and_hold_passes(tmp_path:
             assert peer.command(dialect.MAV_CMD_DO_SET_MODE, *operator.driving.hold.params).accepted
         assert operator.mode() == "HOLD"
         assert not operator.peer.armed
+
+
+def test_the_station_is_told_once_for_each_kind_of_message_that_is_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    heard, reader = RefusalsHeard("r1"), Frames(tunnels.Counter())
+    count, arm = dialect.MAVLink_mission_count_message(1, 1, 3, 0), COMMAND(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
+    told = [Refusals().told(message) for message in (count, arm, count)]
+    capsys.readouterr()
+    for frame in (*told, *frames(1)):
+        for _, message in reader.take(frame, datagram=True):
+            heard.hears(message)
+    said = capsys.readouterr().err.splitlines()
+    assert [line.split("refused ")[1].split(":")[0] for line in said] == [
+        "MISSION_COUNT",
+        "COMPONENT_ARM_DISARM (COMMAND_LONG)",
+    ]
+    assert all("r1" in line and "--raw-orders" in line for line in said)
+
+
+def test_a_tunnels_refusal_is_named_where_the_vehicle_would_seem_silent() -> None:
+    words = dialect.MAVLink_statustext_message(4, b"tunnel refused MISSION_COUNT")
+    with Scripted() as vehicle, reached(vehicle.url, vehicle=1, timeout_s=2.0) as peer:
+        assert "does it want signed messages" in peer.why_silent()
+        tunnel = dialect.MAVLink(None, 1, dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
+        (told,) = tunnel.parse_buffer(bytes(words.pack(tunnel))) or []
+        assert peer._newest.wants(told)
+        peer._newest.put(told)
+        assert peer.why_silent() == ' (it last said "tunnel refused MISSION_COUNT")'
+        assert peer.newest("STATUSTEXT") is None, "that is the autopilot's own"
 
 
 def test_the_tunnel_joins_the_robots_own_end_and_comes_back_after_a_kill(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 from bridge.mavlink.line.origin import check_origin
 from bridge.mavlink.line.peer import Peer, reached
 from bridge.mavlink.line.wire import Message, Who, dialect
+from bridge.mavlink.transfer import upload as uploads
 from bridge.mavlink.transfer.download import download
 from bridge.mavlink.transfer.messages import item_message, item_of
 from bridge.mavlink.transfer.upload import Uploaded, clear, upload
@@ -329,6 +330,31 @@ def test_ctrl_c_leaves_the_mission_before_and_says_so(kind: type[Scripted], befo
         assert dialect.MAV_MISSION_OPERATION_CANCELLED in vehicle.acks
         assert items_on(vehicle)[1:] == items_on_list(held(before))[1:]
     assert len(told) == 1 and "holds the mission it had before (6 items)" in told[0]
+
+
+def test_a_second_ctrl_c_leaves_at_once_and_says_that_it_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    told: list[str] = []
+    monkeypatch.setattr(uploads, "left_on", interrupt)
+    with Scripted(held(OLD)) as vehicle, pytest.raises(KeyboardInterrupt):
+        pushed(vehicle, progress=interrupt, tell=told.append)
+    (line,) = told
+    assert "what it holds now is unknown" in line and "do not start it before" in line
+
+
+def test_ctrl_c_while_the_old_mission_is_read_says_that_nothing_was_sent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    told: list[str] = []
+    monkeypatch.setattr(uploads, "download", interrupt)
+    with Scripted(held(OLD)) as vehicle, pytest.raises(KeyboardInterrupt):
+        pushed(vehicle, tell=told.append)
+    assert told == ["nothing was sent of the mission; the vehicle holds what it held"]
 
 
 # What may not be touched.

@@ -23,7 +23,11 @@ from mission.errors import InputError
 )
 def test_each_kind_is_read(text: str, url: Url) -> None:
     assert read_url(text) == url
-    assert read_url(str(url)).number == url.number
+    assert read_url(str(url)) == url
+
+
+def test_an_ipv6_address_is_shown_in_brackets() -> None:
+    assert str(read_url("udpout://[::1]:24550")) == "udpout:[::1]:24550"
 
 
 @pytest.mark.parametrize(

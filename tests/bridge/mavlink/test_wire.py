@@ -272,7 +272,25 @@ def test_a_key_is_hexadecimal_or_a_passphrase(tmp_path: Path) -> None:
     assert read_signing_key(path) == hashlib.sha256(b"correct horse").digest()
 
 
-@pytest.mark.parametrize(("content", "said"), [(b"", "is empty"), (b"\xff\xfe", "cannot be read .not text")])
+def test_a_key_that_others_can_read_is_told_of_without_showing_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "key"
+    path.write_text("correct horse\n")
+    path.chmod(0o600)
+    read_signing_key(path)
+    assert capsys.readouterr().err == ""
+    path.chmod(0o644)
+    read_signing_key(path)
+    said = capsys.readouterr().err
+    assert "others on this machine can read it; chmod 600" in said and said.count("\n") == 1
+    assert "horse" not in said
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [(b"", "is empty"), (b"\xff\xfe", "is not text; write 64 hex.* xxd"), (b"short", "too short")],
+)
 def test_a_file_without_a_key_is_refused(tmp_path: Path, content: bytes, said: str) -> None:
     path = tmp_path / "key"
     path.write_bytes(content)

@@ -323,8 +323,19 @@ def test_four_items_per_stop_fill_a_vehicle(name, most):
 
 def test_more_items_than_the_vehicle_holds_are_refused():
     assert len(translate(square_tour(), max_items=11).items) == 10  # and home
-    with pytest.raises(AnswerIsNo, match=r"2 stops make 11 items, ardupilot holds 10"):
+    with pytest.raises(AnswerIsNo, match=r"2 stops make 11 items, ardupilot holds 10; --settle hold"):
         translate(square_tour(), max_items=10)
+
+
+@pytest.mark.parametrize(("most", "said"), [(9, "9, which is enough; or"), (8, "9, which is not enough")])
+def test_too_many_items_say_whether_settling_by_hold_is_enough(most, said):
+    with pytest.raises(AnswerIsNo, match=said):
+        translate(square_tour(), max_items=most)
+    if most == 9:
+        assert len(translate(square_tour(), settle="hold", max_items=most).items) == 8  # and home
+    else:
+        with pytest.raises(AnswerIsNo, match="make 9 items, ardupilot holds 8; plan fewer"):
+            translate(square_tour(), settle="hold", max_items=most)
 
 
 @pytest.mark.parametrize(
