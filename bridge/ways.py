@@ -49,7 +49,7 @@ SigningKey = Annotated[
     typer.Option(
         "--signing-key",
         metavar="FILE",
-        help="Sign what is said over MAVLink; FILE holds 64 hex digits or a passphrase of 8 characters.",
+        help="Sign what is said over MAVLink; FILE: 64 hex digits or a passphrase of at least 8 characters.",
     ),
 ]
 StateFolder = Annotated[
