@@ -24,14 +24,11 @@ from bridge.journal import Journal
 from bridge.lease import Denied, claimed, lasting_ns
 from bridge.protocol import Answer, Command, Commit, Lease, Rejected, encode
 from bridge.revision import RevisionPolicy
-from bridge.robots import Base, Scanner
+from bridge.robots import Base, Rest, Scanner
 from bridge.run import Change, Run
 from mission.document import Mission, Stop
 from mission.events import Pose, StateReport
 
-STILL_M = 0.002
-"""Greatest motion of a robot that stands still while it settles."""
-STILL_RAD = 0.002
 SETTLE_SAMPLE_S = 0.1
 SETTLE_LIMIT_S = 30.0
 """How much longer than `settle_s` a robot may take to stand still."""
@@ -350,7 +347,7 @@ class Controller:
             if self._clock.wait(pause, self._interrupt):
                 return None
             waited, still_for, pose = waited + pause, still_for + pause, self._base.pose()
-            if moved(resting, pose):
+            if moved(resting, pose, self._base.rest()):
                 still_for, resting = 0.0, pose
         return True
 
@@ -490,8 +487,8 @@ def distance(pose: Pose, stop: Stop) -> float:
     return math.hypot(pose.x - stop.x, pose.y - stop.y)
 
 
-def moved(before: Pose, after: Pose) -> bool:
-    """Whether the robot moved by more than one that stands still may."""
-    if math.hypot(after.x - before.x, after.y - before.y) > STILL_M:
+def moved(before: Pose, after: Pose, rest: Rest) -> bool:
+    """Whether the robot moved by more than one that stands still seems to."""
+    if math.hypot(after.x - before.x, after.y - before.y) > rest.metres:
         return True
-    return abs(math.remainder(after.heading - before.heading, math.tau)) > STILL_RAD
+    return abs(math.remainder(after.heading - before.heading, math.tau)) > rest.radians

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from threading import Event
 
-from bridge.robots import Base, Outcome
+from bridge.robots import Base, Outcome, Rest
 from mission.document import Mission, Point, RobotSpec, Transform
 from mission.events import Pose
 
@@ -40,6 +40,9 @@ class OnMap:
 
     def endurance_s(self) -> float | None:
         return self._base.endurance_s()
+
+    def rest(self) -> Rest:
+        return self._base.rest()
 
     def goto(
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event

@@ -28,6 +28,13 @@ class ScanFailed(msgspec.Struct, frozen=True, kw_only=True):
     reason: str
 
 
+class Rest(msgspec.Struct, frozen=True, kw_only=True):
+    """By how much the poses of a base that stands still differ: what its localisation makes of standing."""
+
+    metres: float = 0.002
+    radians: float = 0.002
+
+
 class Base(Protocol):
     """What carries the scanner. Poses are in the mission's frame."""
 
@@ -41,6 +48,9 @@ class Base(Protocol):
 
     def endurance_s(self) -> float | None:
         """Seconds that a full battery lasts at work; `None` if it cannot tell."""
+
+    def rest(self) -> Rest:
+        """What counts as standing still while a robot settles."""
 
     def goto(
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event

@@ -16,7 +16,7 @@ import msgspec
 
 from bridge.clock import Clock
 from bridge.motion import Brake, Motion, along
-from bridge.robots import Outcome, ScanFailed, ScanResult
+from bridge.robots import Outcome, Rest, ScanFailed, ScanResult
 from mission.document import Mission, Point, RobotSpec, Scan
 from mission.errors import InputError
 from mission.events import Pose
@@ -132,6 +132,9 @@ class SimulatedBase:
     def endurance_s(self) -> float | None:
         used = self._wear.battery_per_s
         return 1.0 / used if used > 0 else None
+
+    def rest(self) -> Rest:
+        return Rest()
 
     def goto(
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event

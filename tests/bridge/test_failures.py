@@ -7,6 +7,7 @@ import sqlite3
 import msgspec
 import pytest
 
+from bridge.robots import Rest
 from bridge.simulator import Fault, Faults, read_fault
 from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError
@@ -111,6 +112,13 @@ def test_a_robot_that_never_stands_still_fails_the_stop() -> None:
     field = started(corridor(retries=0), Fault("shaking", 1, 1000.0))
     field.work()
     assert field.controller.run.reason == "s1: not still within 32 s"
+
+
+def test_a_base_that_is_located_less_well_stands_still_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    field = started(corridor(retries=0), Fault("shaking", 1, 1000.0))
+    monkeypatch.setattr(field.base, "rest", lambda: Rest(metres=0.02, radians=0.02))
+    field.work()
+    assert field.controller.run.done == ("s1", "s2", "s3")
 
 
 def test_a_low_battery_sends_it_home_and_it_goes_on_once_charged() -> None:

@@ -15,7 +15,7 @@ from bridge.mavlink.gateway.autopilot import ORDER_S, Autopilot
 from bridge.mavlink.gateway.course import NEAR_M, STALLED_S, Course, Patience
 from bridge.mavlink.gateway.local import UNPLACED, LocalFrame, apart, local_frame
 from bridge.mavlink.line.peer import Origin
-from bridge.robots import Outcome
+from bridge.robots import Outcome, Rest
 from mission.document import Mission, Point, RobotSpec, SiteOrigin
 from mission.events import Pose
 
@@ -28,6 +28,8 @@ WARM_UP_S = 1.2
 """Setpoints must have come for a second before an autopilot that lives on them lets itself be driven."""
 TURN_S = 20.0
 TURNED_RAD = math.radians(1.0)
+ESTIMATED = Rest(metres=0.005, radians=0.005)
+"""An estimator of a vehicle that stands wanders by some millimetres."""
 HEADING_RAD = math.radians(5.0)
 """How far a heading may be missed by a mission whose scanner does not see all around."""
 
@@ -77,6 +79,9 @@ class MavlinkBase:
 
     def endurance_s(self) -> float | None:
         return None
+
+    def rest(self) -> Rest:
+        return ESTIMATED
 
     def unfit(self, mission: Mission) -> str:
         site, origin = mission.georeference, self.autopilot.origin()
