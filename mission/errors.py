@@ -35,7 +35,7 @@ class AnswerIsNo(StopgoError):
 
     exit_code = 1
 
-    def __init__(self, message: str, *, reason: str | None = None) -> None:
+    def __init__(self, message: str = "", *, reason: str | None = None) -> None:
         super().__init__(message)
         self.reason = reason
         """The robot's word for why it refused, if it is one of the protocol's."""
