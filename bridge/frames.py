@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from threading import Event
 
 from bridge.robots import Base, Outcome, Rest
+from mission import turning
 from mission.document import Mission, Point, RobotSpec, Transform
 from mission.events import Pose
-
-SAME = Transform(x=0.0, y=0.0, heading=0.0)
+from mission.turning import SAME
 
 
 class OnMap:
@@ -66,8 +66,7 @@ class OnMap:
 
 def turned_point(point: Point, to_map: Transform) -> Point:
     """Site to map: turned by `heading`, then shifted."""
-    cos, sin = math.cos(to_map.heading), math.sin(to_map.heading)
-    return (to_map.x + cos * point[0] - sin * point[1], to_map.y + sin * point[0] + cos * point[1])
+    return turning.turned(to_map, point)
 
 
 def turned(pose: Pose, to_map: Transform) -> Pose:
@@ -80,7 +79,6 @@ def turned_back(pose: Pose, to_map: Transform) -> Pose:
     """A pose of the map in the site's frame; exactly itself where there is nothing to turn."""
     if to_map == SAME:
         return pose
-    cos, sin = math.cos(to_map.heading), math.sin(to_map.heading)
-    dx, dy = pose.x - to_map.x, pose.y - to_map.y
+    x, y = turning.turned_back(to_map, (pose.x, pose.y))
     heading = math.remainder(pose.heading - to_map.heading, math.tau)
-    return Pose(x=cos * dx + sin * dy, y=-sin * dx + cos * dy, heading=heading)
+    return Pose(x=x, y=y, heading=heading)

@@ -7,8 +7,9 @@ import re
 
 from mission.document import Mission, Point, Stop
 from mission.files.exports.format import Supplements
-from mission.files.exports.way import SAME, frame_name, mapped, turned_back
+from mission.files.exports.way import frame_name, mapped
 from mission.table import printable
+from mission.turning import SAME, turned_back
 
 _NUMBER = r"(-?\d+\.\d+)"
 _POSE = re.compile(rf"^    pose: \[{_NUMBER}, {_NUMBER}, {_NUMBER}\]$", re.MULTILINE)

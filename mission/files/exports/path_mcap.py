@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 from mission.document import Mission, Point
 from mission.files.exports.format import Supplements
 from mission.files.exports.nav2_yaml import unmapped
-from mission.files.exports.way import SAME, Waypoint, frame_name, mapped, turned_back, way
+from mission.files.exports.way import Waypoint, frame_name, mapped, way
+from mission.turning import SAME, turned_back
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore

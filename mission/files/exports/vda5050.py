@@ -16,7 +16,8 @@ import msgspec
 from mission.document import Mission, Point, Stop
 from mission.files.exports.format import Supplements
 from mission.files.exports.nav2_yaml import unmapped
-from mission.files.exports.way import SAME, Waypoint, frame_name, mapped, turned_back, way
+from mission.files.exports.way import Waypoint, frame_name, mapped, way
+from mission.turning import SAME, turned_back
 
 VERSION = "2.1.0"
 UNNAMED = "unknown"

@@ -10,8 +10,7 @@ from itertools import pairwise
 import msgspec
 
 from mission.document import Frame, Mission, Point, Stop, Transform
-
-SAME = Transform(x=0.0, y=0.0, heading=0.0)
+from mission.turning import turned
 
 
 @dataclass(frozen=True)
@@ -78,19 +77,6 @@ def mapped(mission: Mission) -> Mission:
         stops=tuple(_turned_stop(to_map, stop) for stop in mission.stops),
         return_=None if mission.return_ is None else _turned_leg(to_map, mission.return_),
     )
-
-
-def turned(to_map: Transform, point: Point) -> Point:
-    """A point of the site on the map."""
-    cos, sin = math.cos(to_map.heading), math.sin(to_map.heading)
-    return (to_map.x + cos * point[0] - sin * point[1], to_map.y + sin * point[0] + cos * point[1])
-
-
-def turned_back(to_map: Transform, point: Point) -> Point:
-    """A point of the map on the site: the inverse of `turned`."""
-    cos, sin = math.cos(to_map.heading), math.sin(to_map.heading)
-    x, y = point[0] - to_map.x, point[1] - to_map.y
-    return (cos * x + sin * y, cos * y - sin * x)
 
 
 def _turned_stop(to_map: Transform, stop: Stop) -> Stop:

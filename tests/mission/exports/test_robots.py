@@ -18,7 +18,8 @@ from ruamel.yaml import YAML
 from mission.document import Mission, Transform
 from mission.files.exports import FORMATS, exported
 from mission.files.exports.format import Supplements
-from mission.files.exports.way import mapped, turned, turned_back, way
+from mission.files.exports.way import mapped, way
+from mission.turning import turned, turned_back
 from tests.mission.exports.vda5050_order import ORDER
 from tests.mission.exports.worlds import MAP, laboratory, on_a_map
 from tests.mission.worlds import mission_of, square_tour, stop
