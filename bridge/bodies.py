@@ -82,12 +82,9 @@ class AutopilotBody:
         from bridge.mavlink.gateway.autopilot import on_board
         from bridge.mavlink.gateway.base import MavlinkBase
         from bridge.mavlink.gateway.scanner import MavlinkScanner
-        from bridge.mavlink.line.url import check_guarded, read_url
-        from bridge.mavlink.line.wire import read_signing_key
+        from bridge.mavlink.line.wire import read_line
 
-        url = read_url(self.url, "--controller")
-        key = None if self.signing_key is None else read_signing_key(self.signing_key)
-        check_guarded(url, signed=key is not None, insecure=self.insecure, option="--controller")
+        url, key = read_line(self.url, self.signing_key, insecure=self.insecure, option="--controller")
         with on_board(url, signing_key=key, vehicle=self.vehicle, timeout_s=self.patience_s) as autopilot:
             base = MavlinkBase(autopilot, clock=clock, arm=self.arm)
             scanner = MavlinkScanner(autopilot, clock=clock, trigger=self.trigger)

@@ -188,12 +188,9 @@ def reached(way: Way) -> AbstractContextManager[Station]:
 def _vehicle(way: Way, mavlink: Mavlink) -> AbstractContextManager[Station]:
     from bridge.mavlink.desk.desk import Options, connect
     from bridge.mavlink.desk.orders import Consent
-    from bridge.mavlink.line.url import check_guarded, read_url
-    from bridge.mavlink.line.wire import read_signing_key
+    from bridge.mavlink.line.wire import read_line
 
-    url = read_url(mavlink.url)
-    key = None if mavlink.signing_key is None else read_signing_key(mavlink.signing_key)
-    check_guarded(url, signed=key is not None, insecure=way.insecure)
+    url, key = read_line(mavlink.url, mavlink.signing_key, insecure=way.insecure)
     options = Options(
         vehicle=mavlink.vehicle, signing_key=key, state=mavlink.state, timeout_s=way.timeout_s,
         commander=way.who, consent=Consent(mavlink.arm, mavlink.disarm, mavlink.any_origin),

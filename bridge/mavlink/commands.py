@@ -15,8 +15,8 @@ from bridge.mavlink.desk.logbook import forget, logbook, remember
 from bridge.mavlink.desk.standing import check_run_over
 from bridge.mavlink.line.origin import check_origin
 from bridge.mavlink.line.peer import Origin, Peer, reached
-from bridge.mavlink.line.url import Url, check_guarded, read_url
-from bridge.mavlink.line.wire import read_signing_key
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import read_line
 from bridge.mavlink.transfer.download import download
 from bridge.mavlink.transfer.left import own_items
 from bridge.mavlink.transfer.upload import NOTHING_SENT, Uploaded, check_standing, clear, if_stopped, upload
@@ -145,9 +145,7 @@ def _peer(line: Line) -> Iterator[tuple[Url, Peer]]:
     """The vehicle that is meant."""
     if line.autopilot is not None:
         _choice("--autopilot", line.autopilot, tuple(AUTOPILOTS))
-    url = read_url(line.url)
-    key = None if line.signing_key is None else read_signing_key(line.signing_key)
-    check_guarded(url, signed=key is not None, insecure=line.insecure)
+    url, key = read_line(line.url, line.signing_key, insecure=line.insecure)
     with reached(url, vehicle=line.vehicle, signing_key=key, timeout_s=line.timeout_s) as peer:
         peer.autopilot = line.autopilot or peer.autopilot
         yield url, peer

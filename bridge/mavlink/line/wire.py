@@ -25,7 +25,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.console import say
 from bridge.mavlink.line.transport import Address, Transport, open_transport
-from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.url import Url, check_guarded, read_url
 from mission.errors import InputError
 
 Message = Any
@@ -289,6 +289,22 @@ def wire(url: Url, *, me: Who = GROUND_STATION, signing_key: bytes | None = None
         yield opened
     finally:
         opened.close()
+
+
+def read_line(
+    text: str, signing_key: Path | None, *, insecure: bool, option: str = "--mavlink"
+) -> tuple[Url, bytes | None]:
+    """Where a vehicle is, and the key that what is said to it is signed with, guarded as it should be.
+
+    Raises
+    ------
+    InputError
+        As `read_url`, `read_signing_key` and `check_guarded` do, in this order.
+    """
+    url = read_url(text, option)
+    key = None if signing_key is None else read_signing_key(signing_key)
+    check_guarded(url, signed=key is not None, insecure=insecure, option=option)
+    return url, key
 
 
 def read_signing_key(path: Path) -> bytes:

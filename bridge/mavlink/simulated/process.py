@@ -11,8 +11,8 @@ from pathlib import Path
 
 from bridge.clock import WallClock
 from bridge.mavlink.line.transport import open_transport
-from bridge.mavlink.line.url import Url, check_guarded, read_url
-from bridge.mavlink.line.wire import Who, Wire, read_signing_key
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import Who, Wire, read_line
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.line import on_line
 from bridge.mavlink.simulated.orders import NORTHMOST
@@ -48,9 +48,7 @@ class VehicleOptions:
 def run_vehicle(options: VehicleOptions, ready: Callable[[Url], None]) -> None:
     """Be a vehicle until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
     signal.signal(signal.SIGTERM, _leave)
-    url = read_url(options.url, OPTION)
-    key = None if options.signing_key is None else read_signing_key(options.signing_key)
-    check_guarded(url, signed=key is not None, insecure=options.insecure, option=OPTION)
+    url, key = read_line(options.url, options.signing_key, insecure=options.insecure, option=OPTION)
     with vehicle_on(url, setting_of(options), speed_up=options.speed_up, signing_key=key) as stopped:
         ready(url)
         stopped.wait()
