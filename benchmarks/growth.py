@@ -83,7 +83,7 @@ def plot(rows: list[list[object]]) -> str:
     def y(seconds: float) -> float:
         return 300 - 260 * (log10(max(seconds, 0.03)) - log10(0.03)) / (log10(1000) - log10(0.03))
 
-    points = [(x(float(row[0])), y(float(row[8]))) for row in rows]  # type: ignore[arg-type]
+    points = [(x(float(row[0])), y(float(row[8]))) for row in rows]
     lines = [
         f'<polyline fill="none" stroke="#1a6" stroke-width="2" points="{" ".join(f"{a:.1f},{b:.1f}" for a, b in points)}"/>'
     ]

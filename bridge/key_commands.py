@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from bridge.console import print_json
 from mission.errors import InputError
 
 SiteFolder = Annotated[Path, typer.Option("--in", metavar="DIR", help="The site's folder of keys.")]
@@ -76,7 +76,7 @@ def keys_show(
     found = holders(given[0])
     if json_:
         keys = [{"role": who.role, "name": who.name, "not_after": who.not_after.isoformat()} for who in found]
-        print(json.dumps({"keys": keys}))  # noqa: T201
+        print_json({"keys": keys})
         return
     for who in found:
         left = (who.not_after - now_utc()).days
