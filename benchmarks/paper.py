@@ -39,6 +39,7 @@ from planner.navigable import navigable
 from planner.routing import GRAPHS, ROUTERS, route
 from planner.selection import select
 from planner.selection.cover import cover_of
+from planner.selection.demands import demands_of
 from planner.selection.greedy import greedy as choose_greedily
 from planner.visibility.bresenham import bresenham
 from planner.visibility.exact import exact
@@ -83,8 +84,8 @@ class Case:
         return read_floor(FLOORS / f"synthetic_{self.name}.dxf", d_dis=self.settings.d_dis)
 
 
-STRUCTURAL = Settings(edge=0.0)
-ROOMS = Settings(doors="closed", robot_radius=0.34)
+STRUCTURAL = Settings(edge=0.0, coverage_rule="paper")
+ROOMS = Settings(doors="closed", robot_radius=0.34, coverage_rule="paper")
 
 CASES = (
     Case(
@@ -187,7 +188,7 @@ def measured(case: Case, strategy: str) -> Ours:
     seen = timed("exact", lambda: exact(found))
     timed("exact, compiled", lambda: exact_compiled(found))
     raster = timed("bresenham", lambda: bresenham(found))
-    timed("greedy alone", lambda: choose_greedily(cover_of(seen, required=settings.coverage)))
+    timed("greedy alone", lambda: choose_greedily(cover_of(seen, demands_of(seen))))
     by_raster = select(_changed(raster, selector="greedy"))
     greedy = timed("greedy", lambda: select(_changed(seen, selector="greedy")))
     default = timed("default", lambda: select(_changed(seen, selector="default")))

@@ -55,6 +55,11 @@ class Targets:
         a, b = self.a[self.unit_segment], self.b[self.unit_segment]
         return frozen(a + t[:, None] * (b - a))
 
+    @cached_property
+    def unit_length(self) -> FloatArray:
+        """Length of each unit in metres (n,)."""
+        return frozen((np.hypot(*(self.b - self.a).T) / self.units)[self.unit_segment])
+
     def by_kind(self, elements: tuple[Element, ...]) -> dict[str, int]:
         """Units per element kind."""
         counts: dict[str, int] = {}
@@ -110,9 +115,18 @@ class NavigableSpace:
     gaps: FloatArray
     """Straight crossings (k, 2, 2) of openings exactly as wide as the robot, between drive areas."""
     targets: Targets
+    unit_room: IntArray
+    """Index into `rooms` of the room that each unit faces, -1 where it faces none (units,)."""
     ground: tuple[Polygon, ...] = ()
     """The floor layer and the floor under inner openings."""
     findings: tuple[Finding, ...] = ()
+
+
+def weights_of(targets: Targets, settings: Settings) -> IntArray:
+    """What each unit counts in a coverage (n,): its length in micrometres, or 1 by the paper's rule."""
+    if settings.coverage_rule == "paper":
+        return frozen(np.ones(targets.total), np.int64)
+    return frozen(np.maximum(1, np.rint(targets.unit_length * 1e6)), np.int64)
 
 
 DROP_REASONS = (
@@ -155,6 +169,8 @@ class Candidates:
     """Whether each candidate stands in a doorway (n,); empty where none does."""
     must: BoolArray = field(default_factory=lambda: frozen([], np.bool_))
     """Whether a stop must be at each candidate (n,); empty where none must."""
+    extra: BoolArray = field(default_factory=lambda: frozen([], np.bool_))
+    """Whether each candidate was added beside a chosen one, and does not count for what is visible (n,)."""
     heading: FloatArray = field(default_factory=lambda: frozen([]))
     """The scanner's heading at each candidate (n,); empty where it looks all round."""
 
@@ -172,6 +188,11 @@ class Candidates:
     def must_rows(self) -> IntArray:
         """Rows (indices into `kept`) of the candidates where a stop must be."""
         return self._rows_where(self.must)
+
+    @cached_property
+    def extra_rows(self) -> IntArray:
+        """Rows (indices into `kept`) of the candidates that were added beside chosen ones."""
+        return self._rows_where(self.extra)
 
     def _rows_where(self, flag: BoolArray) -> IntArray:
         return frozen(np.flatnonzero(flag[self.kept]) if len(flag) else [], np.int64)
@@ -213,8 +234,8 @@ class Visibility:
 
     @cached_property
     def visible(self) -> BoolArray:
-        """Whether any candidate sees each unit (n,)."""
-        return self.seen_from(np.arange(self.rows))
+        """Whether any candidate, those added beside chosen ones aside, sees each unit (n,)."""
+        return self.seen_from(np.setdiff1d(np.arange(self.rows), self.candidates.extra_rows))
 
     def seen_from(self, rows: IntArray) -> BoolArray:
         """Whether any of the candidates in `rows` sees each unit (n,)."""
@@ -242,7 +263,7 @@ class Selection:
 
     @property
     def coverage(self) -> float:
-        """Share of the visible units that the chosen stops see."""
+        """Share of what is visible that the chosen stops see, by the settings' rule."""
         return float(self.coverage_steps[-1]) if len(self.coverage_steps) else 0.0
 
     @cached_property
@@ -331,4 +352,5 @@ __all__ = [
     "Targets",
     "Unreached",
     "Visibility",
+    "weights_of",
 ]

@@ -32,7 +32,13 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     max_err_dist: float = 0.5
     """Greatest distance in metres from a stop to the grid's node that stands for it."""
     coverage: float = 0.9
-    """c_min: share of the visible units that the chosen stops must see."""
+    """c_min: least share of what is visible that the chosen stops must see, of the whole …"""
+    room_coverage: float = 0.7
+    """… of what each room shows …"""
+    kind_coverage: float = 0.7
+    """… and of each kind of element."""
+    coverage_rule: Literal["length", "paper"] = "length"
+    """Whether coverage counts metres of boundary; or units of the whole only, as the paper does."""
     d_sec: float = 0.7
     """Least distance from a stop to any element."""
     d_dis: float = 0.05
@@ -62,6 +68,8 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Places where a stop must be."""
     avoid: tuple[tuple[float, float, float], ...] = ()
     """Circles x, y, radius in which no stop may be."""
+    refine: bool | None = None
+    """Whether places beside the chosen stops are offered too; None: where that takes at most a second."""
     door_scan: bool = False
     """Whether a stop is added in every doorway that is driven through, to help registration."""
     door_candidates: bool = False
@@ -106,6 +114,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 SECTIONS: dict[str, tuple[str, ...]] = {
     "plan": (
         *("candidates", "visibility", "selector", "router", "coverage", "d_sec", "d_dis", "grid"),
+        *("room_coverage", "kind_coverage", "coverage_rule", "refine"),
         *("graph", "den_grid_min", "max_err_dist"),
         *("d_max", "l_min", "dens_min"),
         *("door_access", "edge", "doors", "targets", "tour", "start", "end", "use", "avoid"),
@@ -247,6 +256,9 @@ def _numbers(value: object) -> list[float]:
 def _check_shares(settings: Settings) -> None:
     if not 0 < settings.coverage <= 1:
         raise InputError(f"coverage = {settings.coverage}: must be above 0 and at most 1 (0.9 is 90 %)")
+    for key in ("room_coverage", "kind_coverage"):
+        if not 0 <= getattr(settings, key) <= 1:
+            raise InputError(f"{key} = {getattr(settings, key)}: must be between 0 and 1 (0.7 is 70 %)")
     if not 0 <= settings.battery_min < 1:
         raise InputError(f"battery_min = {settings.battery_min}: must be at least 0 and below 1")
     if settings.d_dis < 1e-3:

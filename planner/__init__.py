@@ -37,6 +37,7 @@ def plan(floor: FloorPlan, settings: Settings, *, observe: Observe = lambda noun
 def plan_part(found: Candidates, *, observe: Observe, number: int = 0) -> Mission:
     """Plan from candidates on; `number` tells the missions of one floor apart."""
     from planner.assemble import assemble
+    from planner.refine import refined
     from planner.routing import route
     from planner.selection import select
     from planner.visibility import visibility
@@ -44,7 +45,10 @@ def plan_part(found: Candidates, *, observe: Observe, number: int = 0) -> Missio
     observe(found)
     seen = visibility(found)
     observe(seen)
-    selection = select(seen)
+    selection = refined(select(seen))
+    if selection.visibility is not seen:
+        observe(selection.visibility.candidates)
+        observe(selection.visibility)
     observe(selection)
     driven = route(selection)
     observe(driven)

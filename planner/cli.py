@@ -65,7 +65,12 @@ def plan_command(
     max_err_dist: Annotated[float | None, typer.Option(help="Stop to its grid node at most, m.")] = None,
     range_: Annotated[float | None, typer.Option("--range", help="Scanner's range, m.")] = None,
     fov: Annotated[float | None, typer.Option(help="Scanner's field of view, degrees.")] = None,
-    coverage: Annotated[float | None, typer.Option(help="Share of the visible units to be seen.")] = None,
+    coverage: Annotated[float | None, typer.Option(help="Least share of all that is visible.")] = None,
+    room_coverage: Annotated[float | None, typer.Option(help="Least share of what each room shows.")] = None,
+    kind_coverage: Annotated[float | None, typer.Option(help="Least share of each kind of element.")] = None,
+    coverage_rule: Annotated[
+        str | None, typer.Option(help="length, or paper (units of the whole, no least share of a room)")
+    ] = None,
     d_sec: Annotated[float | None, typer.Option(help="Stop to element, m.")] = None,
     d_dis: Annotated[float | None, typer.Option(help="Length of a unit, m.")] = None,
     grid: Annotated[float | None, typer.Option(help="Spacing of grid candidates, m.")] = None,
@@ -80,6 +85,12 @@ def plan_command(
     ] = None,
     door_candidates: Annotated[
         bool | None, typer.Option("--door-candidates", help="Offer doorways as candidates.")
+    ] = None,
+    refine: Annotated[
+        bool | None,
+        typer.Option(
+            "--refine/--no-refine", help="Offer places beside the chosen stops too.", show_default=False
+        ),
     ] = None,
     use: Annotated[list[str] | None, typer.Option(help="X,Y of a stop that must be; repeatable.")] = None,
     avoid: Annotated[list[str] | None, typer.Option(help="X,Y,RADIUS without stops; repeatable.")] = None,

@@ -10,6 +10,7 @@ from mission.geodesy import out_of_reach
 from mission.geometry import FloatArray, frozen
 from mission.planning import NavigableSpace
 from mission.settings import Settings
+from planner.facing import faced_rooms
 from planner.ground import Ground, drivable
 from planner.openings import Crossing, barrier
 from planner.passable import opening_states
@@ -31,10 +32,11 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     targets = targets_of(floor, occluders, d_dis=settings.d_dis)
     if targets.total == 0:
         raise AnswerIsNo(f"{floor.name}: no target on the floor; elements: {_kinds(floor)} (see --targets)")
+    rooms = room_spaces(floor, ground, drive_area, settings)
     return NavigableSpace(
         floor=floor,
         settings=settings,
-        rooms=room_spaces(floor, ground, drive_area, settings),
+        rooms=rooms,
         openings=states,
         obstacles=to_polygons(ground.obstacles, origin),
         occluders=to_polygons(occluders, origin),
@@ -42,6 +44,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
         drive_area=to_polygons(drive_area, origin),
         gaps=frozen(gaps + origin),
         targets=targets,
+        unit_room=faced_rooms(targets, rooms, ground),
         ground=to_polygons(ground.outline, origin),
         findings=(*floor.findings, *findings),
     )

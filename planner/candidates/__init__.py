@@ -51,6 +51,12 @@ def candidates(space: NavigableSpace, *, part: int | None = None) -> Candidates:
     return _of_part(space, proposals, part)
 
 
+def judged(space: NavigableSpace, xy: FloatArray, room: IntArray, *, part: int) -> Candidates:
+    """Places (n, 2) of one's own as candidates of one part, each with its reason."""
+    reason = Place(space).reasons(xy, room)
+    return _of_part(space, Proposals.of(xy, room, reason), part)
+
+
 def _from_strategy(place: Place) -> Proposals:
     xy, room, *early = strategy(place.space.settings.candidates)(place.space)
     reason = place.reasons(xy, room)
@@ -86,7 +92,7 @@ def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> C
     at = np.full(len(xy), -1, dtype=np.int64)
     at[reason == KEPT] = reach.part_at(xy[reason == KEPT] - origin)
     reason = np.where((reason == KEPT) & (at < 0), UNREACHABLE, reason)
-    if not np.any(at >= 0):
+    if part is None and not np.any(at >= 0):
         raise AnswerIsNo(_no_candidate(space, reason))
     chosen = _chosen_part(space, proposals, reach, at) if part is None else part
     _check_used(space, proposals, at, chosen)
@@ -156,4 +162,4 @@ def _no_candidate(space: NavigableSpace, reason: IntArray) -> str:
     return f"{space.floor.name}: no candidate is left ({told}); change {' or '.join(options[:2])}"
 
 
-__all__ = ["STRATEGIES", "Strategy", "candidates", "strategy"]
+__all__ = ["STRATEGIES", "Strategy", "candidates", "judged", "strategy"]

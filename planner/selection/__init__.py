@@ -1,6 +1,6 @@
-"""Visibility -> selection: as few candidates as see the required share of what is visible.
+"""Visibility -> selection: as few candidates as see the required shares of what is visible.
 
-A method is a function `(cover, settings) -> (rows, bound)`: rows that cover what is needed, and a number
+A method is a function `(cover, settings) -> (rows, bound)`: rows that meet every demand, and a number
 of rows that no selection goes below.
 """
 
@@ -16,6 +16,7 @@ from mission.planning import Selection, Visibility
 from mission.settings import Settings
 from planner.selection.bound import lower_bound
 from planner.selection.cover import Cover, cover_of
+from planner.selection.demands import demands_of
 from planner.selection.exact import exact
 from planner.selection.greedy import greedy, in_greedy_order
 from planner.selection.improve import improved
@@ -52,36 +53,28 @@ NAMES = {
 def select(visibility: Visibility) -> Selection:
     """Choose stops by the method named in the settings, and say how few there could be at best.
 
-    Stops that must be used are chosen first and count; doorways added for registration come last.
+    Stops that must be used, and doorways added for registration, are chosen first and count.
     """
     candidates = visibility.candidates
     settings = candidates.space.settings
     if settings.selector not in METHODS:
         raise InputError(f"selector = {settings.selector}: unknown; known: {', '.join(METHODS)}")
-    whole = cover_of(visibility, required=settings.coverage)
-    must = candidates.must_rows
+    whole = cover_of(visibility, demands_of(visibility))
+    fixed = np.union1d(candidates.must_rows, candidates.doorway_rows if settings.door_scan else [])
+    fixed = fixed.astype(np.int64)
     offered = np.arange(whole.rows)
     if not settings.door_candidates:
         offered = np.setdiff1d(offered, candidates.doorway_rows)
-    problem = whole.after(must).offering(offered)
+    problem = whole.after(fixed).offering(offered)
     rows, bound = METHODS[settings.selector](problem, settings)
-    chosen = np.concatenate([must, in_greedy_order(problem, rows)]).astype(np.int64)
-    if not settings.door_scan:
-        return _selection(visibility, whole, chosen, len(must) + bound)
-    fixed = np.union1d(must, candidates.doorway_rows)
-    left = lower_bound(whole.after(fixed).offering(offered), found=len(rows))
-    return _selection(visibility, whole, _with(chosen, fixed), len(fixed) + left)
-
-
-def _with(chosen: IntArray, fixed: IntArray) -> IntArray:
-    """The chosen rows, then those of `fixed` that are not among them."""
-    return np.concatenate([chosen, np.setdiff1d(fixed, chosen)])
+    chosen = np.concatenate([fixed, in_greedy_order(problem, rows)]).astype(np.int64)
+    return _selection(visibility, whole, chosen, len(fixed) + bound)
 
 
 def _selection(visibility: Visibility, whole: Cover, chosen: IntArray, bound: int) -> Selection:
     settings = visibility.candidates.space.settings
     steps = _coverage_steps(whole, chosen)
-    if whole.units(whole.covered_by(chosen)) < whole.needed:
+    if whole.missing(whole.covered_by(chosen))[0] > 0:
         name, reached = visibility.candidates.space.floor.name, steps[-1] if len(steps) else 0.0
         raise AnswerIsNo(
             f"{name}: coverage {reached:.3f} is reached, not {settings.coverage:g}; "
@@ -99,11 +92,11 @@ def _selection(visibility: Visibility, whole: Cover, chosen: IntArray, bound: in
 
 
 def _coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
-    """Coverage after each row."""
-    counted, steps = np.zeros(len(cover.weight), dtype=np.int64), []
+    """Coverage of the whole after each row."""
+    counted, steps = np.zeros(cover.columns, dtype=np.int64), []
     for row in rows:
         counted[cover.columns_of(int(row))] += 1
-        steps.append(cover.units(counted) / cover.total)
+        steps.append(cover.seen_weight(counted) / cover.total)
     return np.array(steps)
 
 

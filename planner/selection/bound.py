@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, eye_array, hstack, vstack
 
-from mission.geometry import FloatArray
+from mission.geometry import FloatArray, IntArray
 from planner.selection.cover import Cover
 
 LARGEST = 150_000
@@ -23,9 +23,13 @@ SMOOTHING = 0.7
 
 
 def counting_bound(cover: Cover) -> int:
-    """Fewest rows whose views could reach the needed units if none overlapped."""
-    gains = np.sort(cover.gains(np.zeros(len(cover.weight), dtype=np.int64)))[::-1]
-    return int(np.searchsorted(np.cumsum(gains), cover.needed)) + 1 if cover.needed > 0 else 0
+    """Fewest rows whose views could meet the hardest demand if none overlapped."""
+    gains = (cover.sees @ cover.worth.T).tocsc()
+    return max((_fewest(gains[:, [k]].data, need) for k, need in enumerate(cover.needed)), default=0)
+
+
+def _fewest(gains: IntArray, needed: int) -> int:
+    return int(np.searchsorted(np.cumsum(np.sort(gains)[::-1]), needed)) + 1 if needed > 0 else 0
 
 
 def lower_bound(cover: Cover, *, found: int) -> int:
@@ -34,7 +38,7 @@ def lower_bound(cover: Cover, *, found: int) -> int:
     The relaxation is solved where that is quick, prices are searched for where it is not.
     """
     simple = counting_bound(cover)
-    if simple >= found or cover.needed == 0:
+    if simple >= found or not cover.needed.any():
         return simple
     better = relaxation_bound(cover) if cover.sees.nnz <= LARGEST else multiplier_bound(cover, found=found)
     return max(simple, better)
@@ -43,14 +47,16 @@ def lower_bound(cover: Cover, *, found: int) -> int:
 def multiplier_bound(cover: Cover, *, found: int) -> int:
     """Lagrangian bound: prices u_j on y_j <= Σ x_i, raised where a column is used and not seen.
 
-    For any prices Σ_i min(0, 1 - Σ_j in i u_j) + the cheapest way to buy the needed units at u_j per
-    column is a bound (Geoffrion, 1974); the prices follow Polyak's subgradient rule, smoothed.
+    For any prices u >= 0 of columns and p >= 0 of all demands but the whole, Σ_i min(0, 1 - Σ_j in i u_j)
+    + Σ_k p_k needed_k + the cheapest way to meet the whole at u_j - Σ_k p_k worth_kj per column is a
+    bound (Geoffrion, 1974); the prices follow Polyak's subgradient rule, smoothed.
     """
-    weight = cover.weight.astype(float)
-    prices = weight / max(1.0, float(cover.gains(np.zeros(len(weight), dtype=np.int64)).max(initial=1)))
-    best, step, waited, direction = 0.0, FIRST_STEP, 0, np.zeros(len(weight))
+    scale = max(1.0, float((cover.sees @ cover.weight).max(initial=1)))
+    problem = _Priced(cover, scale)
+    prices = np.concatenate([cover.weight / scale, np.zeros(len(cover.needed) - 1)])
+    best, step, waited, direction = 0.0, FIRST_STEP, 0, np.zeros(len(prices))
     for _ in range(min(STEPS, max(50, WORK // max(1, cover.sees.nnz)))):
-        value, slope = _multiplier_value(cover, weight, prices)
+        value, slope = problem.value(prices)
         waited = 0 if value > best + 1e-4 else waited + 1
         best = max(best, value)
         direction = slope if not direction.any() else SMOOTHING * slope + (1 - SMOOTHING) * direction
@@ -63,48 +69,74 @@ def multiplier_bound(cover: Cover, *, found: int) -> int:
     return int(np.ceil(best - 1e-6))
 
 
-def _multiplier_value(cover: Cover, weight: FloatArray, prices: FloatArray) -> tuple[float, FloatArray]:
-    """The bound at these prices, and the direction in which it rises."""
-    spare = 1.0 - cover.sees @ prices
-    taken = (spare < 0).astype(float)
-    order = np.argsort(prices / weight, kind="stable")
-    before = np.cumsum(weight[order]) - weight[order]
-    bought = np.zeros(len(weight))
-    bought[order] = np.clip((cover.needed - before) / weight[order], 0.0, 1.0)
-    value = float(np.minimum(spare, 0.0).sum() + prices @ bought)
-    return value, bought - cover.seen_by @ taken
+class _Priced:
+    """The problem with weights in shares of the largest view, to be asked for its value at prices."""
+
+    def __init__(self, cover: Cover, scale: float) -> None:
+        self._cover = cover
+        self._weight = cover.weight / scale
+        self._needed = cover.needed / scale
+        self._rest = cover.worth[1:].astype(float) / scale
+
+    def value(self, prices: FloatArray) -> tuple[float, FloatArray]:
+        """The bound at prices of columns, then demands; and the direction in which it rises."""
+        cover = self._cover
+        column, demand = prices[: cover.columns], prices[cover.columns :]
+        spare = 1.0 - cover.sees @ column
+        bought = self._cheapest(column - self._rest.T @ demand)
+        whole = float(np.minimum(spare, 0.0).sum() + demand @ self._needed[1:])
+        value = whole + float((column - self._rest.T @ demand) @ bought)
+        seen = cover.seen_by @ (spare < 0).astype(float)
+        return value, np.concatenate([bought - seen, self._needed[1:] - self._rest @ bought])
+
+    def _cheapest(self, cost: FloatArray) -> FloatArray:
+        """Shares of columns, at these costs, that meet the whole's demand; what costs nothing is taken."""
+        worth = np.maximum(self._weight, 1e-300)
+        order = np.argsort(cost / worth, kind="stable")
+        before = np.cumsum(self._weight[order]) - self._weight[order]
+        bought = np.empty(len(cost))
+        bought[order] = np.clip((self._needed[0] - before) / worth[order], 0.0, 1.0)
+        return np.where(cost < 0, 1.0, bought)
 
 
 def relaxation_bound(cover: Cover) -> int:
-    """Rounded-up optimum of: min Σ x_i, y_j <= Σ x_i that see j, y_j <= 1, Σ w_j y_j >= needed.
+    """Rounded-up optimum of: min Σ x_i, y_j <= Σ x_i that see j, y_j <= 1, Σ w_kj y_j >= needed_k.
 
     The number does not rest on the solver's tolerances: any prices u_j >= 0 with Σ u_j <= 1 over the
-    columns of each row and any p >= 0 give the bound needed · p - Σ_j max(0, w_j p - u_j) by weak
+    columns of each row and any p >= 0 give the bound Σ needed_k p_k - Σ_j max(0, Σ w_kj p_k - u_j) by weak
     duality; the solver's prices are made feasible and the bound is computed from them.
     """
-    prices = _relaxation_prices(cover) if cover.needed else None
+    prices = _relaxation_prices(cover) if cover.needed.any() else None
     return 0 if prices is None else int(np.ceil(_dual_value(cover, *prices) - 1e-6))
 
 
-def _relaxation_prices(cover: Cover) -> tuple[FloatArray, float] | None:
-    """Dual prices of the columns (columns,) and of one needed unit, or None where the solver gives up."""
-    rows, columns = cover.rows, len(cover.weight)
+def _relaxation_prices(cover: Cover) -> tuple[FloatArray, FloatArray] | None:
+    """Dual prices of the columns (columns,) and of the demands, or None where the solver gives up."""
+    rows, columns = cover.rows, cover.columns
     seen = hstack([-cover.sees.T, eye_array(columns)], format="csr")
-    demand = csr_array(np.concatenate([np.zeros(rows), -cover.weight.astype(float)])[None, :])
+    worth, needed, scale = scaled(cover)
+    demand = hstack([csr_array((len(needed), rows)), -worth], format="csr")
     solution = linprog(
         np.concatenate([np.ones(rows), np.zeros(columns)]),
         A_ub=vstack([seen, demand], format="csr"),
-        b_ub=np.concatenate([np.zeros(columns), [-float(cover.needed)]]),
+        b_ub=np.concatenate([np.zeros(columns), -needed]),
         bounds=[(0, None)] * rows + [(0, 1)] * columns,
         method="highs",
     )
     if solution.status != 0:
         return None
-    duals = -np.asarray(solution.ineqlin.marginals)
-    return np.maximum(duals[:-1], 0.0), max(float(duals[-1]), 0.0)
+    duals = np.maximum(-np.asarray(solution.ineqlin.marginals), 0.0)
+    return duals[:columns], duals[columns:] / scale
 
 
-def _dual_value(cover: Cover, column_price: FloatArray, unit_price: float) -> float:
+def scaled(cover: Cover) -> tuple[csr_array, FloatArray, float]:
+    """Worth and needs as a solver likes them, of about one per column; and by what they were divided."""
+    scale = max(1.0, float(cover.weight.mean())) if cover.columns else 1.0
+    return (cover.worth / scale).tocsr(), cover.needed / scale, scale
+
+
+def _dual_value(cover: Cover, column_price: FloatArray, demand_price: FloatArray) -> float:
     heaviest = float((cover.sees @ column_price).max(initial=0.0))
     column_price = column_price / max(1.0, heaviest)
-    return cover.needed * unit_price - float(np.maximum(0.0, cover.weight * unit_price - column_price).sum())
+    paid = cover.worth.T @ demand_price
+    return float(cover.needed @ demand_price - np.maximum(0.0, paid - column_price).sum())

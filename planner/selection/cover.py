@@ -6,67 +6,88 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import coo_array, csr_array, diags_array
 
 from mission.geometry import IntArray
 from mission.planning import Visibility
+from planner.selection.demands import Demands
 
 
 @dataclass(frozen=True, eq=False)
 class Cover:
-    """Rows are candidates, columns groups of units seen by exactly the same candidates."""
+    """Rows are candidates, columns groups of units seen by exactly the same candidates.
+
+    Every demand is a share of something that must be seen: demand 0 of the whole, the others of a room
+    or of a kind of element.
+    """
 
     sees: csr_array
     """(rows, columns), 1 where the candidate sees the group."""
-    weight: IntArray
-    """Units in each column (columns,); every column is seen by some row."""
-    needed: int
-    """Units that must be covered."""
+    worth: csr_array
+    """(demands, columns): what seeing a column adds to each demand."""
+    needed: IntArray
+    """What each demand asks for (demands,)."""
+
+    @classmethod
+    def of_whole(cls, sees: csr_array, weight: IntArray, needed: int) -> Cover:
+        """A problem with the one demand that columns of these weights (columns,) add up to `needed`."""
+        return cls(sees, csr_array(np.asarray(weight, dtype=np.int64)[None, :]), np.array([needed]))
 
     @property
     def rows(self) -> int:
         return int(self.sees.shape[0])
 
     @property
-    def total(self) -> int:
-        return int(self.weight.sum())
+    def columns(self) -> int:
+        return int(self.sees.shape[1])
 
-    def columns_of(self, row: int) -> IntArray:
-        """Columns that a row sees."""
-        return self.sees.indices[self.sees.indptr[row] : self.sees.indptr[row + 1]]
+    @cached_property
+    def weight(self) -> IntArray:
+        """What each column adds to the whole (columns,)."""
+        return self.worth[[0]].toarray()[0].astype(np.int64)
+
+    @property
+    def total(self) -> int:
+        """All that any candidate sees, by weight."""
+        return int(self.weight.sum())
 
     @cached_property
     def seen_by(self) -> csr_array:
         """(columns, rows), the same matrix turned."""
         return _sorted(self.sees.T)
 
-    def weights_of(self, columns: IntArray) -> IntArray:
-        """Units of these columns that each row sees."""
-        turned = self.seen_by
-        counts = turned.indptr[columns + 1] - turned.indptr[columns]
-        offsets = np.repeat(turned.indptr[columns] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
-        rows = turned.indices[np.arange(int(counts.sum())) + offsets]
-        return np.bincount(rows, np.repeat(self.weight[columns], counts), self.rows).astype(np.int64)
+    @cached_property
+    def adds_to(self) -> csr_array:
+        """(columns, demands): the worth of each column, turned."""
+        return _sorted(self.worth.T)
 
-    def gains(self, covered: IntArray) -> IntArray:
-        """Units each row would add, where `covered` counts the chosen rows that see each column."""
-        return np.asarray(self.sees @ np.where(covered > 0, 0, self.weight))
+    def columns_of(self, row: int) -> IntArray:
+        """Columns that a row sees."""
+        return self.sees.indices[self.sees.indptr[row] : self.sees.indptr[row + 1]]
 
     def covered_by(self, rows: IntArray) -> IntArray:
         """How many of `rows` see each column."""
         return np.asarray(self.sees[rows].sum(axis=0)).ravel().astype(np.int64)
 
-    def units(self, covered: IntArray) -> int:
-        """Units in the columns that are covered at least once."""
+    def seen_weight(self, covered: IntArray) -> int:
+        """Weight of the columns that are covered at least once."""
         return int(self.weight[covered > 0].sum())
+
+    def reached(self, covered: IntArray) -> IntArray:
+        """What each demand has got (demands,); `covered` counts the chosen rows that see each column."""
+        return np.asarray(self.worth @ (covered > 0).astype(np.int64)).ravel()
+
+    def missing(self, covered: IntArray) -> IntArray:
+        """What each demand still asks for (demands,)."""
+        return np.maximum(0, self.needed - self.reached(covered))
 
     def after(self, rows: IntArray) -> Cover:
         """What is left to cover once `rows` are chosen; row numbers stay."""
         if not len(rows):
             return self
-        left = self.covered_by(rows) == 0
-        needed = max(0, self.needed - int(self.weight[~left].sum()))
-        return Cover(_sorted(self.sees[:, np.flatnonzero(left)]), self.weight[left], needed)
+        covered = self.covered_by(rows)
+        left = np.flatnonzero(covered == 0)
+        return Cover(_sorted(self.sees[:, left]), _sorted(self.worth[:, left]), self.missing(covered))
 
     def offering(self, rows: IntArray) -> Cover:
         """The same, where only `rows` can be chosen: the others see nothing, nor is it needed."""
@@ -76,28 +97,51 @@ class Cover:
         offered[rows] = 1
         sees = _sorted((diags_array(offered) @ self.sees).tocsr().astype(np.int64))
         sees.eliminate_zeros()
-        coverable = int(self.weight[np.asarray(sees.sum(axis=0)).ravel() > 0].sum())
-        return Cover(sees, self.weight, min(self.needed, coverable))
+        coverable = self.reached(np.asarray(sees.sum(axis=0)).ravel())
+        return Cover(sees, self.worth, np.minimum(self.needed, coverable))
 
 
-def cover_of(visibility: Visibility, *, required: float) -> Cover:
+def cover_of(visibility: Visibility, demands: Demands) -> Cover:
     """Merge equal columns, without loss: within a run's ends nothing changes, then equal sets join."""
-    piece_first, pieces = _pieces(visibility)
+    piece_first = _pieces(visibility)
     sees = _piece_matrix(visibility, piece_first)
-    length = np.diff(np.append(piece_first, visibility.targets.total))
-    by_column = sees.T.tocsr()
-    by_column.sort_indices()
-    groups: dict[bytes, int] = {}
-    group = np.full(pieces, -1, dtype=np.int64)
-    for column in range(pieces):
-        rows = by_column.indices[by_column.indptr[column] : by_column.indptr[column + 1]]
-        if len(rows):
-            group[column] = groups.setdefault(rows.tobytes(), len(groups))
+    group = _alike(sees, demands.weight, piece_first)
     seen = group >= 0
-    first = np.unique(group[seen], return_index=True)[1]
-    weight = np.bincount(group[seen], weights=length[seen], minlength=len(groups)).astype(np.int64)
+    _, first = np.unique(group[seen], return_index=True)
     merged = _sorted(sees[:, np.flatnonzero(seen)[first]])
-    return Cover(merged, weight, needed_units(int(weight.sum()), required=required))
+    worth = _worth(demands, np.repeat(group, np.diff(np.append(piece_first, len(demands.weight)))))
+    return Cover(merged, worth, demands.needed(np.asarray(worth.sum(axis=1)).ravel()))
+
+
+def _alike(sees: csr_array, weight: IntArray, piece_first: IntArray) -> IntArray:
+    """The group of each piece by who sees it; -1 where nobody does, or where it counts for nothing."""
+    by_column = _sorted(sees.T)
+    counts = np.add.reduceat(weight, piece_first) > 0
+    groups: dict[bytes, int] = {}
+    group = np.full(by_column.shape[0], -1, dtype=np.int64)
+    for column in np.flatnonzero(counts & (np.diff(by_column.indptr) > 0)):
+        rows = by_column.indices[by_column.indptr[column] : by_column.indptr[column + 1]]
+        group[column] = groups.setdefault(rows.tobytes(), len(groups))
+    return group
+
+
+def _worth(demands: Demands, column: IntArray) -> csr_array:
+    """(demands, columns): the weight of the units of each column (of each unit, or -1) in each demand."""
+    counted = np.flatnonzero(column >= 0)
+    unit = np.tile(counted, len(demands.member))
+    demand = demands.member[:, counted].ravel()
+    belongs = demand >= 0
+    entries = (demands.weight[unit][belongs], (demand[belongs], column[unit][belongs]))
+    shape = (len(demands.share), int(column.max(initial=-1)) + 1)
+    worth = coo_array(entries, shape=shape, dtype=np.int64).tocsr()
+    worth.sum_duplicates()
+    return _sorted(worth)
+
+
+def ranges(first: IntArray, counts: IntArray) -> IntArray:
+    """`first[k]`, `first[k] + 1`, …, `counts[k]` of each, one after the other."""
+    offsets = np.repeat(first - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
+    return np.arange(int(counts.sum())) + offsets
 
 
 def _sorted(matrix: csr_array) -> csr_array:
@@ -106,26 +150,18 @@ def _sorted(matrix: csr_array) -> csr_array:
     return matrix
 
 
-def needed_units(total: int, *, required: float) -> int:
-    """Fewest units that are at least the share `required` of `total`."""
-    return int(np.ceil(required * total - 1e-9))
-
-
-def _pieces(visibility: Visibility) -> tuple[IntArray, int]:
+def _pieces(visibility: Visibility) -> IntArray:
     """First units of the stretches within which no run begins or ends."""
     cuts = np.concatenate([[0], visibility.first, visibility.last + 1])
-    first = np.unique(cuts[cuts < visibility.targets.total])
-    return first, len(first)
+    return np.unique(cuts[cuts < visibility.targets.total])
 
 
 def _piece_matrix(visibility: Visibility, piece_first: IntArray) -> csr_array:
     row = np.repeat(np.arange(visibility.rows), np.diff(visibility.pointer))
     begin = np.searchsorted(piece_first, visibility.first)
     end = np.searchsorted(piece_first, visibility.last, side="right")
-    lengths = end - begin
-    rows = np.repeat(row, lengths)
-    offset = np.repeat(begin - np.concatenate([[0], np.cumsum(lengths)[:-1]]), lengths)
-    columns = np.arange(int(lengths.sum())) + offset
+    rows = np.repeat(row, end - begin)
+    columns = ranges(begin, end - begin)
     shape = (visibility.rows, len(piece_first))
     matrix = csr_array((np.ones(len(rows), dtype=np.int64), (rows, columns)), shape=shape)
     matrix.data[:] = 1

@@ -10,6 +10,7 @@ from scipy.sparse import csr_array, eye_array, hstack, vstack
 
 from mission.geometry import IntArray
 from mission.settings import Settings
+from planner.selection.bound import scaled
 from planner.selection.cover import Cover
 
 WHOLE = 1e-6
@@ -17,9 +18,9 @@ WHOLE = 1e-6
 
 
 def exact(cover: Cover, start: IntArray, *, settings: Settings) -> tuple[IntArray, int]:
-    """Fewest rows that cover the needed units, and a lower bound on their number.
+    """Fewest rows that meet every demand, and a lower bound on their number.
 
-    min Σ x_i, y_j <= Σ x_i that see j, Σ w_j y_j >= needed; x whole, y continuous in [0, 1]. The search
+    min Σ x_i, y_j <= Σ x_i that see j, Σ w_kj y_j >= needed_k; x whole, y continuous in [0, 1]. The search
     begins at the rows `start`, runs on one thread and ends at a node limit, so that it repeats; where
     it does not close, the bound stays below the number of rows found.
     """
@@ -36,8 +37,8 @@ def exact(cover: Cover, start: IntArray, *, settings: Settings) -> tuple[IntArra
     bound = math.ceil(solver.getInfo().mip_dual_bound - WHOLE)
     values = np.array(solver.getSolution().col_value[: cover.rows])
     rows = np.flatnonzero(values > 0.5) if len(values) == cover.rows else start
-    covered = cover.units(cover.covered_by(rows)) >= cover.needed
-    return (rows if covered and len(rows) < len(start) else start), max(0, min(bound, len(start)))
+    met = not cover.missing(cover.covered_by(rows)).any()
+    return (rows if met and len(rows) < len(start) else start), max(0, min(bound, len(start)))
 
 
 def _options(settings: Settings) -> dict[str, Any]:
@@ -58,15 +59,16 @@ def _model(cover: Cover) -> Any:
     """The programme in HiGHS's form: columns x then y, rows the coverings then the demand."""
     import highspy
 
-    rows, columns = cover.rows, len(cover.weight)
-    demand = csr_array(np.concatenate([np.zeros(rows), cover.weight.astype(float)])[None, :])
+    rows, columns = cover.rows, cover.columns
+    worth, needed, _ = scaled(cover)
+    demand = hstack([csr_array((len(needed), rows)), worth])
     matrix = vstack([hstack([cover.sees.T, -eye_array(columns)]), demand], format="csc")
     model = highspy.HighsLp()
-    model.num_col_, model.num_row_ = rows + columns, columns + 1
+    model.num_col_, model.num_row_ = rows + columns, columns + len(needed)
     model.col_cost_ = np.concatenate([np.ones(rows), np.zeros(columns)])
     model.col_lower_, model.col_upper_ = np.zeros(rows + columns), np.ones(rows + columns)
-    model.row_lower_ = np.concatenate([np.zeros(columns), [float(cover.needed)]])
-    model.row_upper_ = np.full(columns + 1, highspy.kHighsInf)
+    model.row_lower_ = np.concatenate([np.zeros(columns), needed])
+    model.row_upper_ = np.full(columns + len(needed), highspy.kHighsInf)
     model.a_matrix_.format_ = highspy.MatrixFormat.kColwise
     model.a_matrix_.start_, model.a_matrix_.index_ = matrix.indptr, matrix.indices
     model.a_matrix_.value_ = matrix.data.astype(float)

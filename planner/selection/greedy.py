@@ -2,32 +2,61 @@
 
 from __future__ import annotations
 
+import heapq
+from collections.abc import Iterable
+
 import numpy as np
 
 from mission.geometry import IntArray
-from planner.selection.cover import Cover
+from planner.selection.cover import Cover, ranges
 
 
 def greedy(cover: Cover) -> IntArray:
-    """Rows in the order they are chosen, until enough is covered; ties go to the lower row."""
-    covered = np.zeros(len(cover.weight), dtype=np.int64)
-    chosen: list[int] = []
-    while cover.units(covered) < cover.needed:
-        gains = cover.gains(covered)
-        best = int(np.argmax(gains))
-        if gains[best] <= 0:
-            break  # the rows offered do not see enough
-        chosen.append(best)
-        covered[cover.columns_of(best)] += 1
-    return np.array(chosen, dtype=np.int64)
+    """Rows in the order they are chosen, until every demand is met or nothing is left to gain."""
+    return _by_gain(cover, range(cover.rows), until_met=True)
 
 
 def in_greedy_order(cover: Cover, rows: IntArray) -> IntArray:
     """The same rows, each time the one with the largest gain first."""
-    covered = np.zeros(len(cover.weight), dtype=np.int64)
-    left, ordered = sorted(rows.tolist()), []
-    while left:
-        gains = cover.gains(covered)[left]
-        ordered.append(left.pop(int(np.argmax(gains))))
-        covered[cover.columns_of(ordered[-1])] += 1
-    return np.array(ordered, dtype=np.int64)
+    return _by_gain(cover, rows.tolist(), until_met=False)
+
+
+def _by_gain(cover: Cover, rows: Iterable[int], *, until_met: bool) -> IntArray:
+    """Rows by what they add to demands not yet met, then by what they add at all; then the lower row.
+
+    Both only fall as rows are chosen, so a row whose gain is known to be old is looked at again only
+    when it comes up (Minoux, 1978).
+    """
+    covered = np.zeros(cover.columns, dtype=bool)
+    short = cover.needed.copy()
+    queue = [(*_gain(cover, row, covered, short), row) for row in rows]
+    heapq.heapify(queue)
+    chosen: list[int] = []
+    while queue and (short.any() or not until_met):
+        *_, row = heapq.heappop(queue)
+        fresh = (*_gain(cover, row, covered, short), row)
+        if queue and fresh > queue[0]:
+            heapq.heappush(queue, fresh)
+            continue
+        if until_met and fresh[0] == 0:
+            break  # the rows offered do not see enough
+        chosen.append(row)
+        short -= np.minimum(short, _adds(cover, row, covered))
+        covered[cover.columns_of(row)] = True
+    return np.array(chosen, dtype=np.int64)
+
+
+def _gain(cover: Cover, row: int, covered: IntArray, short: IntArray) -> tuple[int, int]:
+    """What a row adds to demands not met, and to the whole, both negative: the least is the best."""
+    adds = _adds(cover, row, covered)
+    return -int(np.minimum(adds, short).sum()), -int(adds[0])
+
+
+def _adds(cover: Cover, row: int, covered: IntArray) -> IntArray:
+    """What a row adds to each demand (demands,)."""
+    columns = cover.columns_of(row)
+    new = columns[~covered[columns]]
+    pointer = cover.adds_to.indptr
+    entries = ranges(pointer[new], pointer[new + 1] - pointer[new])
+    demand, worth = cover.adds_to.indices[entries], cover.adds_to.data[entries]
+    return np.bincount(demand, worth, len(cover.needed)).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Drop-and-repair: try to do with one stop fewer, by swapping stops until the coverage holds again."""
+"""Drop-and-repair: try to do with one stop fewer, by swapping stops until every demand is met again."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 
 from mission.geometry import IntArray
-from planner.selection.cover import Cover
+from planner.selection.cover import Cover, ranges
 
 SWAPS = 400
 """Most swaps tried before a smaller selection is given up; a count, so that no plan depends on speed."""
@@ -30,39 +30,119 @@ def improved(cover: Cover, chosen: IntArray, *, at_least: int, swaps: int = SWAP
 
 
 def _without_least(cover: Cover, chosen: IntArray) -> list[int]:
-    """The selection without the row that covers fewest units alone."""
+    """The selection without the row that covers least alone."""
     covered = cover.covered_by(chosen)
     alone = [int(cover.weight[c][covered[c] == 1].sum()) for c in map(cover.columns_of, chosen)]
     return np.delete(chosen, int(np.argmin(alone))).tolist()
 
 
 def _repaired(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
-    """Swap one row for another while that helps, or hurts least (tabu), until enough is covered."""
-    covered = cover.covered_by(np.array(rows, dtype=np.int64))
+    """Swap one row for another while that helps, or hurts least (tabu), until every demand is met."""
+    board = _Board(cover, rows)
     tabu: deque[int] = deque(maxlen=TENURE)
     for _ in range(swaps):
-        if cover.units(covered) >= cover.needed:
+        if not board.missing.any():
             return np.array(sorted(rows), dtype=np.int64)
-        out, into = _best_swap(cover, rows, covered, tabu)
-        covered[cover.columns_of(out)] -= 1
-        covered[cover.columns_of(into)] += 1
+        out, into = _best_swap(board, rows, tabu)
+        board.insist()
+        board.drop(out)
+        board.take(into)
         rows[rows.index(out)] = into
         tabu.append(out)
     return None
 
 
-def _best_swap(cover: Cover, rows: list[int], covered: IntArray, tabu: deque[int]) -> tuple[int, int]:
-    """The swap after which most units are covered: units lost by leaving, then the largest gain."""
-    best, swap = -np.inf, (rows[0], rows[0])
+def _best_swap(board: _Board, rows: list[int], tabu: deque[int]) -> tuple[int, int]:
+    """The swap after which least is missing, and of those the one after which most is covered."""
+    best, swap = (np.inf, np.inf), (rows[0], rows[0])
     blocked = np.array([*rows, *tabu], dtype=np.int64)
-    gains_now = cover.gains(covered)
     for out in sorted(rows):
-        columns = cover.columns_of(out)
-        alone = columns[covered[columns] == 1]
-        gains = gains_now + cover.weights_of(alone)
-        gains[blocked] = -1
-        into = int(np.argmax(gains))
-        change = int(gains[into]) - int(cover.weight[alone].sum())
-        if change > best:
-            best, swap = change, (out, into)
+        missing, covered = board.after_swaps(out)
+        missing[blocked] = np.iinfo(np.int64).max
+        alike = np.flatnonzero(missing == missing.min())
+        into = int(alike[np.argmax(covered[alike])])
+        worth = (int(missing[into]), -int(covered[into]))
+        if worth < best:
+            best, swap = worth, (out, into)
     return swap
+
+
+class _Board:
+    """A selection being changed: what is covered, what is missing, and what every row would add."""
+
+    def __init__(self, cover: Cover, rows: list[int]) -> None:
+        self._cover = cover
+        self._covered = cover.covered_by(np.array(rows, dtype=np.int64))
+        self._reached = cover.reached(self._covered)
+        self._weight = np.ones(len(cover.needed), dtype=np.int64)
+        bare = cover.worth * (self._covered == 0)[None, :]
+        self._adds = np.ascontiguousarray((cover.sees @ bare.T).toarray().T)
+        """(demands, rows)."""
+
+    @property
+    def missing(self) -> IntArray:
+        """What each demand still asks for (demands,)."""
+        return np.maximum(0, self._cover.needed - self._reached)
+
+    def insist(self) -> None:
+        """Make what is missing count for more, so that the search leaves places where it stays missing."""
+        self._weight[self.missing > 0] += 1
+
+    def take(self, row: int) -> None:
+        """Cover what a row sees."""
+        columns = self._cover.columns_of(row)
+        self._move(columns[self._covered[columns] == 0], sign=-1)
+        self._covered[columns] += 1
+
+    def drop(self, row: int) -> None:
+        """Uncover what a row sees alone."""
+        columns = self._cover.columns_of(row)
+        self._covered[columns] -= 1
+        self._move(columns[self._covered[columns] == 0], sign=1)
+
+    def after_swaps(self, out: int) -> tuple[IntArray, IntArray]:
+        """What is missing in all, and how much of the whole is covered (rows,), by who comes for `out`."""
+        columns = self._cover.columns_of(out)
+        alone = columns[self._covered[columns] == 1]
+        left = self._reached - self._worth_of(alone)
+        asked = self._cover.needed - left
+        open_demands = np.union1d([0], np.flatnonzero(asked > 0))
+        adds = self._adds[open_demands] + self._regained(alone, open_demands)
+        short = np.maximum(0, asked[open_demands][:, None] - adds)
+        return self._weight[open_demands] @ short, left[0] + adds[0]
+
+    def _worth_of(self, columns: IntArray) -> IntArray:
+        """What columns are worth to each demand (demands,)."""
+        _, demand, worth = self._entries(columns)
+        return np.bincount(demand, worth, len(self._cover.needed)).astype(np.int64)
+
+    def _entries(self, columns: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+        """How many demands each column adds to, which, and how much to each."""
+        turned = self._cover.adds_to
+        counts = turned.indptr[columns + 1] - turned.indptr[columns]
+        entry = ranges(turned.indptr[columns], counts)
+        return counts, turned.indices[entry], turned.data[entry]
+
+    def _regained(self, columns: IntArray, demands: IntArray) -> IntArray:
+        """Worth of these columns that each row sees (demands, rows)."""
+        place = np.full(len(self._cover.needed), -1, dtype=np.int64)
+        place[demands] = np.arange(len(demands))
+        column, row = self._seers(columns)
+        counts, demand, worth = self._entries(column)
+        asked = place[demand] >= 0
+        cell = place[demand[asked]] * self._cover.rows + np.repeat(row, counts)[asked]
+        sums = np.bincount(cell, worth[asked], len(demands) * self._cover.rows)
+        return sums.astype(np.int64).reshape(len(demands), self._cover.rows)
+
+    def _seers(self, columns: IntArray) -> tuple[IntArray, IntArray]:
+        """Pairs of a column and a row that sees it."""
+        turned = self._cover.seen_by
+        counts = turned.indptr[columns + 1] - turned.indptr[columns]
+        return np.repeat(columns, counts), turned.indices[ranges(turned.indptr[columns], counts)]
+
+    def _move(self, columns: IntArray, *, sign: int) -> None:
+        """Give back (1) or take away (-1) what these columns are worth."""
+        change = self._worth_of(columns)
+        self._reached -= sign * change
+        demands = np.flatnonzero(change)
+        self._adds[demands] += sign * self._regained(columns, demands)

@@ -111,10 +111,12 @@ def box(x0: float, y0: float, x1: float, y1: float) -> list[tuple[float, float]]
 def room_route() -> Route:
     """Two stops in the room's halves; each sees the 1 m units of its half, the third candidate all."""
     floor = room_floor()
+    targets = room_targets(floor)
     space = NavigableSpace(
         floor=floor, settings=Settings(d_dis=1.0), rooms=(whole_room(floor),), openings=opening_states(floor),
         obstacles=(), occluders=(), barriers=frozen(np.empty((0, 2, 2))), drive_area=(),
-        gaps=frozen(np.empty((0, 2, 2))), targets=room_targets(floor),
+        gaps=frozen(np.empty((0, 2, 2))), targets=targets,
+        unit_room=frozen(np.zeros(targets.total), np.int64),
     )  # fmt: skip
     xy = frozen([[1.2, 2.0], [6.8, 2.0], [4.0, 2.0]])
     zeros = frozen([0, 0, 0], np.int64)

@@ -157,14 +157,31 @@ def check_bounds(mission: Mission, nouns: dict[type, Any], settings: Settings) -
 def check_coverage(mission: Mission, selection: Selection, settings: Settings) -> None:
     """Recompute by brute force what all candidates and the chosen ones see."""
     seen = matrix_by_force(selection.visibility)
-    visible = seen.any(axis=0)
+    pattern = np.setdiff1d(np.arange(len(seen)), selection.visibility.candidates.extra_rows)
+    visible = seen[pattern].any(axis=0)
     assert np.array_equal(visible, selection.visibility.visible), "another set of units is visible"
     covered = seen[selection.chosen].any(axis=0)
-    assert np.isclose(covered.sum() / visible.sum(), selection.coverage, atol=1e-12)
+    check_shares(selection, visible, covered & visible, settings)
     assert sum(stop.sees.new_units for stop in mission.stops) == covered.sum()
     for stop in mission.stops:
         nearest = int(np.argmin(np.hypot(*(selection.xy - (stop.x, stop.y)).T)))
         assert stop.sees.units == seen[selection.chosen[nearest]].sum()
+
+
+def check_shares(selection: Selection, visible: np.ndarray, covered: np.ndarray, settings: Settings) -> None:
+    """The shares of the whole, and of every room and kind unless the paper's rule is asked."""
+    space = selection.visibility.candidates.space
+    targets = space.targets
+    length = np.hypot(*(targets.b - targets.a).T) / targets.units
+    weight = np.repeat(length if settings.coverage_rule == "length" else np.ones(len(length)), targets.units)
+    assert np.isclose(weight[covered].sum() / weight[visible].sum(), selection.coverage, atol=1e-4)
+    if settings.coverage_rule == "paper":
+        return
+    kind = np.array([space.floor.elements[k].kind for k in targets.element])[targets.unit_segment]
+    members = [(space.unit_room == k, settings.room_coverage) for k in range(len(space.rooms))]
+    members += [(kind == name, settings.kind_coverage) for name in sorted(set(kind.tolist()))]
+    for member, share in members:
+        assert weight[covered & member].sum() >= share * weight[visible & member].sum() - 1e-4
 
 
 def matrix_by_force(visibility: Visibility) -> np.ndarray:

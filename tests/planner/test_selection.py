@@ -8,40 +8,46 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from mission.planning import Selection
+from mission.planning import Selection, weights_of
 from mission.settings import Settings
 from planner.selection import METHODS
 from planner.selection.bound import counting_bound, multiplier_bound, relaxation_bound
-from planner.selection.cover import Cover, cover_of, needed_units
+from planner.selection.cover import Cover, cover_of
+from planner.selection.demands import demands_of, needed_of
 from planner.selection.greedy import greedy
 from tests.planner.worlds import box, column, element, hall, planned, two_rooms
 
 
 def small_cover(seed: int) -> Cover:
-    """Up to 10 candidates and 25 groups of units, each seen by someone."""
+    """Up to 10 candidates, 25 groups of units, each seen by someone, and 4 demands on them."""
     random = np.random.default_rng(seed)
     rows, columns = int(random.integers(1, 11)), int(random.integers(1, 26))
     sees = random.random((rows, columns)) < random.uniform(0.1, 0.6)
     sees[random.integers(0, rows, size=columns), np.arange(columns)] = True
     weight = random.integers(1, 30, size=columns)
-    needed = needed_units(int(weight.sum()), required=float(random.choice([0.5, 0.9, 1.0])))
-    return Cover(csr_array(sees.astype(np.int64)), weight.astype(np.int64), needed)
+    groups = random.random((int(random.integers(0, 4)), columns)) < 0.4
+    worth = np.vstack([np.ones(columns), groups]).astype(np.int64) * weight
+    share = random.choice([0.5, 0.9, 1.0], size=len(worth))
+    return Cover(csr_array(sees.astype(np.int64)), csr_array(worth), needed_of(worth.sum(axis=1), share))
+
+
+def is_enough(cover: Cover, rows: np.ndarray) -> bool:
+    seen = (cover.sees.toarray()[rows] > 0).any(axis=0)
+    return bool(np.all(cover.worth.toarray()[:, seen].sum(axis=1) >= cover.needed))
 
 
 def fewest(cover: Cover) -> int:
     """Rows of the smallest selection that covers enough, by trying all."""
-    sees = cover.sees.toarray() > 0
     for size in range(cover.rows + 1):
         for rows in combinations(range(cover.rows), size):
-            if cover.weight[sees[list(rows)].any(axis=0)].sum() >= cover.needed:
+            if is_enough(cover, np.array(rows, dtype=np.int64)):
                 return size
     raise AssertionError("not even all rows cover what is needed")
 
 
 def check_rows(cover: Cover, rows: np.ndarray) -> None:
     assert len(set(rows.tolist())) == len(rows)
-    seen = (cover.sees.toarray()[rows] > 0).any(axis=0)
-    assert cover.weight[seen].sum() >= cover.needed
+    assert is_enough(cover, rows)
 
 
 @pytest.mark.parametrize("name", sorted(METHODS))
@@ -76,7 +82,7 @@ def test_the_default_selector_finds_nearly_every_optimum() -> None:
 
 def test_greedy_takes_what_adds_most_and_ties_go_to_the_lower_row() -> None:
     sees = np.array([[1, 1, 0, 0], [0, 1, 1, 1], [1, 0, 1, 1], [1, 0, 0, 0]])
-    cover = Cover(csr_array(sees), np.array([1, 1, 1, 1]), 4)
+    cover = Cover.of_whole(csr_array(sees), np.array([1, 1, 1, 1]), 4)
     assert greedy(cover).tolist() == [1, 0]
 
 
@@ -85,31 +91,35 @@ def test_greedy_takes_what_adds_most_and_ties_go_to_the_lower_row() -> None:
     [(10, 0.9, 9), (10, 0.91, 10), (7334, 0.9, 6601), (1000, 0.3, 300), (1, 0.01, 1)],
 )
 def test_needed_units_are_the_fewest_that_make_the_share(total: int, required: float, needed: int) -> None:
-    assert needed_units(total, required=required) == needed
+    assert needed_of(np.array(total), required) == needed
 
 
 def test_units_that_look_alike_are_merged_without_loss() -> None:
     floor = two_rooms(1.0, more=(column("c", 2.0, 1.0), element("b", "beams", box(1, 3, 7, 3.2))))
     _, nouns = planned(floor, Settings(range=4))
     visibility = nouns[Selection].visibility
-    cover = cover_of(visibility, required=0.9)
+    cover = cover_of(visibility, demands_of(visibility))
+    weight = weights_of(visibility.targets, visibility.candidates.space.settings)
     seen = np.zeros((visibility.rows, visibility.targets.total), dtype=bool)
     for row in range(visibility.rows):
         seen[row, visibility.seen_by(row)] = True
-    assert cover.total == seen.any(axis=0).sum()
+    assert cover.total == weight[seen.any(axis=0)].sum()
     patterns = {column.tobytes() for column in seen.T if column.any()}
-    assert len(cover.weight) == len(patterns)
+    assert cover.columns == len(patterns)
     random = np.random.default_rng(0)
     for _ in range(50):
         rows = random.permutation(visibility.rows)[: random.integers(1, 6)]
-        assert cover.units(cover.covered_by(rows)) == seen[rows].any(axis=0).sum()
+        assert cover.seen_weight(cover.covered_by(rows)) == weight[seen[rows].any(axis=0)].sum()
 
 
 @pytest.mark.parametrize("name", sorted(METHODS))
 def test_coverage_rises_with_every_stop_and_reaches_what_is_required(name: str) -> None:
     floor = two_rooms(1.0, more=(column("c", 2.0, 1.0), column("k", 6.0, 3.0)))
     for required in (0.5, 0.9, 1.0):
-        _, nouns = planned(floor, Settings(selector=name, coverage=required, range=3))
+        settings = Settings(
+            selector=name, coverage=required, room_coverage=0, kind_coverage=0, range=3, refine=False
+        )
+        _, nouns = planned(floor, settings)
         steps = nouns[Selection].coverage_steps
         assert all(one <= other for one, other in pairwise(steps))
         assert steps[-1] >= required

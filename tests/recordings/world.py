@@ -97,6 +97,7 @@ def space_of(floor: FloorPlan) -> NavigableSpace:
         drive_area=(box(x + 0.55, y + 0.55, 5.3, 1.1),),
         gaps=frozen(np.empty((0, 2, 2))),
         targets=targets,
+        unit_room=frozen(np.zeros(targets.total), np.int64),
         findings=(*floor.findings, Finding("narrow_door", "door d1 is 1.000 m wide")),
     )
 

@@ -1,0 +1,98 @@
+"""Selection -> selection: places beside the chosen stops are offered too, and may save a stop.
+
+Candidates stand on a coarse pattern; a stop is seldom best right there. Offering every place of a fine
+pattern would be dear, so only those round the chosen stops are added and the choice is made again. What is
+visible is still asked of the pattern's candidates, so that the coverage asked for stays the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mission.geometry import FloatArray, IntArray, frozen
+from mission.planning import Candidates, Selection, Visibility
+from planner.candidates import judged
+from planner.candidates.grid import main_axes
+from planner.selection import select
+from planner.shapes import local_origin, to_shape
+from planner.visibility import visibility
+
+STEPS = (-0.5, -0.25, 0.0, 0.25, 0.5)
+"""Where places are offered beside a stop, along both axes of its room, in spacings of the grid."""
+MOST = 25
+"""Stops up to which this is done unless it is asked for: beyond, it takes more than a second."""
+
+
+def refined(selection: Selection) -> Selection:
+    """A selection with fewer stops, some of them beside the pattern; the same where none is saved."""
+    settings = selection.visibility.candidates.space.settings
+    wanted = len(selection.chosen) <= MOST if settings.refine is None else settings.refine
+    if not wanted or settings.coverage_rule == "paper" or settings.fov < 360:
+        return selection
+    beside = _beside(selection)
+    if beside is None:
+        return selection
+    again = select(_joined(selection.visibility, visibility(beside)))
+    return again if len(again.chosen) < len(selection.chosen) else selection
+
+
+def _beside(selection: Selection) -> Candidates | None:
+    """Places round the chosen stops where a stop may be and is not offered yet, if there are any."""
+    candidates = selection.visibility.candidates
+    free = np.setdiff1d(selection.chosen, np.union1d(candidates.must_rows, candidates.doorway_rows))
+    chosen = candidates.kept[free]
+    places = np.concatenate([np.empty((0, 2)), *(_around(candidates, int(index)) for index in chosen)])
+    room = np.repeat(candidates.room[chosen], len(STEPS) ** 2)
+    found = judged(candidates.space, places, room, part=candidates.chosen_part)
+    known = {_place(point) for point in candidates.xy}
+    new = {_place(found.xy[k]): k for k in found.kept[::-1] if _place(found.xy[k]) not in known}
+    return _taken(found, np.array([new[place] for place in sorted(new)])) if new else None
+
+
+def _place(point: FloatArray) -> tuple[float, float]:
+    """A position to the micrometre, for telling places apart."""
+    x, y = np.round(point, 6).tolist()
+    return x, y
+
+
+def _around(candidates: Candidates, index: int) -> FloatArray:
+    """Places (n, 2) round a candidate, along the axes of its room."""
+    space = candidates.space
+    axes = main_axes(to_shape(space.rooms[candidates.room[index]].area, local_origin(space.floor)))
+    along = np.array(STEPS) * space.settings.grid
+    offsets = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
+    return candidates.xy[index] + offsets @ axes
+
+
+PER_CANDIDATE = ("xy", "room", "reason", "part", "doorway", "must")
+"""Arrays of `Candidates` that are joined; headings there are none."""
+
+
+def _taken(found: Candidates, index: IntArray) -> Candidates:
+    """Some of the candidates, marked as extra ones."""
+    taken: dict[str, Any] = {name: _frozen(getattr(found, name)[index]) for name in PER_CANDIDATE}
+    return replace(found, **taken, extra=_frozen(np.ones(len(index), dtype=np.bool_)))
+
+
+def _joined(seen: Visibility, more: Visibility) -> Visibility:
+    """The candidates of both with what they see."""
+    one, other = seen.candidates, more.candidates
+    both: dict[str, Any] = {name: _frozen(getattr(one, name), getattr(other, name)) for name in PER_CANDIDATE}
+    extra = _frozen(np.zeros(len(one.xy), dtype=np.bool_), other.extra)
+    return replace(
+        seen,
+        candidates=replace(one, **both, extra=extra),
+        pointer=_frozen(seen.pointer, seen.pointer[-1] + more.pointer[1:]),
+        segment=_frozen(seen.segment, more.segment),
+        first=_frozen(seen.first, more.first),
+        last=_frozen(seen.last, more.last),
+    )
+
+
+def _frozen(*arrays: NDArray[Any]) -> NDArray[Any]:
+    """The arrays in one, read-only."""
+    return frozen(np.concatenate(arrays), arrays[0].dtype)
