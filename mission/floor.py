@@ -3,8 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import IntEnum
 
 from mission.geometry import FloatArray, Polygon
+
+
+class Rank(IntEnum):
+    """How much a finding bears on a plan, the worst first."""
+
+    GRAVE = 0
+    """The plan may be wrong or leave something out; `--strict` refuses it."""
+    DOUBT = 1
+    """Worth a look at the drawing."""
+    NOTE = 2
+    """Mended or left out without harm."""
+
+
+GRAVE = (
+    *("walls_missing", "little_reached", "stray_element", "leg_over_ignored", "units_doubtful"),
+    *("open_outline", "missing_block", "no_outline", "bad_coordinates"),
+)
+NOTES = (
+    *("duplicate", "repeated_points", "no_length", "text_outside_rooms", "gap_closed", "repaired"),
+    *("layer_as_told", "exterior_opening", "rooms_overlap"),
+)
 
 
 @dataclass(frozen=True)
@@ -19,6 +41,11 @@ class Finding:
     """Id of the element, opening or room it is about."""
     at: tuple[float, float] | None = None
     """Where, in the drawing's metres."""
+
+    @property
+    def rank(self) -> Rank:
+        """How much it bears on a plan, by its code."""
+        return Rank.GRAVE if self.code in GRAVE else Rank.NOTE if self.code in NOTES else Rank.DOUBT
 
 
 @dataclass(frozen=True)
@@ -61,6 +88,15 @@ class Element:
     occludes: bool = False
     obstacle: bool = False
     target: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class IgnoredLine:
+    """Linework of an unknown layer that is neither an obstacle nor anything else, but was drawn."""
+
+    layer: str
+    points: FloatArray
+    """(n, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +154,8 @@ class FloorPlan:
     level: str | None = None
     georeference: Georeference | None = None
     findings: tuple[Finding, ...] = ()
+    ignored: tuple[IgnoredLine, ...] = ()
+    """Lines that no plan may cross unsaid: nobody knows what they stand for."""
 
     @property
     def area(self) -> float:

@@ -60,6 +60,8 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Whether the laser passes doors; closed is the paper's "range restricted to rooms"."""
     targets: tuple[str, ...] | None = None
     """Element kinds to be scanned."""
+    layers: tuple[str, ...] = ()
+    """What layers of other names stand for, such as `A-WALL=walls`; `DIM=ignore` is nothing in the way."""
     tour: Literal["closed", "open"] | None = None
     start: tuple[float, float, float] | None = None
     """x, y in metres and heading in degrees counter-clockwise from +x."""
@@ -106,10 +108,19 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     battery_min: float = 0.15
 
     @property
+    def layer_roles(self) -> dict[str, str]:
+        """What layers stand for, by their names in capitals, where the user says so."""
+        told = (entry.rpartition("=") for entry in self.layers)
+        return {name.strip().upper(): role.strip().lower() for name, _, role in told}
+
+    @property
     def radius(self) -> float:
         """The robot's radius in metres: half of door_access unless given."""
         return self.door_access / 2 if self.robot_radius is None else self.robot_radius
 
+
+LAYER_ROLES = ("floor", "rooms", "doors", "passages", *KINDS, "ignore")
+"""What a layer of a drawing can stand for."""
 
 SECTIONS: dict[str, tuple[str, ...]] = {
     "plan": (
@@ -117,7 +128,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
         *("room_coverage", "kind_coverage", "coverage_rule", "refine"),
         *("graph", "den_grid_min", "max_err_dist"),
         *("d_max", "l_min", "dens_min"),
-        *("door_access", "edge", "doors", "targets", "tour", "start", "end", "use", "avoid"),
+        *("door_access", "edge", "doors", "targets", "layers", "tour", "start", "end", "use", "avoid"),
         *("door_scan", "door_candidates", "node_limit", "time_limit", "origin", "seed"),
     ),
     "robot": ("robot_radius", "speed", "turn_rate", "acceleration"),
@@ -167,6 +178,7 @@ HOW = {
     "origin": "write LAT,LON,ALT,HEADING, such as 47.3769,8.5417,408,0",
     "use": "write X,Y for each, such as 2.5,3.0",
     "avoid": "write X,Y,RADIUS for each, such as 2.5,3.0,1",
+    "layers": "write NAME=KIND for each, such as A-WALL=walls or DIM=ignore",
     "targets": f"write kinds, such as walls,columns; known: {', '.join(KINDS)}",
 }
 """How to write the parameters that are more than one number or word."""
@@ -275,6 +287,10 @@ def _check_choices(settings: Settings) -> None:
     for kind in settings.targets or ():
         if kind not in KINDS:
             raise InputError(f"targets = {kind}: unknown kind; known: {', '.join(KINDS)}")
+    for entry in settings.layers:
+        name, _, role = entry.rpartition("=")
+        if not name.strip() or role.strip().lower() not in LAYER_ROLES:
+            raise InputError(f"layers = {entry}: write NAME=KIND; kinds: {', '.join(LAYER_ROLES)}")
     if settings.targets == ():
         raise InputError(f"targets is empty; known: {', '.join(KINDS)}")
     if settings.tour == "closed" and settings.end is not None:

@@ -34,8 +34,14 @@ def plan(floor: FloorPlan, settings: Settings, *, observe: Observe = lambda noun
     return plan_part(candidates(space), observe=observe)
 
 
-def plan_part(found: Candidates, *, observe: Observe, number: int = 0) -> Mission:
-    """Plan from candidates on; `number` tells the missions of one floor apart."""
+def plan_part(
+    found: Candidates, *, observe: Observe, number: int = 0, planned: frozenset[int] | None = None
+) -> Mission:
+    """Plan from candidates on; `number` tells the missions of one floor apart.
+
+    `planned` are all parts of the floor that some plan of it enters; by default this one.
+    """
+    from planner.appraisal import figures_of
     from planner.assemble import assemble
     from planner.refine import refined
     from planner.routing import route
@@ -52,6 +58,7 @@ def plan_part(found: Candidates, *, observe: Observe, number: int = 0) -> Missio
     observe(selection)
     driven = route(selection)
     observe(driven)
+    observe(figures_of(driven, planned=planned))
     mission = assemble(driven, part=number)
     observe(mission)
     return mission

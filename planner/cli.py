@@ -6,15 +6,15 @@ import datetime
 import json
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 import typer
 
-from mission.errors import InputError
+from mission.errors import InputError, StopgoError
 from mission.settings import Settings, read_settings, settings_toml
 
 if TYPE_CHECKING:
@@ -95,6 +95,10 @@ def plan_command(
     use: Annotated[list[str] | None, typer.Option(help="X,Y of a stop that must be; repeatable.")] = None,
     avoid: Annotated[list[str] | None, typer.Option(help="X,Y,RADIUS without stops; repeatable.")] = None,
     targets: Annotated[str | None, typer.Option(help="Kinds to scan, such as walls,columns.")] = None,
+    layer: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=KIND of a layer, such as A-WALL=walls or DIM=ignore; repeatable."),
+    ] = None,
     tour: Annotated[str | None, typer.Option(help="closed or open")] = None,
     start: Annotated[str | None, typer.Option(help="X,Y,HEADING in m and degrees.")] = None,
     end: Annotated[str | None, typer.Option(help="X,Y in m.")] = None,
@@ -106,17 +110,25 @@ def plan_command(
     tolerance: Annotated[float | None, typer.Option(help="Robot to stop at the start of a scan, m.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the tour search.")] = None,
     all_parts: Annotated[bool, typer.Option(help="Also plan parts not connected with the first.")] = False,
-    strict: Annotated[bool, typer.Option(help="Exit 1 if a room is not reached.")] = False,
+    strict: Annotated[
+        bool, typer.Option(help="Exit 1 if floor is left out or the plan is doubtful.")
+    ] = False,
     print_config: Annotated[bool, typer.Option(help="Print plan.toml with these options and leave.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> int:
-    """Plan where the scanner must stand on a floor, and the route that visits those stops."""
+    """Plan where the scanner must stand on a floor, and the route that visits those stops.
+
+    Exit code 1: no plan can be made, or the robot would drive over lines that were not read; with --strict
+    also where floor is left out or the plan is doubtful.
+    """
     options = dict(locals())
     given = {key.rstrip("_"): value for key, value in options.items() if key not in NOT_SETTINGS}
     for key in ("start", "end", "origin"):
         given[key] = None if given[key] is None else numbers(given[key], key)
     for key in ("use", "avoid"):
         given[key] = tuple(numbers(text, key) for text in given[key]) if given[key] else None
+    given["layers"] = tuple(given.pop("layer")) if layer else None
+    given.pop("layer", None)
     given["targets"] = None if targets is None else tuple(kind.strip() for kind in targets.split(","))
     settings = read_settings(parameters, given)
     if print_config:
@@ -126,7 +138,7 @@ def plan_command(
         raise InputError("no floor given; name a file, such as: stopgo plan floor.dxf -o plan")
     reports = plan_files(floor, out, settings, all_parts=all_parts)
     _print(reports, as_json=as_json)
-    return 1 if strict and any(report.unreached for report in reports[:1]) else 0
+    return max(report.strict_answer if strict else report.answer for report in reports)
 
 
 NOT_SETTINGS = ("floor", "out", "parameters", "all_parts", "strict", "print_config", "as_json")
@@ -147,24 +159,39 @@ def plan_files(floor: Path, out: Path, settings: Settings, *, all_parts: bool = 
     from planner import parts_to_plan
     from planner.floors import read_floor
     from planner.navigable import navigable
-    from planner.unreached import entered
 
     watch = Stopwatch()
-    read = read_floor(floor, d_dis=settings.d_dis)
+    read = read_floor(floor, d_dis=settings.d_dis, layers=settings.layer_roles)
     watch.lap("read")
     folder = _folder(out)
-    if not all_parts:
-        report = _plan_part(read, folder, settings, watch)
-        _set_aside(folder, 1, read, settings)
-        return [report]
-    parts = parts_to_plan(navigable(read, settings))
-    reports = [
-        _plan_part(read, folder, settings, Stopwatch(watch), found=found, number=number)
-        for number, found in enumerate(parts)
-    ]
-    _set_aside(folder, len(parts), read, settings)
-    rooms = frozenset[int]().union(*(entered(found) for found in parts))
-    return [replace(report, elsewhere=rooms) for report in reports]
+    with _telling_findings(read):
+        if not all_parts:
+            report = _plan_part(read, folder, settings, watch)
+            _set_aside(folder, 1, read, settings)
+            return [report]
+        parts = parts_to_plan(navigable(read, settings))
+        planned = frozenset(found.chosen_part for found in parts)
+        reports = [
+            _plan_part(read, folder, settings, Stopwatch(watch), found=found, number=number, planned=planned)
+            for number, found in enumerate(parts)
+        ]
+        _set_aside(folder, len(parts), read, settings)
+        return reports
+
+
+@contextmanager
+def _telling_findings(floor: FloorPlan) -> Iterator[None]:
+    """Where no plan can be made, what was odd about the drawing may say why: told on stderr."""
+    from mission.floor import Rank
+    from planner.report import finding_lines
+
+    try:
+        yield
+    except StopgoError:
+        by_rank = sorted((item for item in floor.findings if item.rank != Rank.NOTE), key=lambda f: f.rank)
+        for line in finding_lines(by_rank):
+            typer.echo(line.strip(), err=True)
+        raise
 
 
 def _set_aside(folder: Path, parts: int, floor: FloorPlan, settings: Settings) -> None:
@@ -194,10 +221,12 @@ def _plan_part(
     *,
     found: Candidates | None = None,
     number: int = 0,
+    planned: frozenset[int] | None = None,
 ) -> PlanReport:
     """Plan one part; its files appear when all of it is done, mission.json last."""
     from mission import __version__
     from mission.document import mission_id
+    from mission.figures import Figures
     from mission.files.coverage_json import coverage_json
     from mission.files.mission_json import encode
     from mission.files.plan_svg import plan_svg
@@ -219,17 +248,17 @@ def _plan_part(
         else:
             for noun in (floor, found.space):
                 observe(noun)
-            made = plan_part(found, observe=observe, number=number)
+            made = plan_part(found, observe=observe, number=number, planned=planned)
         mission = _revised(made, files["mission"])
         recording.observe(mission)
         recording.observe(schedule(mission))
     watch.lap("recording")
-    route = nouns[Route]
-    _write(files["coverage"], coverage_json(route, mission))
-    _write(files["picture"], plan_svg(route, mission, date=datetime.date.today().isoformat()))
+    route, figures = nouns[Route], nouns[Figures]
+    _write(files["coverage"], coverage_json(route, mission, figures))
+    _write(files["picture"], plan_svg(route, mission, figures, date=datetime.date.today().isoformat()))
     _write(files["mission"], encode(mission))
     watch.lap("files")
-    return PlanReport(route=route, mission=mission, files=files, times_s=watch.times())
+    return PlanReport(route=route, mission=mission, files=files, times_s=watch.times(), figures=figures)
 
 
 def _write(path: Path, data: bytes) -> None:
@@ -268,6 +297,7 @@ STAGES = {
     "Visibility": "visibility",
     "Selection": "selection",
     "Route": "route",
+    "Figures": "figures",
     "Mission": "route",
 }
 """The stage that ends with each noun."""

@@ -46,7 +46,7 @@ def misfits(mission: Mission, path: Path) -> tuple[Problem, ...]:
         settings = read_settings(None, mission.origin.parameters)
     except InputError as error:
         return (Problem("$.origin.parameters", f"are not those of a plan: {error}"),)
-    floor = read_floor(path, d_dis=settings.d_dis)
+    floor = read_floor(path, d_dis=settings.d_dis, layers=settings.layer_roles)
     return (*_other_machine(mission, settings), *misfits_on(floor, mission, settings))
 
 

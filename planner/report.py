@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from mission.document import Mission
+from mission.figures import Figures, Share, percent
+from mission.floor import Finding, Rank
 from mission.geometry import FloatArray
-from mission.planning import IN_HOLE, OUTSIDE, SLIVER, TOO_SMALL, Route, Unreached
+from mission.planning import IN_HOLE, OUTSIDE, SLIVER, TOO_SMALL, Route
 from mission.schedule import schedule
-from planner.unreached import unreached
+from mission.table import printable
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,12 +27,17 @@ class PlanReport:
     mission: Mission
     files: dict[str, Path]
     times_s: dict[str, float]
-    elsewhere: frozenset[int] = frozenset()
-    """Rooms that plans of other parts enter."""
+    figures: Figures
 
     @property
-    def unreached(self) -> tuple[Unreached, ...]:
-        return unreached(self.route.selection.visibility.candidates, self.elsewhere)
+    def answer(self) -> int:
+        """Exit code of a plan: 1 where the robot would drive over lines that nobody has read."""
+        return 1 if self.figures.crosses_ignored else 0
+
+    @property
+    def strict_answer(self) -> int:
+        """Exit code where nothing may be left out or doubtful."""
+        return 1 if self.figures.unreached or self.figures.grave else self.answer
 
     def as_json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
@@ -63,6 +72,7 @@ class PlanReport:
                 "bound": selection.bound,
                 "method": selection.method,
             },
+            "coverage": coverage_table(self.figures),
             "route": {
                 "length_m": self.route.length,
                 "bound_m": self.route.bound,
@@ -78,47 +88,107 @@ class PlanReport:
                 "total_s": times.total_s,
             },
             "unreached": [
-                {"room": item.room, "why": item.why, "area_m2": item.area_m2} for item in self.unreached
+                {"room": item.room, "why": item.why, "area_m2": item.area_m2}
+                for item in self.figures.unreached
             ],
             "times_s": {key: round(value, 4) for key, value in self.times_s.items()},
             "files": {key: str(path) for key, path in self.files.items()},
         }
 
     def _floor(self) -> dict[str, Any]:
-        space = self.route.selection.visibility.candidates.space
-        floor = space.floor
+        floor = self.route.selection.visibility.candidates.space.floor
         return {
             "name": floor.name,
             "area_m2": floor.area,
+            "reached_m2": self.figures.reached_m2,
             "rooms": len(floor.rooms),
             "openings": len(floor.openings),
             "findings": [
-                {"code": f.code, "message": f.message, "element": f.element, "at": f.at}
-                for f in space.findings
+                {"rank": f.rank.name.lower(), "code": f.code, "message": f.message}
+                | {"element": f.element, "at": f.at}
+                for f in self.figures.findings
             ],
         }
 
     def as_text(self) -> str:
-        """A few lines a person reads."""
-        told = self.as_json()
-        floor, route, times = told["floor"], told["route"], told["schedule"]
-        chosen = told["selection"]
-        minutes = times["total_s"] / 60
+        """What a person reads: the plan, what it sees, what it leaves out, and what is doubtful."""
+        told, figures = self.as_json(), self.figures
+        floor, route, times, chosen = told["floor"], told["route"], told["schedule"], told["selection"]
         lines = [
-            f"{floor['name']}: {floor['area_m2']:.0f} m², {floor['rooms']} rooms, "
-            f"{floor['openings']} openings",
+            f"{printable(floor['name'])}: {floor['area_m2']:.0f} m², {floor['rooms']} rooms, "
+            f"{floor['openings']} openings; {floor['reached_m2']:.0f} of {figures.rooms_m2:.0f} m² reached",
             f"  targets     {told['targets']['total']} units, "
             f"{told['visibility']['visible']} visible from {told['candidates']['reachable']} candidates",
-            f"  stops       {chosen['stops']} (at least {chosen['bound']} are needed), "
-            f"coverage {100 * chosen['coverage']:.1f} % of what is visible",
+            f"  stops       {chosen['stops']} (of these candidates at least {chosen['bound']} are needed)",
             f"  route       {route['length_m']:.1f} m {route['tour']} "
             f"(no route is below {route['bound_m']:.1f} m), from {route['start']}",
-            f"  time        {minutes:.0f} min: drive {times['drive_s']:.0f} s, turn {times['turn_s']:.0f} s, "
-            f"settle {times['settle_s']:.0f} s, scan {times['scan_s']:.0f} s",
+            f"  time        {times['total_s'] / 60:.0f} min: drive {times['drive_s']:.0f} s, "
+            f"turn {times['turn_s']:.0f} s, settle {times['settle_s']:.0f} s, scan {times['scan_s']:.0f} s",
+            *coverage_lines(figures),
         ]
-        lines += [f"  unreached   {u.room} ({u.area_m2:.1f} m²): {u.why}" for u in self.unreached]
-        lines += [f"  finding     {finding['message']}" for finding in floor["findings"]]
+        lines += [
+            f"  unreached   {printable(u.room)} ({u.area_m2:.1f} m²): {printable(u.why)}"
+            for u in figures.unreached
+        ]
+        lines += finding_lines(figures.findings)
         return "\n".join([*lines, *(f"  {key:<11} {path}" for key, path in self.files.items())])
+
+
+MOST_ROOMS = 12
+"""Rooms listed on a terminal; coverage.json and --json have all."""
+MOST_FINDINGS = 12
+
+
+def coverage_table(figures: Figures) -> dict[str, Any]:
+    """Every row of the coverage table, for JSON."""
+    return {
+        "rule": figures.rule,
+        "total": _row(figures.whole),
+        "rooms": [_row(share) for share in figures.rooms],
+        "kinds": [_row(share) for share in figures.kinds],
+    }
+
+
+def _row(share: Share) -> dict[str, Any]:
+    keys = ("name", "total", "visible", "seen", "coverage", "required", "why")
+    return {key: getattr(share, key) for key in keys}
+
+
+def coverage_lines(figures: Figures) -> list[str]:
+    """The coverage table: the whole, then kinds and rooms, the one least seen first."""
+    whole, unit = figures.whole, figures.unit
+    lines = [
+        f"  coverage    {percent(whole.coverage)} of the {percent(whole.visible_share)} that can be seen "
+        f"({whole.seen:.0f} of {whole.visible:.0f} of {whole.total:.0f} {unit})"
+    ]
+    lines += [_line("kind", share, unit) for share in figures.kinds]
+    lines += [_line("room", share, unit) for share in figures.rooms[:MOST_ROOMS]]
+    rest = figures.rooms[MOST_ROOMS:]
+    if rest:
+        lines.append(
+            f"    rooms     {len(rest)} more, none below {percent(rest[0].coverage)} of what can be seen"
+        )
+    return lines
+
+
+def _line(what: str, share: Share, unit: str) -> str:
+    seen = f"{share.seen:.1f} of {share.visible:.1f} of {share.total:.1f} {unit}"
+    return f"    {what:<9} {printable(share.name):<24} {percent(share.coverage):>7}  {seen}"
+
+
+def finding_lines(findings: Sequence[Finding]) -> list[str]:
+    """The findings that bear on the plan most, and how many more there are of what."""
+    shown = [item for item in findings if item.rank != Rank.NOTE][:MOST_FINDINGS]
+    lines = [f"  {_word(item):<11} {printable(item.message)}" for item in shown]
+    rest = Counter(item.code for item in findings if item not in shown)
+    if rest:
+        told = ", ".join(f"{count} {code}" for code, count in sorted(rest.items()))
+        lines.append(f"  finding     {rest.total()} more: {told} (--json lists them)")
+    return lines
+
+
+def _word(finding: Finding) -> str:
+    return "warning" if finding.rank == Rank.GRAVE else "finding"
 
 
 def _places(xy: FloatArray) -> int:

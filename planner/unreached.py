@@ -1,33 +1,62 @@
-"""Rooms that a plan does not enter, each with the reason."""
+"""Floor that a plan does not enter, room by room and piece by piece, each with the reason."""
 
 from __future__ import annotations
 
-import numpy as np
+import math
+from collections.abc import Iterator
 
-from mission.planning import AT_EDGE, IN_HOLE, KEPT, OTHER_PART, TOO_CLOSE, UNREACHABLE, Candidates, Unreached
+import numpy as np
+import shapely
+
+from mission.planning import AT_EDGE, IN_HOLE, OTHER_PART, TOO_CLOSE, UNREACHABLE, Candidates, Unreached
+from planner.candidates.place import Place
+from planner.reach import reach_of
+from planner.shapes import local_origin, to_shape
 
 LEAST_AREA = 0.01
 """Rooms smaller than this (m²) are not told of."""
+LEAST_PIECE = 1.0
+"""Pieces of a room where the robot's centre could drive on less than this (m²) are not told of."""
 
 
-def unreached(candidates: Candidates, elsewhere: frozenset[int] = frozenset()) -> tuple[Unreached, ...]:
-    """Every room without a reachable candidate of this part, with its area.
+def unreached(candidates: Candidates, planned: frozenset[int] | None = None) -> tuple[Unreached, ...]:
+    """Every room without a reachable candidate, and every piece of the other rooms that is cut off.
 
-    `elsewhere` are rooms (indices into `NavigableSpace.rooms`) that plans of other parts enter.
+    `planned` are the parts of the floor that some plan enters; by default the one of these candidates.
     """
-    space = candidates.space
-    told = []
-    for index, room in enumerate(space.rooms):
-        reasons = candidates.reason[candidates.room == index]
+    parts = planned or frozenset([candidates.chosen_part])
+    told: list[Unreached] = []
+    for index, room in enumerate(candidates.space.rooms):
+        here = candidates.room == index
         area = sum(polygon.area for polygon in room.area)
-        if area > LEAST_AREA and index not in elsewhere and not np.any(reasons == KEPT):
-            told.append(Unreached(room.name, _why(candidates, index, set(reasons.tolist())), area))
+        if np.isin(candidates.part[here], sorted(parts)).any():
+            told += _cut_off(candidates, index, parts)
+        elif area > LEAST_AREA:
+            reasons = set(candidates.reason[here].tolist())
+            told.append(Unreached(room.name, _why(candidates, index, reasons), area))
     return tuple(told)
 
 
-def entered(candidates: Candidates) -> frozenset[int]:
-    """Rooms with a reachable candidate of this part."""
-    return frozenset(candidates.room[candidates.kept].tolist())
+def _cut_off(candidates: Candidates, index: int, parts: frozenset[int]) -> Iterator[Unreached]:
+    """Pieces of an entered room where the robot could drive but does not get to."""
+    space = candidates.space
+    found = reach_of(space).parts
+    shape = to_shape(space.rooms[index].area, local_origin(space.floor))
+    for part, area in sorted(found.area_by_part(shape).items()):
+        if part not in parts and area >= LEAST_PIECE:
+            x, y = _middle(candidates, part, shape)
+            why = f"in another part of the floor round ({x:.1f}, {y:.1f}); --all-parts plans it too"
+            yield Unreached(f"a piece of {space.rooms[index].name}", why, area)
+
+
+def _middle(candidates: Candidates, part: int, room: shapely.Geometry) -> tuple[float, float]:
+    """A point of a part within a room, in the drawing's metres."""
+    found = reach_of(candidates.space).parts
+    origin = local_origin(candidates.space.floor)
+    pieces = [piece for piece, number in zip(found.pieces, found.part, strict=True) if number == part]
+    inside = max((piece.intersection(room) for piece in pieces), key=lambda shape: shape.area)
+    point = inside.representative_point()
+    return float(point.x + origin[0]), float(point.y + origin[1])
 
 
 def _why(candidates: Candidates, index: int, reasons: set[int]) -> str:
@@ -41,16 +70,33 @@ def _why(candidates: Candidates, index: int, reasons: set[int]) -> str:
     if UNREACHABLE in reasons:
         return f"the robot does not fit in ({closed or 'too narrow'})"
     if TOO_CLOSE in reasons:
-        return f"no place {settings.d_sec:g} m from every element"
+        return f"no place {settings.d_sec:g} m from every element{_smaller_d_sec(candidates, index)}"
     if AT_EDGE in reasons:
         return f"no place {settings.edge:g} m from the floor's edges"
     return "no floor in it" if IN_HOLE in reasons else "no place for a stop"
 
 
+def _smaller_d_sec(candidates: Candidates, index: int) -> str:
+    """The greatest d_sec, in whole centimetres, that leaves a place for a stop, if the robot fits there."""
+    space = candidates.space
+    place = Place(space)
+    free = place.rooms[index].difference(place.obstacles)
+    if free.is_empty:
+        return ""
+    middle = shapely.get_coordinates(shapely.maximum_inscribed_circle(free, tolerance=1e-3))[:1]
+    d_sec = math.floor(100 * float(place.to_element(middle)[0]) + 1e-6) / 100
+    fits = d_sec >= space.settings.radius and place.to_edge(middle)[0] >= space.settings.edge
+    return f"; --d-sec {d_sec:g} leaves one" if fits and d_sec < space.settings.d_sec else ""
+
+
 def _closed_openings(candidates: Candidates, index: int) -> str:
-    """The openings of a room that are not passable, in words."""
+    """The openings of a room that are not passable, in words; or that it has none."""
     room = candidates.space.rooms[index].room
     if room is None:
         return ""
-    closed = [item for item in candidates.space.openings if room in item.rooms and not item.passable]
-    return "; ".join(f"{item.opening.kind} {item.opening.id}: {item.why}" for item in closed)
+    its = [item for item in candidates.space.openings if room in item.rooms]
+    if not its:
+        return "no door or passage is drawn on its outline"
+    return "; ".join(
+        f"{item.opening.kind} {item.opening.id}: {item.why}" for item in its if not item.passable
+    )

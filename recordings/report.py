@@ -7,8 +7,10 @@ from typing import Any
 import msgspec
 
 from mission.document import Mission
+from mission.figures import Figures, percent
 from mission.floor import FloorPlan
 from mission.planning import Candidates, NavigableSpace, Route, Schedule, Selection, Visibility
+from mission.table import printable
 from recordings.canvas import Origin
 
 Nouns = dict[type, Any]
@@ -45,7 +47,7 @@ def plan_report(nouns: Nouns, origin: Origin) -> str:
     title = nouns[Mission].name if Mission in nouns else results.get("floor", "plan")
     lines = [f"# {title}", "", "| | |", "|---|---|"]
     lines += [f"| {name.replace('_', ' ')} | {_shown(value)} |" for name, value in _ordered(results)]
-    lines += ["", *_stop_table(nouns.get(Mission)), *_findings(nouns)]
+    lines += ["", *_coverage_table(nouns.get(Figures)), *_stop_table(nouns.get(Mission)), *_findings(nouns)]
     lines += ["## Colours", "", *_COLOURS, "", "## Looking around", "", *_GUIDE, *_origin_note(origin)]
     return "\n".join(lines)
 
@@ -151,11 +153,36 @@ def _stop_table(mission: Mission | None) -> list[str]:
     return [*lines, ""]
 
 
+def _coverage_table(figures: Figures | None) -> list[str]:
+    """What the stops see of everything, least seen first, and what is left out."""
+    if figures is None:
+        return []
+    unit = figures.unit
+    lines = ["## Coverage", "", f"| | all, {unit} | visible | seen | share |", "|---|---|---|---|---|"]
+    for share in (figures.whole, *figures.kinds, *figures.rooms):
+        numbers = f"{share.total:.1f} | {share.visible:.1f} | {share.seen:.1f} | {percent(share.coverage)}"
+        lines.append(f"| {plain(share.name)} | {numbers} |")
+    if figures.unreached:
+        lines += ["", "Not reached:", ""]
+        lines += [
+            f"- {plain(item.room)} ({item.area_m2:.1f} m²): {plain(item.why)}" for item in figures.unreached
+        ]
+    return [*lines, ""]
+
+
+def plain(content: str) -> str:
+    """Text from outside as markdown shows it letter by letter: nothing in it marks up anything."""
+    return "".join(f"\\{letter}" if letter in _MARKS else letter for letter in printable(content))
+
+
+_MARKS = frozenset("\\`*_{}[]<>()#+-!|~")
+
+
 def _findings(nouns: Nouns) -> list[str]:
-    holder = nouns.get(NavigableSpace) or nouns.get(FloorPlan)
+    holder = nouns.get(Figures) or nouns.get(NavigableSpace) or nouns.get(FloorPlan)
     if holder is None or not holder.findings:
         return []
-    return ["## Findings", "", *(f"- **{item.code}** {item.message}" for item in holder.findings), ""]
+    return ["## Findings", "", *(f"- **{item.code}** {plain(item.message)}" for item in holder.findings), ""]
 
 
 _COLOURS = (

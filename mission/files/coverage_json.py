@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,10 @@ import msgspec
 import numpy as np
 
 from mission.document import Mission
+from mission.figures import Figures, Share
 from mission.files.atomic import write_atomic
 from mission.floor import Element
-from mission.geometry import IntArray
+from mission.geometry import FloatArray, IntArray
 from mission.planning import Route, Targets
 from mission.seen import runs_of, seen_units
 
@@ -19,15 +21,17 @@ _DIGITS = 6
 """A micrometre, and a millionth of a segment."""
 
 
-def coverage_json(route: Route, mission: Mission) -> bytes:
-    """The coverage of every target element as JSON, one boundary segment a line.
+def coverage_json(route: Route, mission: Mission, figures: Figures | None = None) -> bytes:
+    """The coverage of every target element as JSON, one boundary segment a line; rooms where given.
 
-    `visible` counts the units that any reachable candidate sees, `seen` those that the stops see, and
-    `coverage` is seen / visible (null where nothing is visible). Each segment runs from `a` to `b`, in
-    metres; `seen` holds fractions from a to b.
+    `visible` counts the units that any reachable candidate sees, `seen` those of them that the stops see,
+    `visible_m` and `seen_m` are their metres. `coverage` is seen / visible by the plan's rule, in metres or
+    units (null where nothing is visible). Each segment runs from `a` to `b`, in metres; `seen` holds
+    fractions from a to b.
     """
-    floor = route.selection.visibility.candidates.space.floor
-    counts = _counts_by_element(route)
+    space = route.selection.visibility.candidates.space
+    floor = space.floor
+    counts = _Counts.of(route)
     targets = [index for index, element in enumerate(floor.elements) if element.target]
     by_kind: dict[str, list[int]] = {}
     for index in targets:
@@ -37,14 +41,16 @@ def coverage_json(route: Route, mission: Mission) -> bytes:
         "version": 1,
         "mission": {"id": mission.id, "revision": mission.revision, "digest": mission.digest},
         "floor": {"name": floor.name, "digest": floor.digest},
-        "total": _summary(counts[targets]),
-        "kinds": {kind: _summary(counts[rows]) for kind, rows in sorted(by_kind.items())},
+        "rule": space.settings.coverage_rule,
+        "total": counts.summary(targets),
+        "kinds": {kind: counts.summary(rows) for kind, rows in sorted(by_kind.items())},
+        **({} if figures is None else {"rooms": [_room(share) for share in figures.rooms]}),
     }
     segments = _segments_by_element(route)
     elements = [
         {
             **_named(floor.elements[index]),
-            **_summary(counts[[index]], with_elements=False),
+            **counts.summary([index], with_elements=False),
             "segments": segments.get(index, []),
         }
         for index in targets
@@ -52,30 +58,57 @@ def coverage_json(route: Route, mission: Mission) -> bytes:
     return _written(head, elements)
 
 
-def write_coverage(route: Route, mission: Mission, path: Path | str) -> None:
+def write_coverage(route: Route, mission: Mission, path: Path | str, figures: Figures | None = None) -> None:
     """Write coverage.json whole or not at all."""
-    write_atomic(path, coverage_json(route, mission))
+    write_atomic(path, coverage_json(route, mission, figures))
 
 
-def _counts_by_element(route: Route) -> IntArray:
-    """Units, visible units and seen units of each element of the floor (elements, 3)."""
-    visibility = route.selection.visibility
-    targets = visibility.targets
-    elements = targets.element[targets.unit_segment]
-    size = len(visibility.candidates.space.floor.elements)
-    masks = (np.ones(targets.total, dtype=bool), visibility.visible, seen_units(route.selection))
-    return np.stack([np.bincount(elements[mask], minlength=size) for mask in masks], axis=1)
+@dataclass(frozen=True, eq=False)
+class _Counts:
+    """Of each element of the floor: all, visible and seen (elements, 3)."""
+
+    units: IntArray
+    metres: FloatArray
+    by_units: bool
+    """Whether coverage is a share of units, the paper's rule."""
+
+    @classmethod
+    def of(cls, route: Route) -> _Counts:
+        visibility = route.selection.visibility
+        space, targets = visibility.candidates.space, visibility.targets
+        elements = targets.element[targets.unit_segment]
+        size, length = len(space.floor.elements), targets.unit_length
+        seen = visibility.visible & seen_units(route.selection)
+        masks = (np.ones(targets.total, dtype=bool), visibility.visible, seen)
+        units = [np.bincount(elements[mask], minlength=size) for mask in masks]
+        metres = [np.bincount(elements[mask], length[mask], minlength=size) for mask in masks]
+        by_units = space.settings.coverage_rule == "paper"
+        return cls(np.stack(units, axis=1), np.stack(metres, axis=1), by_units)
+
+    def summary(self, rows: list[int], *, with_elements: bool = True) -> dict[str, Any]:
+        """What some elements come to."""
+        units, visible, seen = (int(number) for number in self.units[rows].sum(axis=0))
+        length, visible_m, seen_m = (round(float(number), 4) for number in self.metres[rows].sum(axis=0))
+        share = seen / visible if self.by_units and visible else (seen_m / visible_m if visible_m else None)
+        summary = {
+            **{"units": units, "visible": visible, "seen": seen},
+            **{"length_m": length, "visible_m": visible_m, "seen_m": seen_m},
+            "coverage": None if share is None else round(share, _DIGITS),
+        }
+        return {"elements": len(rows), **summary} if with_elements else summary
+
+
+def _room(share: Share) -> dict[str, Any]:
+    """A room's row, in the plan's unit."""
+    numbers = (share.total, share.visible, share.seen)
+    total, visible, seen = (round(number, 4) for number in numbers)
+    coverage = None if share.coverage is None else round(share.coverage, _DIGITS)
+    row = {"room": share.name, "total": total, "visible": visible, "seen": seen, "coverage": coverage}
+    return {**row, "required": share.required, "why": share.why}
 
 
 def _named(element: Element) -> dict[str, Any]:
     return {"id": element.id, "kind": element.kind, "global_id": element.global_id}
-
-
-def _summary(counts: IntArray, *, with_elements: bool = True) -> dict[str, Any]:
-    units, visible, seen = (int(number) for number in counts.sum(axis=0))
-    share = round(seen / visible, _DIGITS) if visible else None
-    summary = {"units": units, "visible": visible, "seen": seen, "coverage": share}
-    return {"elements": len(counts), **summary} if with_elements else summary
 
 
 def _segments_by_element(route: Route) -> dict[int, list[dict[str, Any]]]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from mission.document import Mission
+from mission.figures import Figures, Share, percent
 from mission.files import floor_drawing as floor_look
 from mission.files import route_drawing as route_look
 from mission.files.sheet import COLUMN, HEADER, ROW, Box, Chunk, Sheet
@@ -56,7 +58,7 @@ def facts_of(route: Route, mission: Mission, *, date: str) -> list[tuple[str, st
         ("Floor digest", mission.origin.floor_digest[:12]),
         ("Date", date),
         ("Scanner", f"{mission.scanner.profile}, range {mission.scanner.range:g} m"),
-        ("Stops", f"{len(mission.stops)}, at least {selection.bound} needed"),
+        ("Stops", f"{len(mission.stops)}; of these candidates at least {selection.bound} are needed"),
         (
             "Coverage",
             f"{100 * selection.coverage:.1f} % of what is in sight, {_required(selection.required)}",
@@ -189,14 +191,26 @@ def _arrow(x: float, y: float, angle: float, *, length: float, label: str, strok
     )
 
 
-TABLE_HEAD = ("no", "x m", "y m", "heading °", "units", "new", "time")
-_RIGHT_EDGES = (7.0, 21.0, 35.0, 48.0, 58.0, 68.0, 82.0)
+@dataclass(frozen=True)
+class Row:
+    """A line of the table: cells, each set to the right against its edge, or to the left from the first."""
+
+    cells: tuple[str, ...]
+    edges: tuple[float, ...]
+    bold: bool = False
+    to_left: bool = False
+    """Whether the first cell begins at the left."""
 
 
-def table_rows(mission: Mission) -> list[tuple[str, ...]]:
+STOP_EDGES = (7.0, 21.0, 35.0, 48.0, 58.0, 68.0, 82.0)
+SHARE_EDGES = (2.0, 48.0, 59.0, 70.0, 82.0)
+STOP_HEAD = Row(("no", "x m", "y m", "heading °", "units", "new", "time"), STOP_EDGES, bold=True)
+
+
+def stop_rows(mission: Mission) -> list[Row]:
     """A row per stop, as the robot meets them; a doorway stop has a `d` after its number."""
     arrivals = schedule(mission).arrival_s.tolist()
-    rows: list[tuple[str, ...]] = [
+    cells: list[tuple[str, ...]] = [
         (
             *(f"{number}{'d' if stop.doorway else ''}", f"{stop.x:.3f}", f"{stop.y:.3f}"),
             *(f"{math.degrees(stop.heading):.1f}", str(stop.sees.units), str(stop.sees.new_units)),
@@ -204,19 +218,49 @@ def table_rows(mission: Mission) -> list[tuple[str, ...]]:
         )
         for number, (stop, arrival) in enumerate(zip(mission.stops, arrivals, strict=True), 1)
     ]
-    more = len(rows) - MOST_ROWS
-    return rows if more <= 0 else [*rows[:MOST_ROWS], ("", "", "", "", "", "", f"and {more} more")]
+    more = len(cells) - MOST_ROWS
+    if more > 0:
+        cells = [*cells[:MOST_ROWS], ("", "", "", "", "", "", f"and {more} more")]
+    return [Row(row, STOP_EDGES) for row in cells]
 
 
-def table(rows: list[tuple[str, ...]], chunks: tuple[Chunk, ...]) -> str:
+def figure_rows(figures: Figures) -> list[Row]:
+    """What is seen of the whole, of every kind and every room; what is left out; what is doubtful."""
+    shares = [figures.whole, *figures.kinds, *figures.rooms]
+    rows = [
+        Row(("coverage", f"all {figures.unit}", "visible", "seen", "seen %"), SHARE_EDGES, True, True),
+        *(_share_row(share) for share in shares[:MOST_ROWS]),
+    ]
+    if figures.unreached:
+        rows.append(_words("not reached", bold=True))
+        rows += [_words(f"{item.room} ({item.area_m2:.1f} m²): {item.why}") for item in figures.unreached]
+    if figures.grave:
+        rows.append(_words("to be checked before driving", bold=True))
+        rows += [_words(item.message) for item in figures.grave]
+    return rows
+
+
+def _share_row(share: Share) -> Row:
+    numbers = (f"{share.total:.1f}", f"{share.visible:.1f}", f"{share.seen:.1f}", percent(share.coverage))
+    return Row((shortened(share.name, size=2.1, width=34), *numbers), SHARE_EDGES, to_left=True)
+
+
+def _words(content: str, *, bold: bool = False) -> Row:
+    return Row((shortened(content, size=2.1, width=COLUMN - 5),), (2.0,), bold, to_left=True)
+
+
+def table(rows: list[Row], chunks: tuple[Chunk, ...]) -> str:
     """The rows, over as many columns of the sheet as they need."""
     return group("table", (_chunk(rows, chunk) for chunk in chunks), text_anchor="end")
 
 
-def _chunk(rows: list[tuple[str, ...]], chunk: Chunk) -> str:
+def _chunk(rows: list[Row], chunk: Chunk) -> str:
     box = chunk.box
-    lines = [_frame(box), _row(TABLE_HEAD, box.x, box.y + HEADER - 1.5, font_weight="bold")]
-    for index, row in enumerate(rows[chunk.first : chunk.first + chunk.count]):
+    shown = rows[chunk.first : chunk.first + chunk.count]
+    lines = [_frame(box)]
+    if shown[0].edges == STOP_EDGES:
+        lines.append(_row(STOP_HEAD, box.x, box.y + HEADER - 1.5))
+    for index, row in enumerate(shown):
         top = box.y + HEADER + ROW * index
         if index % 2 == 0:
             lines.append(rect(box.x + 0.2, top, box.width - 0.4, ROW, fill="#f1eef7"))
@@ -224,10 +268,14 @@ def _chunk(rows: list[tuple[str, ...]], chunk: Chunk) -> str:
     return "\n".join(lines)
 
 
-def _row(cells: tuple[str, ...], x: float, y: float, **style: object) -> str:
-    edges = zip(_RIGHT_EDGES, cells, strict=True)
-    spans = "".join(text(x + edge, y, cell, size=2.1) for edge, cell in edges if cell)
-    return f'<g font-weight="{style["font_weight"]}">{spans}</g>' if style else spans
+def _row(row: Row, x: float, y: float) -> str:
+    cells = enumerate(zip(row.edges, row.cells, strict=True))
+    spans = "".join(
+        text(x + edge, y, cell, size=2.1, **({"text_anchor": "start"} if row.to_left and k == 0 else {}))
+        for k, (edge, cell) in cells
+        if cell
+    )
+    return f'<g font-weight="bold">{spans}</g>' if row.bold else spans
 
 
 def _frame(box: Box) -> str:

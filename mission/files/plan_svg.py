@@ -7,6 +7,7 @@ from itertools import chain
 import numpy as np
 
 from mission.document import Mission
+from mission.figures import Figures
 from mission.files import plan_panel as panel
 from mission.files.floor_drawing import building, targets
 from mission.files.room_labels import Busy, points_along, room_labels
@@ -21,13 +22,17 @@ PADDING = 8.0
 """Millimetres kept free round the floor, for coordinates and what stands on its edge."""
 
 
-def plan_svg(made: Route, mission: Mission, *, date: str, with_range: bool = False) -> bytes:
-    """The plan as SVG; `date` stands in the title block as given, so equal inputs give equal bytes.
+def plan_svg(
+    made: Route, mission: Mission, figures: Figures | None = None, *, date: str, with_range: bool = False
+) -> bytes:
+    """The plan as SVG, with a table of its figures where they are given.
+
+    `date` stands in the title block as given, so equal inputs give equal bytes.
 
     `with_range` adds a faint ring of the scanner's range about each stop.
     """
     entries = panel.legend_entries(made, mission)
-    rows = panel.table_rows(mission)
+    rows = [*panel.stop_rows(mission), *(panel.figure_rows(figures) if figures else [])]
     facts = panel.facts_of(made, mission, date=date)
     blocks = (panel.legend_height(entries), panel.title_height([*facts, ("Scale", "")]), len(rows))
     sheet = fit(Contents(_bounds(made, mission), PADDING, *blocks))

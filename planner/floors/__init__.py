@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from mission.errors import InputError
@@ -11,14 +11,16 @@ from mission.floor import FloorPlan
 from planner.floors.dxf import read_dxf
 
 Reader = Callable[..., FloorPlan]
-"""`(data: bytes, *, source: Path, digest: str, d_dis: float) -> FloorPlan`."""
+"""`(data: bytes, *, source: Path, digest: str, d_dis: float, layers: Mapping[str, str]) -> FloorPlan`."""
 
 READERS: dict[str, Reader] = {".dxf": read_dxf}
 """Reader of each suffix."""
 
 
-def read_floor(path: Path, *, d_dis: float) -> FloorPlan:
+def read_floor(path: Path, *, d_dis: float, layers: Mapping[str, str] | None = None) -> FloorPlan:
     """The floor drawn in `path`, in metres; circles are cut by Eq. 1 for units of `d_dis` metres.
+
+    `layers` says what layers of other names stand for: names in capitals, kinds as in LAYER_ROLES.
 
     Raises
     ------
@@ -30,7 +32,8 @@ def read_floor(path: Path, *, d_dis: float) -> FloorPlan:
         known = ", ".join(READERS)
         raise InputError(f"{path}: unknown kind of file '{path.suffix}'; floors are read from {known}")
     data = _bytes_of(path)
-    return reader(data, source=path, digest=hashlib.sha256(data).hexdigest(), d_dis=d_dis)
+    digest = hashlib.sha256(data).hexdigest()
+    return reader(data, source=path, digest=digest, d_dis=d_dis, layers=layers or {})
 
 
 def _bytes_of(path: Path) -> bytes:

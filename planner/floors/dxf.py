@@ -5,7 +5,7 @@ The bytes become a drawing, the drawing shapes on layers, these strokes in metre
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,9 @@ from planner.floors.shapes import Shape, shapes_of
 from planner.floors.strokes import sketch, strokes_of
 
 
-def read_dxf(data: bytes, *, source: Path, digest: str, d_dis: float) -> FloorPlan:
+def read_dxf(
+    data: bytes, *, source: Path, digest: str, d_dis: float, layers: Mapping[str, str] | None = None
+) -> FloorPlan:
     """The floor that the bytes of a DXF hold.
 
     Raises
@@ -27,11 +29,11 @@ def read_dxf(data: bytes, *, source: Path, digest: str, d_dis: float) -> FloorPl
         When the bytes are no complete DXF, or no closed outline lies on layer FLOOR.
     """
     drawing, odd_file = open_drawing(data, source=source)
-    shapes, odd_shapes = shapes_of(drawing, source=source)
+    shapes, odd_shapes = shapes_of(drawing, source=source, layers=layers or {})
     scale, odd_units = _scale(drawing, shapes)
     strokes, words, odd_strokes = strokes_of(shapes, scale=scale, chord=d_dis)
-    layers = [shape.layer for shape in shapes]
-    parts = parts_of(strokes, words, source=source, layers=layers, skipped=_skipped(odd_strokes))
+    present = [shape.layer for shape in shapes]
+    parts = parts_of(strokes, words, source=source, layers=present, skipped=_skipped(odd_strokes))
     return FloorPlan(
         name=source.stem,
         digest=digest,
@@ -39,6 +41,7 @@ def read_dxf(data: bytes, *, source: Path, digest: str, d_dis: float) -> FloorPl
         rooms=parts.rooms,
         openings=parts.openings,
         elements=parts.elements,
+        ignored=parts.ignored,
         findings=in_order((*odd_file, *odd_units, *odd_shapes, *odd_strokes, *parts.findings)),
     )
 

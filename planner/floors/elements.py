@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 import shapely
 
-from mission.floor import KINDS, Element, Finding, Room
+from mission.floor import KINDS, Element, Finding, IgnoredLine, Room
 from mission.geometry import FloatArray, Polygon, frozen
 from planner.floors.drawn import Closed, Drawn, Oddity, Open, faces_of, hole_indices, place
 from planner.floors.rings import SNAP, Region, canonical_region, parents, polygons_of, to_shapely
@@ -53,17 +53,26 @@ class _Spaces:
 
 def elements_of(
     on: Mapping[str, Drawn], *, outline: Region, rooms: Sequence[Room]
-) -> tuple[tuple[Element, ...], list[Finding]]:
-    """Elements kind by kind, in the order of their place; ids count within a kind."""
+) -> tuple[tuple[Element, ...], list[IgnoredLine], list[Finding]]:
+    """Elements kind by kind, in the order of their place, and outlines on unknown layers that are none.
+
+    Ids count within a kind.
+    """
     spaces = _Spaces(outline, tuple(_region(room) for room in rooms))
     elements: list[Element] = []
+    ignored: list[IgnoredLine] = []
     findings: list[Finding] = []
     for kind in KINDS:
         if kind in on:
-            made, odd = _of_kind(kind, on[kind], spaces)
+            drawn = on[kind]
+            odd: list[Finding] = []
+            if kind == "other":
+                drawn, left_out, odd = _on_the_floor(drawn, spaces)
+                ignored += left_out
+            made, more = _of_kind(kind, drawn, spaces)
             elements += made
-            findings += odd
-    return tuple(elements), findings
+            findings += [*odd, *more]
+    return tuple(elements), ignored, findings
 
 
 def _region(room: Room) -> Region:
@@ -73,8 +82,6 @@ def _region(room: Room) -> Region:
 def _of_kind(kind: str, drawn: Drawn, spaces: _Spaces) -> tuple[list[Element], list[Finding]]:
     closed, lines = _closed_and_lines(kind, drawn)
     findings: list[Finding] = []
-    if kind == "other":
-        closed, findings = _on_the_floor(closed, spaces)
     parts = [
         *_bodies(kind, closed, spaces),
         *(_Part(None, (line.points,), line.global_id, line.odd) for line in lines),
@@ -96,11 +103,15 @@ def _closed_and_lines(kind: str, drawn: Drawn) -> tuple[list[Closed], list[Open]
     return [*drawn.closed, *faces], loose
 
 
-def _on_the_floor(closed: Sequence[Closed], spaces: _Spaces) -> tuple[list[Closed], list[Finding]]:
-    """Unknown shapes that may stand on the floor; frames around it and things beside it are left out."""
+def _on_the_floor(drawn: Drawn, spaces: _Spaces) -> tuple[Drawn, list[IgnoredLine], list[Finding]]:
+    """Unknown shapes that may stand on the floor; frames around it and things beside it are left out.
+
+    A frame's outline is drawn all the same, so it is handed on as a line that is ignored.
+    """
     kept: list[Closed] = []
+    frames: list[IgnoredLine] = []
     findings: list[Finding] = []
-    for shape in closed:
+    for shape in drawn.closed:
         at = place(shapely.get_coordinates(shape.region))
         if shape.region.distance(spaces.outline) > _NEAR:
             findings.append(
@@ -109,9 +120,11 @@ def _on_the_floor(closed: Sequence[Closed], spaces: _Spaces) -> tuple[list[Close
         elif spaces.filled_by(shape.region):
             text = f"layer {shape.layer}: a ring around rooms ({shape.region.area:.3g} m²) is ignored"
             findings.append(Finding("outline_not_solid", text, at=at))
+            rings = [ring for part in polygons_of(shape.region) for ring in (part.exterior, *part.interiors)]
+            frames += [IgnoredLine(shape.layer, frozen(shapely.get_coordinates(ring))) for ring in rings]
         else:
             kept.append(shape)
-    return kept, findings
+    return replace(drawn, closed=tuple(kept)), frames, findings
 
 
 def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Part]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mission.errors import InputError
-from mission.floor import Element, Finding, Opening, Room
+from mission.floor import Element, Finding, IgnoredLine, Opening, Room
 from mission.geometry import Polygon
 from planner.floors.drawn import Drawn, drawn, outline_faces
 from planner.floors.elements import elements_of
@@ -26,6 +26,7 @@ class Parts:
     rooms: tuple[Room, ...]
     openings: tuple[Opening, ...]
     elements: tuple[Element, ...]
+    ignored: tuple[IgnoredLine, ...]
     findings: tuple[Finding, ...]
 
 
@@ -51,10 +52,11 @@ def parts_of(
         raise InputError(f"{source}: {why} (draw the outline there as a closed polyline)")
     rooms, odd_rooms = rooms_of(on["rooms"], _room_names(words), outline=outline)
     openings, odd_openings = openings_of(doors=on["doors"], passages=on["passages"])
-    elements, odd_elements = elements_of(on, outline=outline, rooms=rooms)
+    elements, left_out, odd_elements = elements_of(on, outline=outline, rooms=rooms)
+    ignored = (*left_out, *(IgnoredLine(line.layer, line.points) for line in on["other"].open))
     odd_layers = [*_unknown_layers(on["other"], words), *_dropped(on)]
     findings = (*odd_outline, *odd_rooms, *odd_openings, *odd_elements, *odd_layers)
-    return Parts(canonical_region(outline), rooms, openings, elements, findings)
+    return Parts(canonical_region(outline), rooms, openings, elements, ignored, findings)
 
 
 def _drawn_by_role(strokes: Iterable[Stroke]) -> defaultdict[str, Drawn]:
@@ -104,7 +106,8 @@ def _unknown_layers(other: Drawn, words: Iterable[Word]) -> list[Finding]:
         Finding(
             "unknown_layer",
             f"layer {layer} is not one of a floor's: {closed[layer]} closed shapes are obstacles, "
-            f"{lines[layer]} open lines and {texts[layer]} texts or dimensions are ignored",
+            f"{lines[layer]} open lines and {texts[layer]} texts or dimensions are ignored "
+            f"(--layer {layer}=KIND says what it is)",
         )
         for layer in sorted({*closed, *lines, *texts})
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,6 +26,7 @@ ROLES: dict[str, str] = {
     **{kind.upper(): kind for kind in KINDS if kind != "other"},
 }
 """What the shapes of a layer are; a layer that is not here is `other`."""
+IGNORE = "ignore"
 
 _PREFIX = re.compile(r"^.*(\$\d+\$|\|)")
 _NOT_DRAWN = {"ATTDEF", "VIEWPORT", "SEQEND", "POINT", "WIPEOUT", "XLINE", "RAY"}
@@ -81,12 +82,16 @@ class _Placement:
     """Names of the blocks it is in, outermost first."""
 
 
-def shapes_of(drawing: Drawing, *, source: Path) -> tuple[list[Shape], list[Finding]]:
+def shapes_of(
+    drawing: Drawing, *, source: Path, layers: Mapping[str, str] | None = None
+) -> tuple[list[Shape], list[Finding]]:
     """All shapes of the model space, and a finding for each hidden layer and each thing not followed.
+
+    `layers` says what layers of other names stand for; those to ignore are left out.
 
     Content of a block on layer 0 lies on its insert's layer. A hidden layer counts only if its name is known.
     """
-    walk = _Walk(drawing, source=source)
+    walk = _Walk(drawing, source=source, layers=layers or {})
     shapes = list(walk.through(drawing.modelspace(), _Placement()))
     return shapes, walk.findings()
 
@@ -94,10 +99,13 @@ def shapes_of(drawing: Drawing, *, source: Path) -> tuple[list[Shape], list[Find
 class _Walk:
     """One pass over a drawing, with what it met on the way."""
 
-    def __init__(self, drawing: Drawing, *, source: Path) -> None:
+    def __init__(self, drawing: Drawing, *, source: Path, layers: Mapping[str, str]) -> None:
         self._source = source
         self._met = 0
         self._hidden = {layer.dxf.name.upper(): layer.is_frozen() for layer in _hidden_layers(drawing)}
+        self._roles = {**ROLES, **layers}
+        self._told = set(layers)
+        self._as_told: Counter[tuple[str, str]] = Counter()
         self._used: Counter[str] = Counter()
         self._odd: Counter[tuple[str, str]] = Counter()
 
@@ -160,8 +168,8 @@ class _Walk:
     def _shape(self, entity: DXFEntity, placed: _Placement) -> Iterator[Shape]:
         layer = _layer(entity, placed)
         plain = legible(_PREFIX.sub("", layer))
-        role = ROLES.get(plain.upper(), "other")
-        if plain.upper() == "DEFPOINTS":
+        role = self._role(plain)
+        if role == IGNORE or plain.upper() == "DEFPOINTS":
             return
         if placed.frozen or layer.upper() in self._hidden:
             if role == "other":
@@ -170,13 +178,32 @@ class _Walk:
         global_id = _global_id(entity) or placed.global_id
         yield Shape(entity, plain, role, matrix=placed.matrix, global_id=global_id)
 
+    def _role(self, layer: str) -> str:
+        """What a layer stands for, and that the user has said so."""
+        role = self._roles.get(layer.upper(), "other")
+        if layer.upper() in self._told:
+            self._as_told[layer, role] += 1
+        return role
+
     def findings(self) -> list[Finding]:
+        told = [
+            Finding("layer_as_told", f"layer {layer} is taken for {role}, as told: {count} entities")
+            for (layer, role), count in self._as_told.items()
+        ]
         hidden = [
             Finding("hidden_layer", f"layer {legible(layer)} is frozen or off; its {count} entities are used")
             for layer, count in self._used.items()
         ]
-        return hidden + [
+        return [*told, *self._absent(), *hidden] + [
             Finding(code, text) for (code, text), count in self._odd.items() for _ in range(count)
+        ]
+
+    def _absent(self) -> list[Finding]:
+        """Layers that the user names and the drawing does not have."""
+        absent = self._told - {layer.upper() for layer, _ in self._as_told}
+        return [
+            Finding("no_such_layer", f"layer {legible(name)} is not in the drawing")
+            for name in sorted(absent)
         ]
 
 

@@ -32,7 +32,9 @@ def test_every_target_element_is_there_with_its_global_id(document: dict[str, An
 
 
 def test_sums_add_up(document: dict[str, Any]) -> None:
-    assert document["total"] == {"elements": 3, "units": 32, "visible": 32, "seen": 32, "coverage": 1.0}
+    counts = {"elements": 3, "units": 32, "visible": 32, "seen": 32}
+    metres = {"length_m": 27.2, "visible_m": 27.2, "seen_m": 27.2}
+    assert document["total"] == {**counts, **metres, "coverage": 1.0}
     assert document["kinds"]["walls"]["units"] == 24
     assert document["kinds"]["columns"]["elements"] == 2
     assert sum(item["seen"] for item in document["elements"]) == document["total"]["seen"]

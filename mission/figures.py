@@ -1,0 +1,87 @@
+"""What a plan amounts to: one set of numbers for the terminal, JSON, the printed plan and the recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from mission.floor import Finding, Rank
+from mission.planning import Unreached
+
+
+@dataclass(frozen=True)
+class Share:
+    """What of some targets can be seen at all, and what of that the chosen stops see.
+
+    Counted in metres of boundary, or in units by the paper's rule.
+    """
+
+    name: str
+    """A room, a kind of element, or `all`."""
+    total: float
+    visible: float
+    """Seen from any reachable candidate."""
+    seen: float
+    """Of what is visible, seen by the stops."""
+    required: float | None = None
+    """Least share asked for, if any."""
+    why: str = ""
+    """Why a room is not entered."""
+
+    @property
+    def coverage(self) -> float | None:
+        """Share of what is visible that is seen; None where nothing is visible."""
+        return self.seen / self.visible if self.visible else None
+
+    @property
+    def visible_share(self) -> float:
+        """Share of all that is visible."""
+        return self.visible / self.total if self.total else 0.0
+
+
+@dataclass(frozen=True)
+class Figures:
+    """A plan in numbers."""
+
+    rule: Literal["length", "paper"]
+    """Whether shares count metres or units."""
+    whole: Share
+    rooms: tuple[Share, ...]
+    """Every room with targets, the one least seen first."""
+    kinds: tuple[Share, ...]
+    """Every kind of target, the one least seen first."""
+    rooms_m2: float
+    """Floor of all rooms, floor outside every room included."""
+    reached_m2: float
+    """Floor of the rooms, or parts of rooms, that the robot gets to."""
+    unreached: tuple[Unreached, ...]
+    findings: tuple[Finding, ...]
+    """Everything odd, what bears on the plan most first."""
+
+    @property
+    def unit(self) -> str:
+        return "m" if self.rule == "length" else "units"
+
+    @property
+    def grave(self) -> tuple[Finding, ...]:
+        """Findings for which the plan may be wrong or leave something out."""
+        return tuple(item for item in self.findings if item.rank == Rank.GRAVE)
+
+    @property
+    def crosses_ignored(self) -> bool:
+        """Whether a leg crosses lines of which nobody knows what they stand for."""
+        return any(item.code == LEG_OVER_IGNORED for item in self.findings)
+
+
+LEG_OVER_IGNORED = "leg_over_ignored"
+
+
+def worst_first(shares: Sequence[Share]) -> tuple[Share, ...]:
+    """By coverage, then by name; where nothing is visible at the end."""
+    return tuple(sorted(shares, key=lambda s: (s.coverage is None, s.coverage or 0.0, s.name)))
+
+
+def percent(share: float | None) -> str:
+    """A share as people read it, cut and not rounded up, so that 89.96 % is not told as 90.0 %."""
+    return "-" if share is None else f"{int(share * 1000 + 1e-9) / 10:.1f} %"

@@ -1,0 +1,193 @@
+"""Whether a plan is of the floor that is meant: walls that are missing, lines nobody read, floor left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from mission.figures import LEG_OVER_IGNORED
+from mission.floor import Finding, FloorPlan
+from mission.geometry import FloatArray
+from mission.planning import NavigableSpace, Route
+from planner.shapes import HAIRLINE, local_origin, to_shape
+from planner.targets import solid_of
+
+BESIDE_WALL = 0.35
+"""A room's outline this close (m) to an element has a wall there."""
+WALLED = 0.3
+"""Share of a room's outline that has walls, below which they are missing …"""
+MANY = 0.5
+"""… which is grave where it is so for this share of the rooms."""
+STRAY = 10.0
+"""Elements farther than this (m) from the floor do not belong to it."""
+LITTLE = 0.5
+"""Share of the floor below which a plan that reaches no more is doubtful."""
+OPEN_END = (1e-3, 0.3)
+"""Ends of walls drawn as lines that stop this far (m) from another wall leave a gap."""
+BESIDE_LEG = 0.15
+"""A finding this close (m) to where the robot drives bears on the drive."""
+
+
+def doubts_of(route: Route, *, reached_m2: float) -> tuple[Finding, ...]:
+    """What is doubtful about a plan, seen as a whole."""
+    space = route.selection.visibility.candidates.space
+    return (
+        *_over_ignored(route),
+        *_little_reached(space, reached_m2),
+        *_missing_walls(space),
+        *_stray_elements(space.floor),
+        *_wall_gaps(space),
+    )
+
+
+def near_a_leg(finding: Finding, route: Route) -> bool:
+    """Whether a finding's place lies where the robot drives, or right beside it."""
+    if finding.code == LEG_OVER_IGNORED:
+        return True
+    space = route.selection.visibility.candidates.space
+    if finding.at is None:
+        return False
+    place = shapely.Point(np.array(finding.at) - local_origin(space.floor))
+    reach = space.settings.radius + BESIDE_LEG
+    return any(leg.distance(place) <= reach for leg in _legs(route))
+
+
+@lru_cache(maxsize=1)
+def _legs(route: Route) -> tuple[BaseGeometry, ...]:
+    """Every leg in the local frame, the way back last."""
+    origin = local_origin(route.selection.visibility.candidates.space.floor)
+    legs = route.approaches if route.return_leg is None else (*route.approaches, route.return_leg)
+    lines = (leg - origin for leg in legs)
+    return tuple(shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0]) for line in lines)
+
+
+def _over_ignored(route: Route) -> Iterator[Finding]:
+    """Layers with lines that are not read, where the robot would drive over or into them."""
+    space = route.selection.visibility.candidates.space
+    origin = local_origin(space.floor)
+    swept = [leg.buffer(space.settings.radius) for leg in _legs(route)]
+    tree = shapely.STRtree(swept)
+    by_layer: dict[str, list[BaseGeometry]] = {}
+    for line in space.floor.ignored:
+        by_layer.setdefault(line.layer, []).append(shapely.LineString(line.points - origin))
+    for layer, lines in sorted(by_layer.items()):
+        line, leg = tree.query(lines, predicate="intersects")
+        if len(leg):
+            first = int(np.lexsort((line, leg))[0])
+            at = _place(lines[line[first]].intersection(swept[leg[first]]), origin)
+            names = _named(sorted(set(leg.tolist())), len(route.approaches))
+            message = (
+                f"the robot drives over lines on layer {layer}, which are not read: {names} "
+                f"(first at {at[0]:.2f}, {at[1]:.2f}); say what they are: --layer {layer}=KIND, "
+                f"or {layer}=ignore if nothing stands there"
+            )
+            yield Finding(LEG_OVER_IGNORED, message, at=at)
+
+
+def _named(legs: Sequence[int], stops: int) -> str:
+    names = [f"to stop {k + 1}" if k < stops else "back" for k in legs]
+    more = f" and {len(names) - 4} more" if len(names) > 4 else ""
+    return f"leg{'s' * (len(names) > 1)} {', '.join(names[:4])}{more}"
+
+
+def _place(shape: BaseGeometry, origin: FloatArray) -> tuple[float, float]:
+    """The first corner of a shape, in the drawing's metres."""
+    x, y = min(map(tuple, shapely.get_coordinates(shape).tolist()))
+    return (float(x + origin[0]), float(y + origin[1]))
+
+
+def _little_reached(space: NavigableSpace, reached_m2: float) -> Iterator[Finding]:
+    whole = sum(polygon.area for room in space.rooms for polygon in room.area)
+    if reached_m2 < LITTLE * whole:
+        yield Finding(
+            "little_reached",
+            f"the plan reaches {reached_m2:.1f} m² of {whole:.1f} m² of floor; "
+            "see what is unreached, and why",
+        )
+
+
+def _missing_walls(space: NavigableSpace) -> Iterator[Finding]:
+    """Rooms with hardly a wall around them, which show nothing and hide nothing."""
+    origin = local_origin(space.floor)
+    rooms = [room for room in space.rooms if room.room is not None]
+    if not rooms:
+        return
+    walls = to_shape((*space.obstacles, *space.occluders), origin).buffer(BESIDE_WALL, quad_segs=2)
+    shapely.prepare(walls)
+    outlines = [shapely.boundary(to_shape(room.area, origin)) for room in rooms]
+    bare = [
+        room
+        for room, outline in zip(rooms, outlines, strict=True)
+        if outline.length and outline.intersection(walls).length < WALLED * outline.length
+    ]
+    if not bare:
+        return
+    names = ", ".join(room.name for room in bare[:5]) + (" …" if len(bare) > 5 else "")
+    code = "walls_missing" if len(bare) >= MANY * len(rooms) else "room_without_walls"
+    yield Finding(
+        code,
+        f"{len(bare)} of {len(rooms)} rooms have walls along less than {100 * WALLED:.0f} % "
+        f"of their outline: {names}{_not_read(space.floor)}",
+    )
+
+
+def _not_read(floor: FloorPlan) -> str:
+    """Layers that may hold what is missing."""
+    layers = sorted({line.layer for line in floor.ignored})
+    unknown = [item.message.split(" ")[1] for item in floor.findings if item.code == "unknown_layer"]
+    names = sorted({*layers, *unknown})
+    if not names:
+        return "; is the layer WALLS complete?"
+    return f"; layers that are not read: {', '.join(names[:8])} (--layer {names[0]}=walls)"
+
+
+def _stray_elements(floor: FloorPlan) -> Iterator[Finding]:
+    """Elements far from the floor: another drawing in the same file, or a slip."""
+    origin = local_origin(floor)
+    outline = to_shape(floor.outline, origin)
+    for item in floor.elements:
+        shape = solid_of(item, origin, HAIRLINE)
+        away = 0.0 if shape.is_empty else float(shape.distance(outline))
+        if away > STRAY:
+            message = f"{item.id} lies {away:.0f} m from the floor; is it part of this storey?"
+            yield Finding("stray_element", message, item.id, _place(shape, origin))
+
+
+def _wall_gaps(space: NavigableSpace) -> Iterator[Finding]:
+    """Ends of walls drawn as lines that stop short of another wall: the laser looks through there."""
+    origin = local_origin(space.floor)
+    items = [item for item in space.floor.elements if item.occludes]
+    if not any(item.lines for item in items):
+        return
+    solids = np.array([solid_of(item, origin, HAIRLINE) for item in items], dtype=object)
+    tree = shapely.STRtree(solids)
+    openings = [shapely.LineString(item.opening.line - origin) for item in space.openings]
+    for k, item in enumerate(items):
+        for end in (point for line in item.lines for point in (line[0], line[-1])):
+            other, width = _nearest_other(tree, solids, k, shapely.Point(end - origin))
+            if other is None or not OPEN_END[0] < width <= OPEN_END[1] or _in_opening(end - origin, openings):
+                continue
+            message = (
+                f"{item.id} ends {100 * width:.1f} cm from {items[other].id} "
+                f"at ({end[0]:.2f}, {end[1]:.2f}): the laser looks through the gap"
+            )
+            yield Finding("wall_gap", message, item.id, (float(end[0]), float(end[1])))
+
+
+def _nearest_other(
+    tree: shapely.STRtree, solids: NDArray[np.object_], own: int, point: BaseGeometry
+) -> tuple[int | None, float]:
+    near = [k for k in tree.query(point, predicate="dwithin", distance=OPEN_END[1]).tolist() if k != own]
+    if not near:
+        return None, np.inf
+    distances = shapely.distance(solids[near], point)
+    return near[int(np.argmin(distances))], float(distances.min())
+
+
+def _in_opening(point: FloatArray, openings: Sequence[BaseGeometry]) -> bool:
+    return any(line.distance(shapely.Point(point)) <= OPEN_END[1] for line in openings)
