@@ -27,6 +27,7 @@ from planner.assemble import CLEAR_SLACK
 from planner.floors import read_floor
 from planner.gaps import Walls
 from planner.ground import Ground
+from planner.plausible import over_ignored
 from planner.shapes import HAIRLINE, SLACK, segments_of, to_shape
 from planner.targets import solid_of
 
@@ -59,6 +60,7 @@ def misfits_on(floor: FloorPlan, mission: Mission, settings: Settings) -> Iterat
         yield from fit.stop(path, stop)
         yield from fit.leg(f"{path}.approach", stop.approach)
     yield from fit.leg("$.return", mission.return_ or ())
+    yield from fit.over_ignored(mission)
 
 
 def _other_machine(mission: Mission, settings: Settings) -> Iterator[Problem]:
@@ -127,6 +129,18 @@ class _Fit:
                 yield Problem(place, f"{what} {off}")
             elif (fault := self._worst(way, self.legs)) is not None:
                 yield Problem(place, f"{what} is {self._said(fault, self.legs)}")
+
+    def over_ignored(self, mission: Mission) -> Iterator[Problem]:
+        """Legs over lines of the drawing that nobody has read."""
+        legs = [stop.approach for stop in mission.stops] + ([mission.return_] if mission.return_ else [])
+        shapes = [shapely.LineString(self._local(leg)) for leg in legs]
+        radius = self.settings.radius
+        for item in over_ignored(self.floor, shapes, stops=len(mission.stops), radius=radius):
+            yield Problem("$.stops", item.message)
+
+    def _local(self, leg: tuple[Point, ...]) -> FloatArray:
+        """A leg in the local frame (n, 2), with two points at least."""
+        return np.array(leg if len(leg) > 1 else leg * 2) - self.ground.origin
 
     def _off(self, shape: BaseGeometry) -> str | None:
         """Whether a place or way leaves the floor or lies within an element, in words."""

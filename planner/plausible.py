@@ -37,7 +37,7 @@ def doubts_of(route: Route, *, reached_m2: float) -> tuple[Finding, ...]:
     """What is doubtful about a plan, seen as a whole."""
     space = route.selection.visibility.candidates.space
     return (
-        *_over_ignored(route),
+        *over_ignored(space.floor, _legs(route), stops=len(route.approaches), radius=space.settings.radius),
         *_little_reached(space, reached_m2),
         *_missing_walls(space),
         *_stray_elements(space.floor),
@@ -66,21 +66,25 @@ def _legs(route: Route) -> tuple[BaseGeometry, ...]:
     return tuple(shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0]) for line in lines)
 
 
-def _over_ignored(route: Route) -> Iterator[Finding]:
-    """Layers with lines that are not read, where the robot would drive over or into them."""
-    space = route.selection.visibility.candidates.space
-    origin = local_origin(space.floor)
-    swept = [leg.buffer(space.settings.radius) for leg in _legs(route)]
+def over_ignored(
+    floor: FloorPlan, legs: Sequence[BaseGeometry], *, stops: int, radius: float
+) -> Iterator[Finding]:
+    """Layers with lines that are not read, where a robot of this radius would drive over or into them.
+
+    Legs are in the local frame; those beyond the first `stops` lead back.
+    """
+    origin = local_origin(floor)
+    swept = [leg.buffer(radius) for leg in legs]
     tree = shapely.STRtree(swept)
     by_layer: dict[str, list[BaseGeometry]] = {}
-    for line in space.floor.ignored:
+    for line in floor.ignored:
         by_layer.setdefault(line.layer, []).append(shapely.LineString(line.points - origin))
     for layer, lines in sorted(by_layer.items()):
         line, leg = tree.query(lines, predicate="intersects")
         if len(leg):
             first = int(np.lexsort((line, leg))[0])
             at = _place(lines[line[first]].intersection(swept[leg[first]]), origin)
-            names = _named(sorted(set(leg.tolist())), len(route.approaches))
+            names = _named(sorted(set(leg.tolist())), stops)
             message = (
                 f"the robot drives over lines on layer {layer}, which are not read: {names} "
                 f"(first at {at[0]:.2f}, {at[1]:.2f}); say what they are: --layer {layer}=KIND, "
