@@ -190,7 +190,7 @@ def matrix_by_force(visibility: Visibility) -> np.ndarray:
     origin = local_origin(space.floor)
     return visible_pairs(
         to_grid(found.xy[found.kept] - origin),
-        to_grid(face_segments(to_shape(space.occluders, origin))).reshape(-1, 4),
+        to_grid(face_segments(to_shape(space.occluders, origin))),
         to_grid(targets.a - origin),
         to_grid(targets.b - origin),
         targets.units,

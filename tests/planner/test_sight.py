@@ -28,17 +28,28 @@ def matrix(runs: Runs, units: np.ndarray) -> np.ndarray:
 
 
 class World:
-    """Occluders in a frame of 21 × 21 m, their faces and some free segments as targets."""
+    """Occluders in a frame, 21 × 21 m unless given, their faces and some free segments as targets."""
 
-    def __init__(self, shapes, free: np.ndarray, viewpoints: np.ndarray, *, d_dis: float = 0.25) -> None:
+    def __init__(
+        self,
+        shapes,
+        free: np.ndarray,
+        viewpoints: np.ndarray,
+        *,
+        d_dis: float = 0.25,
+        frame: tuple[float, ...] = (-5, -5, 16, 16),
+    ) -> None:
         self.occluders = snapped_union(shapes)
-        frame = snapped(shapely.box(-5, -5, 16, 16))
-        self.open = shapely.difference(frame, self.occluders, grid_size=GRID)
+        self.open = shapely.difference(snapped(shapely.box(*frame)), self.occluders, grid_size=GRID)
         self.faces = face_segments(self.occluders)
         segments = np.concatenate([self.faces, free.reshape(-1, 2, 2)])
         self.a, self.b = segments[:, 0], segments[:, 1]
         self.units = units_on(np.hypot(*(self.b - self.a).T), d_dis=d_dis)
         self.is_face = np.arange(len(segments)) < len(self.faces)
+        self.stand_at(viewpoints)
+
+    def stand_at(self, viewpoints: np.ndarray) -> None:
+        """Look from these points, but for those within occluders."""
         inside = shapely.contains_properly(self.occluders, shapely.points(viewpoints))
         self.viewpoints = to_grid(viewpoints[~inside])
 
@@ -49,7 +60,7 @@ class World:
         return matrix(sight(self.scene(), self.viewpoints, reach=reach), self.units)
 
     def by_force(self, reach: float | None) -> np.ndarray:
-        edges = to_grid(self.faces).reshape(-1, 4)
+        edges = to_grid(self.faces)
         steps = None if reach is None else round(reach / GRID)
         seen = visible_pairs(
             self.viewpoints, edges, to_grid(self.a), to_grid(self.b), self.units, self.is_face, reach=steps

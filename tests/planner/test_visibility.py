@@ -62,7 +62,7 @@ def by_force(found: Candidates, rows: Iterable[int], reach: float) -> np.ndarray
     """The same by brute force."""
     space, targets = found.space, found.space.targets
     origin = local_origin(space.floor)
-    edges = to_grid(face_segments(to_shape(space.occluders, origin))).reshape(-1, 4)
+    edges = to_grid(face_segments(to_shape(space.occluders, origin)))
     return visible_pairs(
         to_grid(found.xy[found.kept] - origin)[list(rows)],
         edges,
