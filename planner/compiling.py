@@ -11,8 +11,9 @@ from typing import Any
 def compiled(kernel: Callable[..., Any], *helpers: Callable[..., Any]) -> Callable[..., Any]:
     """The kernel as machine code, kept on disk between runs; the kernel itself where numba is absent.
 
-    `helpers` are the functions it calls. Kernels are written for integers that numba wraps at 64 bits
-    and Python does not; they only wrap where the true value is known to fit.
+    `helpers` are the functions it calls, of the kernel's own file: what is kept on disk is known to be of
+    an older source by that file alone. A kernel's integers must fit 64 bits, where machine code and Python
+    part; each kernel's file says why its own do.
     """
     try:
         from numba import njit

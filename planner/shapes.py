@@ -25,7 +25,9 @@ SLACK = 1e-6
 HAIRLINE = 4e-7
 """Thickness in metres that an obstacle drawn as a single line gets, so that it has an inside."""
 LARGEST = 5000.0
-"""Greatest extent of a floor in metres for which all integer arithmetic stays exact."""
+"""Greatest extent of a floor in metres: with what is drawn round it, within FARTHEST_STEPS."""
+FARTHEST_STEPS = 2**29
+"""Grid steps from 0, 0 up to which all integer arithmetic is exact, a little more than 5.3 km."""
 
 
 @lru_cache(maxsize=8)
@@ -94,8 +96,15 @@ def snapped_union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
 
 
 def to_grid(xy: FloatArray) -> NDArray[np.int64]:
-    """Local coordinates in metres as whole grid steps."""
-    return np.rint(np.asarray(xy) / GRID).astype(np.int64)
+    """Local coordinates in metres as whole grid steps; refuses those that are too large to be exact."""
+    steps = np.rint(np.asarray(xy) / GRID)
+    if not np.all(np.abs(steps) <= FARTHEST_STEPS):
+        far, most = GRID * float(np.abs(steps).max()), GRID * FARTHEST_STEPS
+        raise InputError(
+            f"something lies {far:.0f} m from the floor's lower left corner, more than {most:.0f} m; "
+            "check the drawing's units"
+        )
+    return steps.astype(np.int64)
 
 
 def grown(shape: BaseGeometry, distance: float) -> BaseGeometry:

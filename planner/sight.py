@@ -10,11 +10,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from mission.errors import InputError
 from mission.geometry import BoolArray, FloatArray, IntArray
 from planner.compiling import compiled
 from planner.mesh import Mesh, containing
 from planner.shapes import GRID, to_grid
-from planner.sight_kernel import HELPERS, look_all
+from planner.sight_kernel import FARTHEST, HELPERS, MOST_UNITS, look_all, not_negative
 
 COMPILE_ABOVE = 2_000_000
 """Viewpoints × mesh triangles above which loading the compiled kernel pays for itself."""
@@ -52,6 +53,7 @@ class Runs:
 
 def scene_of(mesh: Mesh, a: FloatArray, b: FloatArray, units: IntArray, on_boundary: BoolArray) -> Scene:
     """Put target segments (m, 2), local metres, into the mesh: faces on its edges, others into triangles."""
+    _check_units(units)
     start, end = to_grid(a), to_grid(b)
     pointer, segment, low, high = _buckets(mesh, start, end, units, np.flatnonzero(~on_boundary))
     return Scene(
@@ -65,6 +67,13 @@ def scene_of(mesh: Mesh, a: FloatArray, b: FloatArray, units: IntArray, on_bound
         bucket_low=low,
         bucket_high=high,
     )
+
+
+def _check_units(units: IntArray) -> None:
+    """Refuse more units on a segment than whole numbers stay exact for."""
+    most = int(units.max(initial=0))
+    if most > MOST_UNITS:
+        raise InputError(f"{most} units on one face, more than {MOST_UNITS}; raise --d-dis")
 
 
 def _faces(mesh: Mesh, a: IntArray, b: IntArray, faces: IntArray) -> IntArray:
@@ -117,7 +126,7 @@ def _units_in_triangles(
         p = mesh.vertices[mesh.corners[triangle, k]]
         q = mesh.vertices[mesh.corners[triangle, (k + 1) % 3]]
         at_a, at_b = _turns(p, q, a[unit]), _turns(p, q, b[unit])
-        inside &= _side_not_negative(at_a, at_b, odd[unit], pieces[unit])
+        inside &= not_negative(at_a, at_b, odd[unit], pieces[unit])
     return unit[inside], triangle[inside]
 
 
@@ -125,19 +134,11 @@ def _turns(p: IntArray, q: IntArray, r: IntArray) -> IntArray:
     return (q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0])
 
 
-def _side_not_negative(at_a: IntArray, at_b: IntArray, odd: IntArray, pieces: IntArray) -> BoolArray:
-    """Exact sign test of `side_sign` in the kernel, for arrays."""
-    slope = at_b - at_a
-    estimate = pieces.astype(float) * at_a.astype(float) + odd.astype(float) * slope.astype(float)
-    exact = pieces * at_a + odd * slope  # wraps only where the estimate already decides
-    return np.where(np.abs(estimate) > 2.0**60, estimate > 0, exact >= 0)
-
-
 def sight(scene: Scene, viewpoints: NDArray[np.int64], *, reach: float | None) -> Runs:
     """Everything each viewpoint (grid steps) sees within `reach` metres (None: no limit)."""
     point, triangle = containing(scene.mesh, viewpoints)
     start = np.searchsorted(point, np.arange(len(viewpoints) + 1)).astype(np.int64)
-    steps = -1 if reach is None else round(reach / GRID)
+    steps = -1 if reach is None else min(round(reach / GRID), FARTHEST)
     arrays = [
         np.ascontiguousarray(array, dtype=np.int64)
         for array in (

@@ -6,44 +6,62 @@ coordinates are whole grid steps; every decision is exact.
 The rule for rays through a vertex: a point is seen if it can be seen by a ray turned to one side by
 an arbitrarily small angle. A gap of no width is not looked through, a face is not seen edge-on, and a
 wedge's limits, which are always vertices, belong to it.
+
+No number exceeds 64 bits, where machine code and Python would part. What is given lies within these
+bounds, which `planner.sight` sees to:
+
+- coordinates within ±2**29, so differences within 2**30 and turns within 2**61;
+- at most 2**26 units on a segment, so `pieces`, two per unit, within 2**27;
+- a range of at most 2**31, which is beyond any two points.
+
+Greater products are held in parts, each multiplied by itself.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-EXACT_BELOW = 2.0**60
-"""Values whose floating point estimate is below this fit 64-bit integers, so wrapped sums are exact."""
+MOST_UNITS = 2**26
+"""Units on one segment."""
+FARTHEST = 2**31
+"""Grid steps of the longest range."""
+
+HALF = 31
+HALF_MASK = 2**HALF - 1
+THIRD = 29
+THIRD_MASK = 2**THIRD - 1
 
 
 def turn(px: int, py: int, qx: int, qy: int, rx: int, ry: int) -> int:
-    """Twice the signed area of p, q, r: positive when r is left of p -> q."""
+    """Twice the signed area of p, q, r: positive when r is left of p -> q; within 2 · 2**30 · 2**30."""
     return (qx - px) * (ry - py) - (qy - py) * (rx - px)
 
 
-def side_sign(at_a: int, at_b: int, odd: int, pieces: int) -> int:
-    """Sign of the linear function that is `at_a` at a and `at_b` at b, at the fraction odd / pieces."""
-    slope = at_b - at_a
-    estimate = float(pieces) * float(at_a) + float(odd) * float(slope)
-    if estimate > EXACT_BELOW:
-        return 1
-    if estimate < -EXACT_BELOW:
-        return -1
-    value = pieces * at_a + odd * slope
-    return 1 if value > 0 else (-1 if value < 0 else 0)
+def not_negative(at_a: Any, at_b: Any, odd: Any, pieces: Any) -> Any:
+    """Whether the linear function that is `at_a` at a and `at_b` at b is >= 0 at the fraction odd / pieces.
+
+    For numbers as for arrays. Both are turns, each of a high part within 2**30 and a low part below 2**31: times `pieces`, within
+    2**57 and 2**58.
+    """
+    rest = pieces - odd
+    low = rest * (at_a & HALF_MASK) + odd * (at_b & HALF_MASK)
+    return rest * (at_a >> HALF) + odd * (at_b >> HALF) + (low >> HALF) >= 0
 
 
-def within_reach(ux: int, uy: int, wx: int, wy: int, odd: int, pieces: int, reach: int) -> bool:
-    """Whether u + (odd / pieces) w is at most `reach` long."""
-    x = pieces * ux + odd * wx
-    y = pieces * uy + odd * wy
+def within_reach(ax: int, ay: int, bx: int, by: int, odd: int, pieces: int, reach: int) -> bool:
+    """Whether the point at the fraction odd / pieces of the way from a to b is at most `reach` from 0, 0.
+
+    Times `pieces`, it is within 2**57 and the range within 2**58: squared as high part, within 2**29, and
+    low part, below 2**29, every sum of products is within 2**61.
+    """
+    x, y = (pieces - odd) * ax + odd * bx, (pieces - odd) * ay + odd * by
     far = pieces * reach
-    estimate = float(x) * float(x) + float(y) * float(y) - float(far) * float(far)
-    if estimate > EXACT_BELOW:
-        return False
-    if estimate < -EXACT_BELOW:
-        return True
-    return x * x + y * y - far * far <= 0
+    x_high, y_high, far_high = x >> THIRD, y >> THIRD, far >> THIRD
+    x_low, y_low, far_low = x & THIRD_MASK, y & THIRD_MASK, far & THIRD_MASK
+    low = x_low * x_low + y_low * y_low - far_low * far_low
+    middle = 2 * (x_high * x_low + y_high * y_low - far_high * far_low) + (low >> THIRD)
+    high = x_high * x_high + y_high * y_high - far_high * far_high + (middle >> THIRD)
+    return high < 0 or (high == 0 and middle & THIRD_MASK == 0 and low & THIRD_MASK == 0)
 
 
 def first_not_negative(at_a: int, at_b: int, units: int, low: int) -> int:
@@ -51,9 +69,9 @@ def first_not_negative(at_a: int, at_b: int, units: int, low: int) -> int:
     pieces = 2 * units
     guess = (-float(pieces) * float(at_a) / float(at_b - at_a) - 1.0) / 2.0
     unit = low if guess < low else (units if guess > units else int(guess))
-    while unit > low and side_sign(at_a, at_b, 2 * unit - 1, pieces) >= 0:
+    while unit > low and not_negative(at_a, at_b, 2 * unit - 1, pieces):
         unit -= 1
-    while unit < units and side_sign(at_a, at_b, 2 * unit + 1, pieces) < 0:
+    while unit < units and not not_negative(at_a, at_b, 2 * unit + 1, pieces):
         unit += 1
     return unit
 
@@ -63,9 +81,9 @@ def last_not_negative(at_a: int, at_b: int, units: int, high: int) -> int:
     pieces = 2 * units
     guess = (-float(pieces) * float(at_a) / float(at_b - at_a) - 1.0) / 2.0
     unit = high if guess > high else (-1 if guess < -1 else int(guess))
-    while unit < high and side_sign(at_a, at_b, 2 * unit + 3, pieces) >= 0:
+    while unit < high and not_negative(at_a, at_b, 2 * unit + 3, pieces):
         unit += 1
-    while unit >= 0 and side_sign(at_a, at_b, 2 * unit + 1, pieces) < 0:
+    while unit >= 0 and not not_negative(at_a, at_b, 2 * unit + 1, pieces):
         unit -= 1
     return unit
 
@@ -80,22 +98,23 @@ def clip_side(at_a: int, at_b: int, units: int, low: int, high: int) -> tuple[in
 
 
 def clip_reach(
-    ux: int, uy: int, wx: int, wy: int, units: int, reach: int, low: int, high: int
+    ax: int, ay: int, bx: int, by: int, units: int, reach: int, low: int, high: int
 ) -> tuple[int, int]:
-    """Units low..high whose midpoints are within reach; u is the way to a, w from a to b."""
+    """Units low..high whose midpoints are within reach of 0, 0."""
     if high < low:
         return low, high
-    ww = float(wx) * float(wx) + float(wy) * float(wy)
+    wx, wy = float(bx - ax), float(by - ay)
+    ww = wx * wx + wy * wy
     pieces = 2 * units
     nearest = low
     if ww > 0.0:
-        foot = (-(float(ux) * float(wx) + float(uy) * float(wy)) / ww * pieces - 1.0) / 2.0
+        foot = (-(float(ax) * wx + float(ay) * wy) / ww * pieces - 1.0) / 2.0
         nearest = low if foot < low else (high if foot > high else int(foot + 0.5))
         nearest = min(max(nearest, low), high)
-    if not within_reach(ux, uy, wx, wy, 2 * nearest + 1, pieces, reach):
+    if not within_reach(ax, ay, bx, by, 2 * nearest + 1, pieces, reach):
         better = nearest
         for other in (nearest - 1, nearest + 1):
-            if low <= other <= high and within_reach(ux, uy, wx, wy, 2 * other + 1, pieces, reach):
+            if low <= other <= high and within_reach(ax, ay, bx, by, 2 * other + 1, pieces, reach):
                 better = other
         if better == nearest:
             return 0, -1
@@ -103,7 +122,7 @@ def clip_reach(
     below, above = low - 1, nearest
     while above - below > 1:
         middle = (above + below) // 2
-        if within_reach(ux, uy, wx, wy, 2 * middle + 1, pieces, reach):
+        if within_reach(ax, ay, bx, by, 2 * middle + 1, pieces, reach):
             above = middle
         else:
             below = middle
@@ -111,7 +130,7 @@ def clip_reach(
     below, above = nearest, high + 1
     while above - below > 1:
         middle = (above + below) // 2
-        if within_reach(ux, uy, wx, wy, 2 * middle + 1, pieces, reach):
+        if within_reach(ax, ay, bx, by, 2 * middle + 1, pieces, reach):
             below = middle
         else:
             above = middle
@@ -205,9 +224,9 @@ def look(
                 at_b = turn(x, y, bx[segment], by[segment], vx[left], vy[left])
                 low, high = clip_side(at_a, at_b, n, low, high)
             if reach >= 0:
-                ux, uy = ax[segment] - x, ay[segment] - y
-                wx, wy = bx[segment] - ax[segment], by[segment] - ay[segment]
-                low, high = clip_reach(ux, uy, wx, wy, n, reach, low, high)
+                low, high = clip_reach(
+                    ax[segment] - x, ay[segment] - y, bx[segment] - x, by[segment] - y, n, reach, low, high
+                )
             if low <= high:
                 if count >= size:
                     return -1
@@ -257,8 +276,7 @@ def look(
                 at_b = turn(x, y, vx[b], vy[b], vx[new_left], vy[new_left])
                 low, high = clip_side(at_a, at_b, n, low, high)
             if reach >= 0:
-                ux, uy = vx[a] - x, vy[a] - y
-                low, high = clip_reach(ux, uy, vx[b] - vx[a], vy[b] - vy[a], n, reach, low, high)
+                low, high = clip_reach(vx[a] - x, vy[a] - y, vx[b] - x, vy[b] - y, n, reach, low, high)
             if low <= high:
                 if count >= size:
                     return -1
@@ -284,7 +302,7 @@ def look_all(first_row: int, pointer: Any, qx: Any, *scene_and_output: Any) -> i
 
 HELPERS = (
     turn,
-    side_sign,
+    not_negative,
     within_reach,
     first_not_negative,
     last_not_negative,
