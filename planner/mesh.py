@@ -9,8 +9,9 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from mission.errors import StopgoError
 from mission.geometry import IntArray
-from planner.shapes import GRID, polygon_parts, to_grid
+from planner.shapes import GRID, polygon_parts, segments_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,13 +31,55 @@ class Mesh:
 
 
 def mesh_of(region: BaseGeometry) -> Mesh:
-    """Triangulate a region whose vertices lie on the grid and whose touching rings share vertices."""
+    """Triangulate a region in whole grid steps whose touching rings share vertices.
+
+    Raises
+    ------
+    StopgoError
+        Naming the place, if the region is not valid or one of its edges is no edge of the mesh: it would be
+        there for nobody.
+    """
+    if not shapely.is_valid(region):
+        raise StopgoError(f"open space, in steps of {GRID:g} m: {shapely.is_valid_reason(region)}; redraw it")
     parts = [shapely.constrained_delaunay_triangles(part) for part in polygon_parts(region)]
     triangles = shapely.get_parts(parts) if parts else np.array([])
     xy = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
-    vertices, index = np.unique(to_grid(xy.reshape(-1, 2)), axis=0, return_inverse=True)
+    vertices, index = np.unique(np.rint(xy.reshape(-1, 2)).astype(np.int64), axis=0, return_inverse=True)
     corners = _counter_clockwise(vertices, index.reshape(-1, 3))
-    return Mesh(vertices=vertices, corners=corners, neighbour=_neighbours(corners))
+    mesh = Mesh(vertices=vertices, corners=corners, neighbour=_neighbours(corners))
+    _check_rim(mesh, region)
+    return mesh
+
+
+def _check_rim(mesh: Mesh, region: BaseGeometry) -> None:
+    """The mesh ends where the region does, edge by edge."""
+    _, _, rim = rim_of(mesh)
+    drawn = np.rint(segments_of(shapely.orient_polygons(region))).astype(np.int64)
+    if not np.array_equal(_sorted(rim), _sorted(drawn)):
+        edge = min({*map(_key, rim)} ^ {*map(_key, drawn)})
+        raise StopgoError(f"open space has no triangle along {place_of(edge)}; redraw that place")
+
+
+def rim_of(mesh: Mesh) -> tuple[IntArray, IntArray, IntArray]:
+    """Triangle (n,), number (n,) and ends (n, 2, 2) of each edge at the boundary, the region on its left."""
+    triangle, number = np.nonzero(mesh.neighbour < 0)
+    ends = [mesh.vertices[mesh.corners[triangle, (number + k) % 3]] for k in range(2)]
+    return triangle, number, np.stack(ends, axis=1)
+
+
+def place_of(edge: tuple[int, ...]) -> str:
+    """An edge's ends in words."""
+    ax, ay, bx, by = (GRID * step for step in edge)
+    return f"({ax:.5f}, {ay:.5f}) to ({bx:.5f}, {by:.5f}) m from the floor's lower left corner"
+
+
+def _key(edge: IntArray) -> tuple[int, ...]:
+    return tuple(edge.ravel().tolist())
+
+
+def _sorted(edges: IntArray) -> IntArray:
+    flat = edges.reshape(-1, 4)
+    return flat[np.lexsort(flat.T)]
 
 
 def _counter_clockwise(vertices: IntArray, corners: IntArray) -> IntArray:

@@ -14,7 +14,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from mission.errors import InputError
+from mission.errors import InputError, StopgoError
 from mission.floor import FloorPlan
 from mission.geometry import FloatArray, Polygon, bounds, frozen
 
@@ -26,6 +26,8 @@ HAIRLINE = 4e-7
 """Thickness in metres that an obstacle drawn as a single line gets, so that it has an inside."""
 LARGEST = 5000.0
 """Greatest extent of a floor in metres: with what is drawn round it, within FARTHEST_STEPS."""
+SETTLING = 20
+"""Times an outline is rounded at most until it stays as it is; two or three are enough."""
 FARTHEST_STEPS = 2**29
 """Grid steps from 0, 0 up to which all integer arithmetic is exact, a little more than 5.3 km."""
 
@@ -61,8 +63,12 @@ def one_shape(polygon: Polygon, origin: FloatArray) -> BaseGeometry:
     if len(polygon.exterior) < 3:
         return shapely.Polygon()
     holes = [hole - origin for hole in polygon.holes if len(hole) >= 3]
-    mended = shapely.make_valid(shapely.Polygon(polygon.exterior - origin, holes))
-    return shapely.union_all(polygon_parts(mended))
+    return mended(shapely.Polygon(polygon.exterior - origin, holes))
+
+
+def mended(shape: BaseGeometry) -> BaseGeometry:
+    """What is valid of a polygonal geometry; empty where it has no area."""
+    return shapely.union_all(polygon_parts(shapely.make_valid(shape)))
 
 
 def to_polygons(shape: BaseGeometry, origin: FloatArray) -> tuple[Polygon, ...]:
@@ -84,15 +90,48 @@ def polygon_parts(shape: BaseGeometry) -> list[shapely.Polygon]:
 
 
 def snapped(shape: BaseGeometry) -> BaseGeometry:
-    """The same shape, valid, with every vertex on the grid; later operations are not rounded to it."""
-    return shapely.set_precision(shapely.set_precision(shape, GRID), 0)
+    """The same shape, valid, every vertex on the grid, no line within half a step of another's vertex.
+
+    So snapping it again changes nothing, and operations on its whole steps find no new crossing.
+    """
+    return _in_metres(_settled(_in_steps(shape)))
 
 
 def snapped_union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
-    """The union of shapes with every vertex on the grid and every crossing a vertex."""
-    found = np.array([snapped(shape) for shape in shapes], dtype=object)
+    """The union of shapes, `snapped`, with every crossing a vertex."""
+    found = np.array([_in_steps(snapped(shape)) for shape in shapes], dtype=object)
     ordered = found[np.argsort(shapely.to_wkb(found), kind="stable")]
-    return shapely.normalize(shapely.set_precision(shapely.union_all(ordered, grid_size=GRID), 0))
+    return shapely.normalize(_in_metres(_settled(shapely.union_all(ordered, grid_size=1.0))))
+
+
+def _in_steps(shape: BaseGeometry) -> BaseGeometry:
+    """The shape in grid steps, not rounded to whole ones."""
+    return shapely.transform(shape, lambda xy: xy / GRID)
+
+
+def _in_metres(steps: BaseGeometry) -> BaseGeometry:
+    return shapely.transform(steps, lambda xy: np.rint(xy) * GRID)
+
+
+def _settled(steps: BaseGeometry) -> BaseGeometry:
+    """The shape rounded to whole steps, until no line that rounding moves meets one more vertex."""
+    for _ in range(SETTLING):
+        before, steps = steps, shapely.normalize(shapely.set_precision(shapely.set_precision(steps, 1.0), 0))
+        if shapely.equals_exact(before, steps):
+            return steps
+    x, y = shapely.get_coordinates(steps).mean(axis=0) * GRID
+    raise StopgoError(f"outlines near ({x:.3f}, {y:.3f}) cannot be rounded to {GRID:g} m; draw them anew")
+
+
+def whole_steps(shape: BaseGeometry) -> BaseGeometry:
+    """A shape that was `snapped` with its coordinates in whole grid steps: the very same vertices."""
+    return shapely.transform(shape, lambda xy: to_grid(xy).astype(float))
+
+
+def whole_steps_of(polygons: Iterable[Polygon], origin: FloatArray) -> BaseGeometry:
+    """Polygons of a shape that was `snapped`, in the drawing's coordinates, as one in whole grid steps."""
+    parts = [(one.exterior - origin, [hole - origin for hole in one.holes]) for one in polygons]
+    return whole_steps(shapely.MultiPolygon(parts))
 
 
 def to_grid(xy: FloatArray) -> NDArray[np.int64]:

@@ -10,10 +10,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from mission.errors import InputError
+from mission.errors import InputError, StopgoError
 from mission.geometry import BoolArray, FloatArray, IntArray
 from planner.compiling import compiled
-from planner.mesh import Mesh, containing
+from planner.mesh import Mesh, containing, place_of, rim_of
 from planner.shapes import GRID, to_grid
 from planner.sight_kernel import FARTHEST, HELPERS, MOST_UNITS, look_all, not_negative
 
@@ -77,13 +77,19 @@ def _check_units(units: IntArray) -> None:
 
 
 def _faces(mesh: Mesh, a: IntArray, b: IntArray, faces: IntArray) -> IntArray:
-    """The face on each mesh edge, found by its end points."""
+    """The face on each mesh edge, found by its end points.
+
+    Raises
+    ------
+    StopgoError
+        Naming the place, if a face is on no mesh edge: nobody would ever see it.
+    """
     segment_at = {(*a[k].tolist(), *b[k].tolist()): int(k) for k in faces}
     found = np.full(mesh.corners.shape, -1, dtype=np.int64)
-    for triangle, edge in np.argwhere(mesh.neighbour < 0):
-        start = mesh.vertices[mesh.corners[triangle, edge]]
-        end = mesh.vertices[mesh.corners[triangle, (edge + 1) % 3]]
-        found[triangle, edge] = segment_at.get((*start.tolist(), *end.tolist()), -1)
+    for triangle, edge, ends in zip(*rim_of(mesh), strict=True):
+        found[triangle, edge] = segment_at.pop(tuple(ends.ravel().tolist()), -1)
+    for lost in segment_at:
+        raise StopgoError(f"no open space along the face {place_of(lost)}; redraw that place")
     return found
 
 

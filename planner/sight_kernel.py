@@ -40,8 +40,8 @@ def turn(px: int, py: int, qx: int, qy: int, rx: int, ry: int) -> int:
 def not_negative(at_a: Any, at_b: Any, odd: Any, pieces: Any) -> Any:
     """Whether the linear function that is `at_a` at a and `at_b` at b is >= 0 at the fraction odd / pieces.
 
-    For numbers as for arrays. Both are turns, each of a high part within 2**30 and a low part below 2**31: times `pieces`, within
-    2**57 and 2**58.
+    For numbers as for arrays. Both are turns, each of a high part within 2**30 and a low part below 2**31:
+    times `pieces`, within 2**57 and 2**58.
     """
     rest = pieces - odd
     low = rest * (at_a & HALF_MASK) + odd * (at_b & HALF_MASK)

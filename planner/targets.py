@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -12,12 +13,26 @@ from shapely.geometry.base import BaseGeometry
 from mission.floor import Element, FloorPlan
 from mission.geometry import FloatArray, frozen, polyline_length
 from mission.planning import Targets
-from planner.shapes import GRID, local_origin, one_shape, polygon_parts, snapped, snapped_union
+from planner.shapes import (
+    GRID,
+    local_origin,
+    mended,
+    one_shape,
+    polygon_parts,
+    snapped,
+    snapped_union,
+    to_grid,
+)
 
 CRACK = 2e-4
 """Solids at most this far apart (m) are taken to touch."""
+NOISE = GRID / 100
+"""Width in metres up to which closing cracks widens a face by rounding only."""
 STRAIGHT = 1.5
-"""A vertex this many grid steps beside the line of its neighbours is on it: snapping moved it."""
+"""A vertex less than this many grid steps beside the line of its neighbours is on it: snapping moved it."""
+CLEAR = 2.5
+"""Grid steps that a straightened face keeps from all other vertices: more than STRAIGHT, so that two
+faces which both are straightened do not come to cross."""
 LINE_WALL = 1e-3
 """Thickness in metres given to an occluding element that is drawn as a single line."""
 
@@ -40,13 +55,9 @@ def without_cracks(shape: BaseGeometry) -> BaseGeometry:
     A laser would else look through, and the faces in the gap would be targets nobody can see.
     """
     wide = shape.buffer(CRACK / 2, join_style="mitre", mitre_limit=100.0)
-    closed = snapped(wide.buffer(-CRACK / 2, join_style="mitre", mitre_limit=100.0))
-    return shape if _rings(closed) == _rings(shape) else closed
-
-
-def _rings(shape: BaseGeometry) -> tuple[int, int]:
-    parts = polygon_parts(shape)
-    return len(parts), sum(len(part.interiors) for part in parts)
+    closed = mended(wide.buffer(-CRACK / 2, join_style="mitre", mitre_limit=100.0))
+    cracks = polygon_parts(shapely.difference(closed, shape, grid_size=NOISE))
+    return snapped(shapely.union_all([shape, *cracks], grid_size=NOISE)) if cracks else shape
 
 
 def solid_of(element: Element, origin: FloatArray, thickness: float) -> BaseGeometry:
@@ -159,40 +170,62 @@ def owners_of(faces: FloatArray, floor: FloorPlan) -> list[int]:
 def without_idle_vertices(shape: BaseGeometry, floor: FloorPlan) -> BaseGeometry:
     """The union without vertices on a straight face of one element, left there by crossings inside.
 
-    They would cut a face into pieces and so make more units than the paper's fewest.
+    They would cut a face into pieces and so make more units than the paper's fewest. What is straightened
+    keeps clear of every other vertex, so the outlines still meet where they met and nowhere else.
     """
-    faces = face_segments(shape)
-    owner = dict(zip(map(_key, faces), owners_of(faces, floor), strict=True))
-    uses: dict[tuple[float, ...], int] = {}
-    for a, _ in faces:
-        uses[tuple(a)] = uses.get(tuple(a), 0) + 1
+    corners = _Corners(shape, floor)
     polygons = []
     for part in polygon_parts(shape):
         turned = shapely.orient_polygons(part, exterior_cw=True)
-        outlines = (turned.exterior, *turned.interiors)
-        rings = [_thinned(shapely.get_coordinates(ring), owner, uses) for ring in outlines]
+        rings = [
+            corners.straightened(shapely.get_coordinates(r)[:-1])
+            for r in (turned.exterior, *turned.interiors)
+        ]
         polygons.append(shapely.Polygon(rings[0], rings[1:]))
     return shapely.MultiPolygon(polygons)
 
 
-def _key(segment: FloatArray) -> tuple[float, ...]:
-    return tuple(segment.ravel().tolist())
+class _Corners:
+    """All vertices of a union, and which of them a face may do without."""
+
+    def __init__(self, shape: BaseGeometry, floor: FloorPlan) -> None:
+        faces = face_segments(shape)
+        self._owner = dict(zip(map(_key, faces), owners_of(faces, floor), strict=True))
+        self._uses = Counter(map(_key, faces[:, 0]))
+        self._all = to_grid(np.array([*self._uses]).reshape(-1, 2)).astype(float)
+        self._tree = shapely.STRtree(shapely.points(self._all))
+
+    def straightened(self, ring: FloatArray) -> FloatArray:
+        """The ring (n, 2) with as few of its vertices as keep it where it is."""
+        n, steps, idle = len(ring), to_grid(ring).astype(float), self._idle(ring)
+        needed = (k for k in range(n) if not (idle[k] and self._is_straight(steps, k - 1, k + 1)))
+        kept = [next(needed, 0)]
+        for k in range(kept[0] + 2, kept[0] + n + 1):
+            if not (idle[(k - 1) % n] and self._is_straight(steps, kept[-1], k)):
+                kept.append(k - 1)
+        return ring[np.array(kept) % n] if len(kept) >= 3 else ring
+
+    def _idle(self, ring: FloatArray) -> list[bool]:
+        """Whether each vertex parts two faces of one element and is no other ring's."""
+        sides = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
+        owners = [self._owner[_key(side)] for side in sides]
+        return [self._uses[_key(xy)] == 1 and owners[k - 1] == owners[k] for k, xy in enumerate(ring)]
+
+    def _is_straight(self, steps: FloatArray, begin: int, end: int) -> bool:
+        """Whether the vertices between two of a ring lie on the line between these, and no others near it."""
+        between = steps[np.arange(begin + 1, end) % len(steps)]
+        line = steps[[begin % len(steps), end % len(steps)]]
+        if (_beside(between, line) >= STRAIGHT).any():
+            return False
+        near = self._all[self._tree.query(shapely.LineString(line), predicate="dwithin", distance=CLEAR)]
+        return len(near) == len(between) + 2
 
 
-def _thinned(
-    ring: FloatArray, owner: dict[tuple[float, ...], int], uses: dict[tuple[float, ...], int]
-) -> FloatArray:
-    points = ring[:-1]
-    whole = np.rint(points / GRID).astype(np.int64)
-    before, after = np.roll(whole, 1, axis=0), np.roll(whole, -1, axis=0)
-    into, across = whole - before, after - before
-    beside = np.abs(across[:, 0] * into[:, 1] - across[:, 1] * into[:, 0]) / np.hypot(*across.T)
-    straight = beside < STRAIGHT
-    keep = [
-        not straight[k]
-        or uses[tuple(points[k])] > 1
-        or owner[_key(np.stack([points[k - 1], points[k]]))]
-        != owner[_key(np.stack([points[k], points[(k + 1) % len(points)]]))]
-        for k in range(len(points))
-    ]
-    return points[keep] if np.count_nonzero(keep) >= 3 else points
+def _beside(points: FloatArray, line: FloatArray) -> FloatArray:
+    """Distance of each point (n, 2) to a line (2, 2) from end to end."""
+    distance: FloatArray = shapely.distance(shapely.points(points), shapely.LineString(line))
+    return distance
+
+
+def _key(place: FloatArray) -> tuple[float, ...]:
+    return tuple(place.ravel().tolist())

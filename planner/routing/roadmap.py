@@ -18,7 +18,7 @@ from mission.planning import NavigableSpace
 from planner.mesh import mesh_of
 from planner.reach import reach_of
 from planner.routing.ways import Ways, shortest_ways
-from planner.shapes import GRID, local_origin, polygon_parts, snapped, to_grid, to_shape
+from planner.shapes import GRID, local_origin, polygon_parts, snapped, to_grid, to_shape, whole_steps
 from planner.sight import scene_of, sight
 
 TOUCH = 1e-9
@@ -97,7 +97,7 @@ def on_crossings(points: FloatArray, nodes: FloatArray, links: IntArray) -> IntA
 
 def _in_sight(space: NavigableSpace, nodes: FloatArray) -> IntArray:
     """Pairs (m, 2) of nodes that see each other."""
-    mesh = mesh_of(_drive_area(space))
+    mesh = mesh_of(whole_steps(_drive_area(space)))
     ones = np.ones(len(nodes), dtype=np.int64)
     scene = scene_of(mesh, nodes, nodes, ones, np.zeros(len(nodes), dtype=bool))
     runs = sight(scene, to_grid(nodes), reach=None)

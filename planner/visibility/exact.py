@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from mission.geometry import FloatArray, IntArray, frozen
+from mission.geometry import FloatArray, IntArray, bounds, frozen
 from mission.planning import Candidates, Visibility
 from planner.mesh import Mesh, mesh_of
-from planner.shapes import GRID, local_origin, snapped, to_grid, to_shape
+from planner.shapes import local_origin, to_grid, whole_steps_of
 from planner.sight import scene_of, sight
 from planner.targets import LINE_WALL
 
@@ -68,16 +68,15 @@ def _across_opening(candidates: Candidates, point: FloatArray) -> FloatArray:
 
 
 def open_space(candidates: Candidates) -> Mesh:
-    """A mesh of everything that light crosses: a frame around the floor, minus the occluders."""
+    """A mesh of everything that light crosses: a frame around the floor, minus the occluders.
+
+    Taken from whole grid steps, where their outlines meet at vertices only, so that the mesh's edges are
+    the very faces of the occluders.
+    """
     space = candidates.space
     origin = local_origin(space.floor)
-    occluders = to_shape(space.occluders, origin)
-    everything = np.concatenate([space.targets.a, space.targets.b, candidates.xy]) - origin
-    low = np.minimum(
-        everything.min(axis=0), shapely.bounds(occluders)[:2] if not occluders.is_empty else np.inf
-    )
-    high = np.maximum(
-        everything.max(axis=0), shapely.bounds(occluders)[2:] if not occluders.is_empty else -np.inf
-    )
-    frame = snapped(shapely.box(*(low - MARGIN), *(high + MARGIN)))
-    return mesh_of(shapely.difference(frame, occluders, grid_size=GRID))
+    outlines = [polygon.exterior for polygon in space.occluders]
+    low_x, low_y, high_x, high_y = bounds([space.targets.a, space.targets.b, candidates.xy, *outlines])
+    corners = np.array([(low_x - MARGIN, low_y - MARGIN), (high_x + MARGIN, high_y + MARGIN)]) - origin
+    frame = shapely.box(*to_grid(corners).ravel())
+    return mesh_of(shapely.difference(frame, whole_steps_of(space.occluders, origin)))

@@ -10,7 +10,7 @@ from tests.planner.long_walls import RANGES, told
 
 
 def test_no_pair_of_place_and_unit_is_told_wrongly(monkeypatch: pytest.MonkeyPatch) -> None:
-    seeds = range(1000, 1000 + size(short=1, full=160))
+    seeds = range(1000, 1000 + size(short=1, full=40))
     found = [
         told(seed, reach=reach, places=60, monkeypatch=monkeypatch) for seed in seeds for reach in RANGES
     ]

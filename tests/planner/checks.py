@@ -17,7 +17,7 @@ from mission.planning import Candidates, NavigableSpace, Route, Selection, Visib
 from mission.sense import problems_of
 from mission.settings import Settings
 from planner.routing.roadmap import ways_between
-from planner.shapes import GRID, local_origin, to_grid, to_shape
+from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
 from planner.targets import face_segments
 from tests.planner.oracle import visible_pairs
 
@@ -190,7 +190,7 @@ def matrix_by_force(visibility: Visibility) -> np.ndarray:
     origin = local_origin(space.floor)
     return visible_pairs(
         to_grid(found.xy[found.kept] - origin),
-        to_grid(face_segments(to_shape(space.occluders, origin))),
+        face_segments(whole_steps_of(space.occluders, origin)).astype(np.int64),
         to_grid(targets.a - origin),
         to_grid(targets.b - origin),
         targets.units,

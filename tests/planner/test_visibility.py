@@ -18,7 +18,7 @@ from mission.settings import Settings
 from planner.candidates import candidates
 from planner.floors import read_floor
 from planner.navigable import navigable
-from planner.shapes import GRID, local_origin, to_grid, to_shape
+from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
 from planner.targets import face_segments
 from planner.visibility import visibility
 from planner.visibility.exact import exact
@@ -62,7 +62,7 @@ def by_force(found: Candidates, rows: Iterable[int], reach: float) -> np.ndarray
     """The same by brute force."""
     space, targets = found.space, found.space.targets
     origin = local_origin(space.floor)
-    edges = to_grid(face_segments(to_shape(space.occluders, origin)))
+    edges = face_segments(whole_steps_of(space.occluders, origin)).astype(np.int64)
     return visible_pairs(
         to_grid(found.xy[found.kept] - origin)[list(rows)],
         edges,
