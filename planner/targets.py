@@ -33,6 +33,8 @@ STRAIGHT = 1.5
 CLEAR = 2.5
 """Grid steps that a straightened face keeps from all other vertices: more than STRAIGHT, so that two
 faces which both are straightened do not come to cross."""
+FLUSH = 3 * GRID
+"""What runs along a face and is no farther from it, in metres, is flush with it."""
 LINE_WALL = 1e-3
 """Thickness in metres given to an occluding element that is drawn as a single line."""
 
@@ -81,7 +83,8 @@ def targets_of(floor: FloorPlan, occluders: BaseGeometry, *, d_dis: float) -> Ta
     origin = local_origin(floor)
     faces, owners = _occluding_faces(floor, occluders)
     free = _free_segments(floor)
-    segments = np.concatenate([faces, np.array([s for s, _ in free]).reshape(-1, 2, 2)])
+    drawn = np.array([s for s, _ in free]).reshape(-1, 2, 2)
+    segments = np.concatenate([faces, off_faces(drawn, face_segments(occluders))])
     lengths = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
     return Targets(
         a=frozen(segments[:, 0] + origin),
@@ -130,6 +133,35 @@ def _free_segments(floor: FloorPlan) -> list[tuple[FloatArray, int]]:
                 ends = tuple(sorted([tuple(a.tolist()), tuple(b.tolist())]))
                 found.setdefault(ends, (np.stack([a, b]) - origin, index))
     return [found[ends] for ends in sorted(found)]
+
+
+def off_faces(segments: FloatArray, faces: FloatArray) -> FloatArray:
+    """Segments (n, 2, 2), those that run along a face moved a hair's breadth before it.
+
+    A beam flush with a wall would else be before it or within it as rounding has it, and its side seen at
+    one angle of the drawing and hidden at another.
+    """
+    if not len(segments) or not len(faces):
+        return segments
+    tree = shapely.STRtree(shapely.linestrings(faces))
+    free, face = tree.query(shapely.linestrings(segments), predicate="dwithin", distance=FLUSH)
+    begin, way = faces[face, 0], faces[face, 1] - faces[face, 0]
+    length = np.hypot(*way.T)
+    along = way / length[:, None]
+    before = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    shared = np.ptp(np.clip(_dots(segments[free] - begin[:, None], along), 0.0, length[:, None]), axis=1)
+    straight = np.ptp(_dots(segments[free], before), axis=1) * shared <= FLUSH * np.ptp(
+        _dots(segments[free], along), axis=1
+    )
+    aside = np.zeros((len(segments), 2))
+    np.add.at(aside, free, np.where(straight, shared, 0.0)[:, None] * before)
+    size = np.maximum(np.hypot(*aside.T), LINE_WALL)
+    return segments + (FLUSH * aside / size[:, None])[:, None]
+
+
+def _dots(points: FloatArray, axes: FloatArray) -> FloatArray:
+    """Each pair of points (n, 2, 2) along its own axis (n, 2)."""
+    return np.einsum("nij,nj->ni", points, axes)
 
 
 def _occluding_faces(floor: FloorPlan, occluders: BaseGeometry) -> tuple[FloatArray, list[int]]:

@@ -135,7 +135,19 @@ def test_visibility_does_not_change_when_the_floor_is_turned(degrees: float) -> 
     there = at(moved(furnished(), turned(degrees)), turned(degrees)(POSITIONS))
     here = at(furnished(), POSITIONS)
     assert there.targets.total == here.targets.total
-    assert [len(places) for places in seen_places(there)] == [len(places) for places in seen_places(here)]
+    back = seen_places(there, turned(-degrees))
+    assert [len(places) for places in back] == [len(places) for places in seen_places(here)]
+
+
+def test_a_beam_flush_with_a_wall_is_seen_at_any_angle() -> None:
+    beam = element(
+        "beam", "beams", box(-0.2, 0.55, 0, 3.55)
+    )  # in the west wall, whose faces are at -0.2 and 0
+    for degrees in range(0, 360, 10):
+        move = turned(degrees)
+        seen = at(moved(hall(6, 4, beam), move), move(np.array([(3.1, 2.3)])))
+        targets = seen.targets
+        assert np.count_nonzero(~targets.occluding[targets.unit_segment] & seen.visible) == 60  # 3 m
 
 
 @pytest.mark.parametrize("degrees", [17.0, 45.0])
