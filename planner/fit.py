@@ -28,7 +28,7 @@ from planner.floors import read_floor
 from planner.gaps import Walls
 from planner.ground import Ground
 from planner.plausible import over_ignored
-from planner.shapes import HAIRLINE, SLACK, segments_of, to_shape
+from planner.shapes import HAIRLINE, SLACK, holds, segments_of
 from planner.targets import solid_of
 
 ALLOWED = SLACK + CLEAR_SLACK
@@ -92,18 +92,9 @@ class _Fit:
         self.floor, self.settings = floor, settings
         self.ground = Ground.of(floor, settings)
         self.legs = self.ground.walls(settings)
-        self.stops = self._stop_walls()
+        self.stops = self.ground.stop_walls(settings)
         self._trees = {walls: shapely.STRtree(walls.shapes()) for walls in (self.legs, self.stops)}
-        self._carries = self.ground.outline.buffer(ALLOWED, join_style="mitre")
         self._doorways = [item.clear for item in self.ground.crossings if not item.closed_because]
-
-    def _stop_walls(self) -> Walls:
-        """What a stop keeps away from: elements by d_sec, and the edges of the floor layer."""
-        solid = segments_of(self.ground.obstacles)
-        edges = segments_of(to_shape(self.floor.outline, self.ground.origin))
-        keep = max(self.settings.d_sec, self.settings.radius)
-        clearance = np.repeat([keep, self.settings.edge], [len(solid), len(edges)])
-        return Walls(np.concatenate([solid, edges]), clearance)
 
     def stop(self, path: str, stop: Stop) -> Iterator[Problem]:
         """A stop's distance from elements and floor edges; the legs tell of stops in doorways."""
@@ -144,8 +135,8 @@ class _Fit:
 
     def _off(self, shape: BaseGeometry) -> str | None:
         """Whether a place or way leaves the floor or lies within an element, in words."""
-        if not self._carries.covers(shape):
-            out = shapely.get_coordinates(shape.difference(self._carries))
+        if not holds(self.ground.outline, shape, slack=ALLOWED):
+            out = shapely.get_coordinates(shape.difference(self.ground.outline))
             far = out[np.argmax(shapely.distance(shapely.points(out), self.ground.outline))]
             away = self.ground.outline.distance(shapely.Point(far))
             return f"is off the floor: {self._at(far)} lies {away:.3f} m beside it"

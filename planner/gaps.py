@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from mission.geometry import FloatArray
-from planner.shapes import GRID, GROWTH, SLACK
+from planner.shapes import GRID, GROWTH, SLACK, holds
 
 STEPS = 0.02 * 1.4 ** np.arange(15)
 """Distances from a gap's middle, up to about 2 m, at which the drive area is looked for."""
@@ -150,7 +150,7 @@ class Site:
 
     def __init__(self, walls: Walls, drive_area: BaseGeometry, ground: BaseGeometry) -> None:
         self.walls, self.drive_area = walls, drive_area
-        self.ground = ground.buffer(SLACK, join_style="mitre")
+        self.ground = ground
         self.slop = 2 * (GROWTH - 1) * float(walls.clearance.max(initial=0.0)) + 8 * GRID
         """The drive area may begin this far (m) beside a place that keeps every clearance."""
         self.tree = shapely.STRtree(walls.shapes())
@@ -160,7 +160,7 @@ class Site:
     def allows(self, a: FloatArray, b: FloatArray) -> bool:
         """Whether the robot may drive straight from a to b."""
         way = shapely.LineString([a, b])
-        return keeps_clear(way, self.walls, self.tree) and self.ground.covers(way)
+        return keeps_clear(way, self.walls, self.tree) and holds(self.ground, way, slack=SLACK)
 
     def way_out(self, gap: Gap, along: FloatArray) -> list[FloatArray]:
         """Points from the gap's middle to the drive area; only the middle where there is no way.

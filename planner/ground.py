@@ -16,14 +16,16 @@ from planner.gaps import Walls, crossings_through, tight_gaps
 from planner.openings import Crossing, barrier, crossings_of, threshold
 from planner.shapes import (
     GRID,
+    GROWTH,
     HAIRLINE,
-    grown,
+    QUARTER,
     local_origin,
     polygon_parts,
     segments_of,
     snapped,
     to_shape,
     union,
+    widened,
 )
 from planner.targets import solid_of
 
@@ -63,16 +65,31 @@ class Ground:
         clearance = np.repeat([settings.radius, settings.edge], [len(solid), len(edges)])
         return Walls(np.concatenate([solid, edges]), clearance)
 
+    def stop_walls(self, settings: Settings) -> Walls:
+        """Everything a stop keeps a distance from: elements, and the edges of the floor layer."""
+        solid = segments_of(self.obstacles)
+        edges = segments_of(to_shape(self.floor.outline, self.origin))
+        keep = max(settings.d_sec, settings.radius)
+        clearance = np.repeat([keep, settings.edge], [len(solid), len(edges)])
+        return Walls(np.concatenate([solid, edges]), clearance)
+
 
 def drivable(ground: Ground, settings: Settings) -> tuple[BaseGeometry, FloatArray]:
     """Where the robot's centre may drive, and the exact crossings of gaps just wide enough."""
-    blocked = grown(ground.obstacles, settings.radius)
-    barriers = shapely.union_all([grown(shapely.LineString(b), settings.radius) for b in ground.barriers])
-    edges = grown(shapely.multilinestrings(list(segments_of(ground.outline))), settings.edge)
-    inner = ground.outline.difference(edges) if settings.edge > 0 else ground.outline
-    area = snapped(inner.difference(shapely.union_all([blocked, barriers])))
+    walls = ground.walls(settings)
+    area = snapped(clear_of(walls, ground))
     area = shapely.MultiPolygon([part for part in polygon_parts(area) if part.area > GRID])
     if area.is_empty:
         return area, np.empty((0, 2, 2))
-    walls = ground.walls(settings)
     return area, crossings_through(tight_gaps(walls), walls, area, ground.outline)
+
+
+def clear_of(walls: Walls, ground: Ground) -> BaseGeometry:
+    """The ground that keeps every wall's clearance, drawn a little too small: arcs are round from outside.
+
+    What lies inside keeps its clearance; what is missing keeps less than 2 % more.
+    """
+    kept = walls.clearance > 0
+    reach = walls.clearance[kept] * GROWTH + 2 * GRID
+    near = widened(walls.shapes()[kept], reach, quad_segs=QUARTER)
+    return ground.outline.difference(ground.obstacles).difference(near)

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from mission.floor import FloorPlan, Opening
 from mission.geometry import FloatArray
 from mission.settings import Settings
-from planner.shapes import SLACK, local_origin, to_shape
+from planner.shapes import SLACK, boundary_lines, local_origin, polygon_parts, to_shape, widened
 
 PROBES = (0.15, 0.25, 0.4, 0.6)
 """Distances in metres from an opening's line at which its rooms are looked for."""
@@ -58,7 +58,7 @@ def _crossing(
     line = shapely.LineString(opening.line - origin)
     if line.length <= SLACK:
         return Crossing(opening, shapely.LineString(), (None, None), "its line has no length")
-    clear = widest_clear(line, part_near(obstacles, line))
+    clear = widest_clear(line, obstacles)
     sides = (None, None) if clear.is_empty else _sides(clear, rooms)
     return Crossing(opening, clear, sides, _closed(clear, sides, rooms, outline, opening, settings))
 
@@ -68,15 +68,22 @@ def widest_clear(line: BaseGeometry, obstacles: BaseGeometry) -> BaseGeometry:
 
     A line drawn along a wall's face, or within ALONG of it, is in the wall there.
     """
-    beside = _longest(line.difference(obstacles.buffer(ALONG)))
+    near = part_near(obstacles, line)
+    beside = _longest(line.difference(near).difference(_alongside(line, near)))
     if beside.is_empty:
         return beside
     a, b = shapely.get_coordinates(beside)[[0, -1]]
     step = ALONG * (b - a) / np.hypot(*(b - a))
-    reach = shapely.LineString([a - step, b + step]).difference(obstacles)
+    reach = shapely.LineString([a - step, b + step]).difference(near)
     whole = shapely.get_coordinates(line)[[0, -1]]
     ends = shapely.get_coordinates(_longest(reach))[[0, -1]]
     return shapely.LineString([_within(end, whole) for end in ends])
+
+
+def _alongside(line: BaseGeometry, obstacles: BaseGeometry) -> BaseGeometry:
+    """Where a line is within ALONG of an obstacle's outline."""
+    edges = boundary_lines(obstacles)
+    return widened(edges[shapely.dwithin(edges, line, ALONG)], ALONG, quad_segs=16)
 
 
 def _longest(lines: BaseGeometry) -> BaseGeometry:
@@ -93,10 +100,10 @@ def _within(point: FloatArray, ends: FloatArray) -> FloatArray:
 
 def part_near(shape: BaseGeometry, line: BaseGeometry) -> BaseGeometry:
     """What of a large shape lies within 1 m of a line's bounds, quick to work with."""
-    if line.is_empty:
-        return line
     x0, y0, x1, y1 = line.bounds
-    return shapely.clip_by_rect(shape, x0 - 1.0, y0 - 1.0, x1 + 1.0, y1 + 1.0)
+    # Not clip_by_rect: it fails where it leaves less than a triangle of a shape.
+    near = shape.intersection(shapely.box(x0 - 1.0, y0 - 1.0, x1 + 1.0, y1 + 1.0))
+    return shapely.MultiPolygon(polygon_parts(near))
 
 
 def _sides(clear: BaseGeometry, rooms: shapely.STRtree) -> tuple[int | None, int | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
 from functools import cache
 
@@ -15,10 +16,10 @@ from mission.geometry import FloatArray
 from mission.planning import OpeningState
 from mission.settings import Settings
 from planner.connected import Parts, parts_of
-from planner.gaps import gaps_between
+from planner.gaps import Gap, gaps_between
 from planner.ground import Ground
 from planner.openings import Crossing, middle_and_normal
-from planner.shapes import HAIRLINE, SLACK, polygon_parts, to_shape
+from planner.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
 from planner.targets import LINE_WALL, solid_of
 
 NEAR_OPENING = 1.6
@@ -85,12 +86,18 @@ def _narrowest(
     walls = ground.walls(settings).near(window)
     gaps = gaps_between(walls, short=-2 * float(walls.clearance.max(initial=0.0)) + 0.05, long=-SLACK)
     cells = [_cells_of(parts, main, ground, room, window) for room, main in wanted.items()]
-    for gap in sorted(gaps, key=lambda item: -item.width):
-        if _opens(crossing, cells, ground, window, gap.width / 2 - SLACK):
-            names = " and ".join(dict.fromkeys(_owner(walls.segments[k], ground) for k in gap.walls))
-            need = float(walls.clearance[list(gap.walls)].sum())
-            return f"{gap.width:.3f} m between {names} near it, the robot needs {need:.3f} m"
-    return f"no place for a robot of radius {settings.radius:.3f} m next to it"
+    gaps = sorted(gaps, key=lambda item: -item.width)
+
+    def opens(gap: Gap) -> bool:
+        return _opens(crossing, cells, ground, window, gap.width / 2 - SLACK)
+
+    widest = bisect_left(gaps, True, key=opens)  # a robot gets wherever a wider one does
+    if widest == len(gaps):
+        return f"no place for a robot of radius {settings.radius:.3f} m next to it"
+    gap = gaps[widest]
+    names = " and ".join(dict.fromkeys(_owner(walls.segments[k], ground) for k in gap.walls))
+    need = float(walls.clearance[list(gap.walls)].sum())
+    return f"{gap.width:.3f} m between {names} near it, the robot needs {need:.3f} m"
 
 
 def _cells_of(
@@ -110,9 +117,9 @@ def _opens(
     radius: float,
 ) -> bool:
     """Whether a robot of this radius gets from the opening to the cells of both rooms."""
-    free = window.intersection(ground.outline).difference(
-        ground.obstacles.intersection(window).buffer(radius)
-    )
+    near = boundary_lines(ground.obstacles.intersection(window))
+    free = window.intersection(ground.outline).difference(ground.obstacles)
+    free = free.difference(widened(near, radius, quad_segs=16))
     here = [piece for piece in polygon_parts(free) if piece.intersects(crossing.clear)]
     return all(any(np.any(shapely.intersects(some, piece)) for piece in here) for some in cells if len(some))
 

@@ -9,9 +9,9 @@ from shapely.geometry.base import BaseGeometry
 from mission.floor import FloorPlan
 from mission.planning import RoomSpace
 from mission.settings import Settings
-from planner.ground import Ground
+from planner.ground import Ground, clear_of
 from planner.openings import part_near
-from planner.shapes import polygon_parts, to_polygons, to_shape
+from planner.shapes import boundary_lines, polygon_parts, to_polygons, to_shape, widened
 
 LEAST_UNNAMED = 0.5
 """Floor outside every room smaller than this (m²) is a threshold or a niche, not a room."""
@@ -22,14 +22,12 @@ def room_spaces(
 ) -> tuple[RoomSpace, ...]:
     """The rooms as planned: inner rooms subtracted from outer ones, and floor outside every room."""
     shapes = [to_shape(room.polygons, ground.origin) for room in floor.rooms]
-    tree = shapely.STRtree([shape.representative_point() for shape in shapes])
+    inside = shapely.STRtree([shape.representative_point() for shape in shapes])
     planned: list[tuple[int | None, str, BaseGeometry]] = [
-        (k, floor.rooms[k].label, _without_inner(shape, shapes, k, tree)) for k, shape in enumerate(shapes)
+        (k, floor.rooms[k].label, _without_inner(shape, shapes, k, inside)) for k, shape in enumerate(shapes)
     ]
     planned.extend((None, name, shape) for name, shape in _unnamed(ground, drive_area, shapes))
-    forbidden = ground.obstacles.buffer(settings.d_sec, quad_segs=16)
-    inner = ground.outline.buffer(-settings.edge) if settings.edge > 0 else ground.outline
-    allowed = inner.difference(forbidden)
+    allowed = clear_of(ground.stop_walls(settings), ground)
     return tuple(
         RoomSpace(
             room=index,
@@ -58,7 +56,8 @@ def _unnamed(
         parts = sorted(polygon_parts(to_shape(ground.floor.outline, ground.origin)), key=lambda p: p.bounds)
         names = ["floor"] if len(parts) == 1 else [f"floor {k + 1}" for k in range(len(parts))]
         return list(zip(names, parts, strict=True))
-    outside = ground.outline.difference(shapely.union_all(rooms).buffer(THIN, join_style="mitre"))
+    inside = shapely.union_all(rooms)
+    outside = ground.outline.difference(inside).difference(widened(boundary_lines(inside), THIN, quad_segs=4))
     parts = [p for p in polygon_parts(outside) if p.intersection(drive_area).area > LEAST_UNNAMED]
     ordered = sorted(parts, key=lambda part: part.bounds)
     return [(f"unnamed {k + 1}", part) for k, part in enumerate(ordered)]

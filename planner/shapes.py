@@ -146,17 +146,23 @@ def to_grid(xy: FloatArray) -> NDArray[np.int64]:
     return steps.astype(np.int64)
 
 
-def grown(shape: BaseGeometry, distance: float) -> BaseGeometry:
-    """All points nearer than `distance`, and a little more: arcs are drawn round from outside.
+def widened(lines: NDArray[np.object_], distance: float | FloatArray, *, quad_segs: int) -> BaseGeometry:
+    """All points at most `distance` metres (of each line its own) from straight lines.
 
-    Whatever lies outside the result is at least `distance` away, and less than 2 % more on its edge.
-    Segments are widened one by one, since widening whole outlines would first simplify them.
+    Lines are widened one by one: GEOS simplifies a whole outline before it widens it, and at some angles
+    gives a polygon whose rings cross, which no later operation can be asked about.
     """
-    if distance <= 0 or shape.is_empty:
-        return shape
-    lines = shapely.linestrings(segments_of(shape)) if shape.area > 0 else shapely.get_parts(shape)
-    wide = shapely.buffer(lines, distance * GROWTH + 2 * GRID, quad_segs=QUARTER)
-    return shapely.union_all([shape, *wide] if shape.area > 0 else wide)
+    return shapely.union_all(shapely.buffer(lines, distance, quad_segs=quad_segs))
+
+
+def holds(region: BaseGeometry, shape: BaseGeometry, *, slack: float) -> bool:
+    """Whether a point or line lies in a region, or at most `slack` metres beside it."""
+    if region.covers(shape):
+        return True
+    beside = shape.difference(region)
+    edges = boundary_lines(region)
+    near = edges[shapely.dwithin(edges, beside, slack)]
+    return bool(widened(near, slack, quad_segs=QUARTER).covers(beside))
 
 
 QUARTER = 4

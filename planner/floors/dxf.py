@@ -6,6 +6,7 @@ The bytes become a drawing, the drawing shapes on layers, these strokes in metre
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,14 @@ def read_dxf(
         When the bytes are no complete DXF, or no closed outline lies on layer FLOOR.
     """
     drawing, odd_file = open_drawing(data, source=source)
+    read = floor_in(drawing, source=source, digest=digest, d_dis=d_dis, layers=layers)
+    return replace(read, findings=in_order((*odd_file, *read.findings)))
+
+
+def floor_in(
+    drawing: Drawing, *, source: Path, digest: str, d_dis: float, layers: Mapping[str, str] | None = None
+) -> FloorPlan:
+    """The floor drawn in the model space of a drawing, whatever file it is from."""
     shapes, odd_shapes = shapes_of(drawing, source=source, layers=layers or {})
     scale, odd_units = _scale(drawing, shapes)
     strokes, words, odd_strokes = strokes_of(shapes, scale=scale, chord=d_dis)
@@ -42,7 +51,7 @@ def read_dxf(
         openings=parts.openings,
         elements=parts.elements,
         ignored=parts.ignored,
-        findings=in_order((*odd_file, *odd_units, *odd_shapes, *odd_strokes, *parts.findings)),
+        findings=in_order((*odd_units, *odd_shapes, *odd_strokes, *parts.findings)),
     )
 
 

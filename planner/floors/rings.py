@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
 from mission.geometry import FloatArray, Polygon, frozen, ring_area
+from planner.shapes import QUARTER, boundary_lines, widened
 
 SNAP = 1e-3
 """Ends closer than this, in metres, meet."""
@@ -182,7 +183,7 @@ def joined(lines: Sequence[FloatArray], *, merge: bool, gap: float = GAP) -> Joi
         whole = polygons_of(shapely.union_all(enclosed)) if merge else enclosed
         faces += [shapely.Polygon(face.exterior) for face in whole]
         cells += enclosed
-    edges = shapely.union_all([cell.boundary for cell in cells]).buffer(SNAP)
+    edges = widened(boundary_lines(shapely.MultiPolygon(cells)), SNAP, quad_segs=QUARTER)
     alongside = shapely.length(shapely.intersection(drawn, edges)) / shapely.length(drawn)
     loose = tuple(index for index in range(len(lines)) if alongside[index] < 0.5)
     return Joined(tuple(faces), loose, tuple(gaps))

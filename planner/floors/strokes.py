@@ -113,7 +113,8 @@ def _strokes(shape: Shape, *, scale: float, chord: float) -> list[Stroke]:
 def _filled(boundaries: Sequence[Stroke]) -> list[Stroke]:
     """The boundaries of a hatch, turned by how deep they are nested: every second one is a hole."""
     rings = [item for item in boundaries if len(item.points) >= 3]
-    nested = depths([shapely.Polygon(item.points).buffer(0) for item in rings])
+    drawn = [shapely.Polygon(item.points) for item in rings]
+    nested = depths(shapely.make_valid(drawn, method="structure", keep_collapsed=False).tolist())
     return [
         replace(item, points=_turned(item.points, depth), fill=True)
         for item, depth in zip(rings, nested, strict=True)
