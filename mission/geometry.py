@@ -25,9 +25,8 @@ def ring_area(ring: FloatArray) -> float:
     """Signed area in m² of a ring (n, 2): positive when counter-clockwise (shoelace formula)."""
     if len(ring) < 3:
         return 0.0
-    local = ring - ring[0]
-    x, y = local[:, 0], local[:, 1]
-    return 0.5 * float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+    x, y = (ring - ring[0]).T  # from its first point on, which then adds nothing
+    return 0.5 * float(np.dot(x[:-1], y[1:]) - np.dot(y[:-1], x[1:]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 from mission.floor import FloorPlan
 from mission.planning import RoomSpace
 from mission.settings import Settings
-from planner.ground import Ground, clear_of
+from planner.ground import Ground
 from planner.openings import part_near
 from planner.shapes import boundary_lines, polygon_parts, to_polygons, to_shape, widened
 
@@ -27,7 +27,7 @@ def room_spaces(
         (k, floor.rooms[k].label, _without_inner(shape, shapes, k, inside)) for k, shape in enumerate(shapes)
     ]
     planned.extend((None, name, shape) for name, shape in _unnamed(ground, drive_area, shapes))
-    allowed = clear_of(ground.stop_walls(settings), ground)
+    allowed = _stop_area(ground, settings)
     return tuple(
         RoomSpace(
             room=index,
@@ -46,6 +46,15 @@ def _without_inner(
     held = np.sort(tree.query(shape, predicate="intersects"))
     inner = [shapes[k] for k in held if k != index and shapes[k].area < shape.area]
     return shape.difference(shapely.union_all(inner)) if inner else shape
+
+
+def _stop_area(ground: Ground, settings: Settings) -> BaseGeometry:
+    """Where stops may be, to look at: whole outlines are widened at once, quickly but not exactly."""
+    keep = max(settings.d_sec, settings.radius)
+    edges = shapely.boundary(to_shape(ground.floor.outline, ground.origin))
+    near = [ground.obstacles.buffer(keep), edges.buffer(settings.edge)]
+    near = shapely.make_valid(near, method="structure", keep_collapsed=False)
+    return ground.outline.difference(near[0]).difference(near[1])
 
 
 def _unnamed(

@@ -63,7 +63,8 @@ def one_shape(polygon: Polygon, origin: FloatArray) -> BaseGeometry:
     if len(polygon.exterior) < 3:
         return shapely.Polygon()
     holes = [hole - origin for hole in polygon.holes if len(hole) >= 3]
-    return mended(shapely.Polygon(polygon.exterior - origin, holes))
+    drawn = shapely.Polygon(polygon.exterior - origin, holes)
+    return drawn if drawn.is_valid else mended(drawn)
 
 
 def mended(shape: BaseGeometry) -> BaseGeometry:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from mission.floor import Element, FloorPlan
@@ -45,10 +47,17 @@ def occluders_of(floor: FloorPlan, closed: FloatArray) -> BaseGeometry:
     A wall drawn as a single line is LINE_WALL thick, so that it has two faces. `closed` are openings the
     laser does not pass either, as segments (k, 2, 2) in the local frame.
     """
+    doors = [thin_solid(segment, LINE_WALL) for segment in closed]
+    return without_idle_vertices(without_cracks(snapped_union([*_occluding(floor)[1], *doors])), floor)
+
+
+@lru_cache(maxsize=4)
+def _occluding(floor: FloorPlan) -> tuple[list[int], NDArray[np.object_]]:
+    """The occluding elements and their solids, on the grid."""
     origin = local_origin(floor)
-    solids = [solid_of(item, origin, LINE_WALL) for item in floor.elements if item.occludes]
-    solids += [thin_solid(segment, LINE_WALL) for segment in closed]
-    return without_idle_vertices(without_cracks(snapped_union(solids)), floor)
+    indices = [k for k, item in enumerate(floor.elements) if item.occludes]
+    solids = [solid_of(floor.elements[k], origin, LINE_WALL) for k in indices]
+    return indices, np.array([snapped(solid) for solid in solids], dtype=object)
 
 
 def without_cracks(shape: BaseGeometry) -> BaseGeometry:
@@ -66,12 +75,13 @@ def solid_of(element: Element, origin: FloatArray, thickness: float) -> BaseGeom
     """An element's filled plan in the local frame; lines become solids of this thickness (m)."""
     parts = [one_shape(solid, origin) for solid in element.solids]
     parts += [thin_solid(line - origin, thickness) for line in element.lines if polyline_length(line) > 0]
-    return shapely.union_all([shapely.make_valid(part) for part in parts])
+    return parts[0] if len(parts) == 1 else shapely.union_all(parts)
 
 
 def thin_solid(line: FloatArray, thickness: float) -> BaseGeometry:
     """A line (n, 2) as a solid of this thickness (m)."""
-    return shapely.LineString(line).buffer(thickness / 2, cap_style="flat", join_style="mitre")
+    wide = shapely.LineString(line).buffer(thickness / 2, cap_style="flat", join_style="mitre")
+    return shapely.make_valid(wide)
 
 
 def targets_of(floor: FloorPlan, occluders: BaseGeometry, *, d_dis: float) -> Targets:
@@ -185,10 +195,8 @@ def owners_of(faces: FloatArray, floor: FloorPlan) -> list[int]:
     """The element whose boundary each face lies on; a target before another, then the first; else -1."""
     if not len(faces):
         return []
-    origin = local_origin(floor)
-    indices = [k for k, item in enumerate(floor.elements) if item.occludes]
-    outlines = [shapely.boundary(snapped(solid_of(floor.elements[k], origin, LINE_WALL))) for k in indices]
-    tree = shapely.STRtree(outlines)
+    indices, solids = _occluding(floor)
+    tree = shapely.STRtree(shapely.boundary(solids))
     middles = shapely.points(faces.mean(axis=1))
     face, hit = tree.query(middles, predicate="dwithin", distance=3 * GRID)
     owners = [-1] * len(faces)

@@ -158,11 +158,14 @@ def _open_key(line: Open) -> tuple:
 
 def _without_fills(shapes: Sequence[Closed]) -> list[Closed]:
     """Without hatches that fill outlines drawn on the same layer."""
-    outlines = [shape for shape in shapes if not shape.fill]
-    drawn_area = shapely.union_all([shape.region for shape in outlines])
-    fills = [shape for shape in shapes if shape.fill]
-    bare = [shape for shape in fills if shape.region.difference(drawn_area).area > shape.region.area / 100]
-    return sorted((*outlines, *bare), key=_closed_key)
+    if not any(shape.fill for shape in shapes):
+        return list(shapes)
+    drawn_area = shapely.union_all([shape.region for shape in shapes if not shape.fill])
+    return [
+        shape
+        for shape in shapes
+        if not shape.fill or shape.region.difference(drawn_area).area > shape.region.area / 100
+    ]
 
 
 def _each_closed_once(shapes: Sequence[Closed]) -> tuple[Closed, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 import shapely
@@ -33,6 +33,10 @@ class _Part:
     global_id: str | None = None
     odd: tuple[Oddity, ...] = ()
 
+    @cached_property
+    def solids(self) -> tuple[Polygon, ...]:
+        return () if self.region is None else canonical_region(self.region)
+
 
 @dataclass(frozen=True, eq=False)
 class _Spaces:
@@ -43,12 +47,21 @@ class _Spaces:
 
     def filled_by(self, region: Region) -> bool:
         """Whether a shape would fill a whole room or more than half of the floor: then it is an outline."""
-        if region.intersection(self.outline).area > self.outline.area / 2:
+        area, half = region.area, self._area / 2
+        if area > half and region.intersection(self.outline).area > half:
             return True
-        large = [room for room in self.rooms if _ROOM <= room.area <= region.area * 1.05]
         return any(
-            region.intersection(room).area > 0.95 * room.area for room in large if region.intersects(room)
+            _ROOM <= room.area <= area * 1.05 and region.intersection(room).area > 0.95 * room.area
+            for room in (self.rooms[k] for k in self._tree.query(region, predicate="intersects"))
         )
+
+    @cached_property
+    def _area(self) -> float:
+        return float(self.outline.area)
+
+    @cached_property
+    def _tree(self) -> shapely.STRtree:
+        return shapely.STRtree(self.rooms)
 
 
 def elements_of(
@@ -134,7 +147,9 @@ def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Part]
     parts: list[_Part] = []
     for index in (item for item in range(len(closed)) if item not in holes):
         inner = [closed[item] for item in sorted(holes) if above[item] == index]
-        body = closed[index].region.difference(shapely.union_all([hole.region for hole in inner]))
+        body = closed[index].region
+        if inner:
+            body = body.difference(shapely.union_all([hole.region for hole in inner]))
         if not polygons_of(body) or (kind in _OUTLINES and spaces.filled_by(body)):
             parts += [_body_or_outline(kind, shape, spaces) for shape in (closed[index], *inner)]
         else:
@@ -174,12 +189,8 @@ def _body_or_outline(kind: str, shape: Closed, spaces: _Spaces) -> _Part:
 
 
 def _place_key(part: _Part) -> tuple:
-    rings = [polygon.exterior.tolist() for polygon in _solids(part)]
+    rings = [polygon.exterior.tolist() for polygon in part.solids]
     return (*rings, *(line.tolist() for line in part.lines)), part.global_id or ""
-
-
-def _solids(part: _Part) -> tuple[Polygon, ...]:
-    return () if part.region is None else canonical_region(part.region)
 
 
 def _element(name: str, kind: str, part: _Part) -> Element:
@@ -187,7 +198,7 @@ def _element(name: str, kind: str, part: _Part) -> Element:
     return Element(
         name,
         kind,
-        solids=_solids(part),
+        solids=part.solids,
         lines=part.lines,
         global_id=part.global_id,
         occludes=means.occludes,

@@ -77,7 +77,7 @@ def canonical_ring(ring: shapely.LinearRing, *, clockwise: bool = False) -> Floa
     if (ring_area(points) < 0) != clockwise:
         points = points[::-1]
     first = int(np.lexsort((points[:, 1], points[:, 0]))[0])
-    return frozen(np.roll(points, -first, axis=0))
+    return frozen(np.concatenate((points[first:], points[:first])))
 
 
 def canonical_region(region: Region) -> tuple[Polygon, ...]:

@@ -8,12 +8,15 @@ from pathlib import Path
 import pytest
 
 from tests.faults.sizes import size
-from tests.planner.turning import MovableDrawing, places
+from tests.planner.turning import Figures, MovableDrawing, Place, places
 from tests.planner.worlds import FLOORS, SHARED
 
 OFFICE = Path(__file__).parents[2] / "recordings" / "samples" / "office.dxf"
 DRAWINGS = {"office": OFFICE, **{Path(name).stem: SHARED / name for name in FLOORS}}
 ANGLES = size(short=36, full=360)
+FEW = size(short=9, full=360)
+"""Angles of floors that take as long as all others together."""
+LARGE = {"office-l1"}
 
 
 @cache
@@ -23,10 +26,20 @@ def drawing(name: str) -> MovableDrawing:
     return MovableDrawing(DRAWINGS[name])
 
 
+@cache
+def anywhere(name: str) -> dict[Place, Figures]:
+    return {place: drawing(name).figures(place) for place in places(FEW if name in LARGE else ANGLES, seed=1)}
+
+
 @pytest.mark.parametrize("name", DRAWINGS)
 def test_a_floor_is_the_same_wherever_it_lies(name: str) -> None:
-    here = drawing(name)
-    unlike = {
-        place: told for place in places(ANGLES, seed=1) if (told := here.figures(place).unlike(here.as_drawn))
-    }
+    here = drawing(name).as_drawn
+    unlike = {place: told for place, there in anywhere(name).items() if (told := there.unlike(here))}
     assert not unlike
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+@pytest.mark.xfail(reason="cutting the open space on the grid moves a corner now and then", strict=False)
+def test_no_unit_is_lost_wherever_a_floor_lies(name: str) -> None:
+    lost = {place: there.lost for place, there in anywhere(name).items() if there.lost}
+    assert not lost
