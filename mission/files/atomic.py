@@ -1,10 +1,11 @@
-"""Writes a file whole or not at all: a reader, a crash or Ctrl-C never meets half of it."""
+"""Writes files whole or not at all: a reader, a full disk, a crash or Ctrl-C never meets half of one."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import secrets
+from collections.abc import Iterator
 from pathlib import Path
 
 from mission.errors import InputError
@@ -13,28 +14,13 @@ from mission.errors import InputError
 def write_atomic(path: Path | str, data: bytes) -> None:
     """Write `data` under a temporary name in the same folder, sync it to disk, then rename it.
 
-    A symbolic link is followed; what was there before stays until the rename.
-
     Raises
     ------
     InputError
-        When the folder is missing or cannot be written, or the disk is full; `path` is then untouched.
+        As `replacing` does.
     """
-    target = Path(os.path.realpath(path))
-    _check_target(target, shown=path)
-    temporary = target.parent / f".stopgo-{secrets.token_hex(6)}.tmp"
-    try:
-        _write_synced(temporary, data)
-        os.replace(temporary, target)
-        _sync_folder(target.parent)
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written ({error.strerror}); "
-            f"check that the folder {target.parent} is writable and has space, or choose another"
-        ) from None
-    finally:
-        with contextlib.suppress(OSError):  # gone after the rename, and nothing to do if it cannot go
-            temporary.unlink(missing_ok=True)
+    with replacing(path) as (temporary,):
+        temporary.write_bytes(data)
 
 
 def write_checked(path: Path | str, data: bytes) -> None:
@@ -44,22 +30,64 @@ def write_checked(path: Path | str, data: bytes) -> None:
         raise InputError(f"{path}: does not hold what was written; is another program writing to it?")
 
 
-def _check_target(target: Path, shown: Path | str) -> None:
-    if str(shown) == "-":
+@contextlib.contextmanager
+def replacing(*paths: Path | str) -> Iterator[list[Path]]:
+    """Empty files beside `paths`, for the block to fill; they take the places of `paths` when it ends well.
+
+    All are synced to disk before the first is renamed, and they are renamed in the order given. Symbolic
+    links are followed; whatever was there before stays until the rename, and for good if the block raises.
+
+    Raises
+    ------
+    InputError
+        When a folder is missing or cannot be written, or the disk is full; `paths` are then untouched.
+    """
+    targets = [_target(path) for path in paths]
+    temporaries = [target.parent / f".stopgo-{secrets.token_hex(6)}.tmp" for target in targets]
+    try:
+        for temporary in temporaries:
+            _create(temporary)
+        yield temporaries
+        for temporary in temporaries:
+            _sync(temporary)
+        for temporary, target in zip(temporaries, targets, strict=True):
+            os.replace(temporary, target)
+        for folder in {target.parent for target in targets}:
+            _sync_folder(folder)
+    except OSError as error:
+        folder = targets[0].parent
+        raise InputError(
+            f"{paths[0] if len(paths) == 1 else folder}: cannot be written ({error.strerror}); "
+            f"check that the folder {folder} is writable and has space, or choose another"
+        ) from None
+    finally:
+        for temporary in temporaries:
+            with contextlib.suppress(OSError):  # gone after the rename, and nothing to do if it cannot go
+                temporary.unlink(missing_ok=True)
+
+
+def _target(path: Path | str) -> Path:
+    if str(path) == "-":
         raise InputError("-: results are written to files, checked and whole; give a file's name")
+    target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
-        raise InputError(f"{shown}: the folder {target.parent} does not exist; create it first")
+        raise InputError(f"{path}: the folder {target.parent} does not exist; create it first")
     if target.exists() and not target.is_file():
-        raise InputError(f"{shown}: is not a regular file; choose another name")
+        raise InputError(f"{path}: is not a regular file; choose another name")
+    return target
 
 
-def _write_synced(path: Path, data: bytes) -> None:
+def _create(path: Path) -> None:
     # O_EXCL: never write through something that another process put there.
-    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-    with os.fdopen(descriptor, "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
+    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDWR)  # some systems sync only what may be written
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _sync_folder(folder: Path) -> None:

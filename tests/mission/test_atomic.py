@@ -9,7 +9,8 @@ import pytest
 
 from mission.errors import InputError
 from mission.files import atomic
-from mission.files.atomic import write_atomic
+from mission.files.atomic import replacing, write_atomic
+from tests.disk import small_disk
 
 
 def test_what_is_written_is_there_and_nothing_else(tmp_path: Path) -> None:
@@ -59,3 +60,27 @@ def test_a_fault_leaves_the_old_file_and_no_other(
 def test_a_dash_is_no_file() -> None:
     with pytest.raises(InputError, match="results are written to files"):
         write_atomic("-", b"x")
+
+
+def test_files_of_one_result_appear_together(tmp_path: Path) -> None:
+    (tmp_path / "b").write_bytes(b"old")
+    with replacing(tmp_path / "a", tmp_path / "b") as (first, second):
+        first.write_bytes(b"new")
+        second.write_bytes(b"new")
+        assert not (tmp_path / "a").exists()
+        assert (tmp_path / "b").read_bytes() == b"old"
+    assert sorted(os.listdir(tmp_path)) == ["a", "b"]
+    assert (tmp_path / "b").read_bytes() == b"new"
+
+
+def test_if_one_of_them_finds_no_room_none_changes(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"old")
+    with (
+        pytest.raises(InputError, match=rf"^{tmp_path}: cannot be written \(File too large\)"),
+        replacing(tmp_path / "a", tmp_path / "b") as (first, second),
+        small_disk(100),
+    ):
+        first.write_bytes(b"new")
+        second.write_bytes(bytes(101))
+    assert os.listdir(tmp_path) == ["a"]
+    assert (tmp_path / "a").read_bytes() == b"old"
