@@ -364,7 +364,8 @@ def watch(
 ) -> None:
     """Follow the robot's run until it ends, gaps filled from its journal; its end never touches the robot.
 
-    Ends with 0 when the run finished and 1 when it was aborted. While a vehicle is watched over MAVLink, what
+    Ends with 0 when the run finished, 1 when it was aborted, and 2 when it finished and its recording is
+    incomplete, as on a full disk. While a vehicle is watched over MAVLink, what
     its mission says of a stop that failed is done by this command.
 
     Example: stopgo watch --robot r1 --rrd field.rrd
@@ -378,9 +379,10 @@ def watch(
         reached(way.to_look(compares=True)) as station,
     ):
         state = watch_showing(station, record, Table() if sys.stderr.isatty() else Lines(say))
-    if json_:
-        print_json(status_json(state))
-    raise typer.Exit(0 if state.state == "FINISHED" else 1)
+        if json_:
+            print_json(status_json(state))
+        if state.state != "FINISHED":  # which weighs more than what became of the recording
+            raise typer.Exit(1)
 
 
 def recording(path: Path | None, *, view: bool) -> AbstractContextManager[Recording | None]:
@@ -391,7 +393,7 @@ def recording(path: Path | None, *, view: bool) -> AbstractContextManager[Record
         return nullcontext()
     from recordings.field import FieldRecording
 
-    record = FieldRecording(path, None)
+    record = FieldRecording(path, say=say)
     if not view:
         return record
     from recordings.viewer import Viewed

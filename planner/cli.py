@@ -223,10 +223,11 @@ def _plan_part(
     number: int = 0,
     planned: frozenset[int] | None = None,
 ) -> PlanReport:
-    """Plan one part; its files appear when all of it is done, mission.json last."""
+    """Plan one part; its files appear together when all of it is done, mission.json last."""
     from mission import __version__
     from mission.document import mission_id
     from mission.figures import Figures
+    from mission.files.atomic import replacing
     from mission.files.coverage_json import coverage_json
     from mission.files.mission_json import encode
     from mission.files.plan_svg import plan_svg
@@ -235,36 +236,38 @@ def _plan_part(
     from planner import plan, plan_part
     from planner.outputs import names
     from planner.report import PlanReport
+    from recordings.canvas import must_be_writable
     from recordings.plan import PlanRecording
 
     files = names(folder, number)
+    for path in files.values():
+        must_be_writable(path)
     nouns: dict[type, Any] = {}
-    with PlanRecording(
-        files["recording"], recording_id=mission_id(floor.digest, settings, __version__, number)
-    ) as recording:
-        observe = _observer(recording.observe, nouns, watch)
-        if found is None:
-            made = plan(floor, settings, observe=observe)
-        else:
-            for noun in (floor, found.space):
-                observe(noun)
-            made = plan_part(found, observe=observe, number=number, planned=planned)
-        mission = _revised(made, files["mission"])
-        recording.observe(mission)
-        recording.observe(schedule(mission))
-    watch.lap("recording")
+    recording = PlanRecording(mission_id(floor.digest, settings, __version__, number))
+    observe = _observer(recording.observe, nouns, watch)
+    if found is None:
+        made = plan(floor, settings, observe=observe)
+    else:
+        for noun in (floor, found.space):
+            observe(noun)
+        made = plan_part(found, observe=observe, number=number, planned=planned)
+    mission = _revised(made, files["mission"])
+    recording.observe(mission)
+    recording.observe(schedule(mission))
     route, figures = nouns[Route], nouns[Figures]
-    _write(files["coverage"], coverage_json(route, mission, figures))
-    _write(files["picture"], plan_svg(route, mission, figures, date=datetime.date.today().isoformat()))
-    _write(files["mission"], encode(mission))
+    with replacing(*(files[key] for key in WRITTEN)) as (recorded, coverage, picture, document):
+        recording.write(recorded)
+        watch.lap("recording")
+        coverage.write_bytes(coverage_json(route, mission, figures))
+        today = datetime.date.today().isoformat()
+        picture.write_bytes(plan_svg(route, mission, figures, date=today))
+        document.write_bytes(encode(mission))
     watch.lap("files")
     return PlanReport(route=route, mission=mission, files=files, times_s=watch.times(), figures=figures)
 
 
-def _write(path: Path, data: bytes) -> None:
-    from mission.files.atomic import write_atomic
-
-    write_atomic(path, data)
+WRITTEN = ("recording", "coverage", "picture", "mission")
+"""A plan's files in the order in which they appear: the mission when all else is there."""
 
 
 def _revised(mission: Mission, path: Path) -> Mission:
@@ -363,7 +366,7 @@ def _follow(station: Station, mission: Mission, path: Path) -> tuple[EventTee, s
     from bridge.watch import watch_run
     from recordings.field import FieldRecording
 
-    with FieldRecording(path, mission) as recording:
+    with FieldRecording(path, mission, say=lambda line: typer.echo(line, err=True)) as recording:
         tee = EventTee(recording, mission)
         last = watch_run(station, tee, say=lambda line: typer.echo(f"  {line}", err=True))
     return tee, last.state

@@ -49,6 +49,11 @@ class Canvas:
 
     stream: rr.RecordingStream
     origin: Origin
+    drawn: rr.BinaryStream
+
+    def taken(self) -> bytes:
+        """All that was drawn since it was last taken, as a recording in Rerun's format."""
+        return self.drawn.read() or b""
 
     def local(self, xy: FloatArray) -> NDArray[Any]:
         """Points (…, 2) relative to the local origin, as Rerun stores them."""
@@ -148,31 +153,26 @@ def _try(path: Path) -> None:
 
 
 @contextmanager
-def open_canvas(path: Path, sheet: Sheet, *, port: int | None = None) -> Iterator[Canvas]:
-    """A recording written to `path`, with the blueprint that all recordings share; leaving closes it.
+def open_canvas(sheet: Sheet, *, port: int | None = None) -> Iterator[Canvas]:
+    """A recording in memory, with the blueprint that all recordings share.
 
-    With a port, viewers of this machine can follow there what is drawn; until it is closed, all of it is
-    kept for those that come later.
+    Who opens it writes it: Rerun's own writers end in a thread of theirs when the disk is full, and whoever
+    waits for them waits for ever. With a port, viewers of this machine can follow there what is drawn;
+    until it is closed, all of it is kept for those that come later.
     """
     rr.set_strict_mode(True)
     with rr.RecordingStream(
         entities.APPLICATION, recording_id=sheet.recording_id, send_properties=False
     ) as stream:
-        _save(stream, path, sheet, port)
+        drawn = rr.binary_stream(stream)
+        viewers = [] if port is None else [rr.GrpcServerSink("127.0.0.1", port)]
+        layout = blueprint(sheet.local_extent, of_run=sheet.of_run)
+        stream.set_sinks(drawn, *viewers, default_blueprint=layout)
         stream.set_log_time_enabled(False)
         stream.send_recording_name(sheet.name)
-        canvas = Canvas(stream, sheet.origin)
+        canvas = Canvas(stream, sheet.origin, drawn)
         _prepare(canvas)
         yield canvas
-
-
-def _save(stream: rr.RecordingStream, path: Path, sheet: Sheet, port: int | None) -> None:
-    layout = blueprint(sheet.local_extent, of_run=sheet.of_run)
-    viewers = [] if port is None else [rr.GrpcServerSink("127.0.0.1", port)]
-    try:
-        stream.set_sinks(rr.FileSink(str(path)), *viewers, default_blueprint=layout)
-    except RuntimeError as error:
-        raise InputError(f"{path}: cannot be written ({error})") from None
 
 
 def _prepare(canvas: Canvas) -> None:

@@ -29,7 +29,7 @@ def compact(source: Path, target: Path) -> None:
         if _merge(source, merged) and _holds(merged, written):
             os.replace(merged, target)
             source.unlink()
-        else:
+        else:  # such as on a disk without room for two
             os.replace(source, target)
     finally:
         merged.unlink(missing_ok=True)

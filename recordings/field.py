@@ -13,6 +13,7 @@ from mission.errors import InputError
 from mission.events import AnyEvent, PoseReport, StateReport
 from recordings.canvas import Canvas, Sheet, mission_origin, must_be_writable, open_canvas
 from recordings.compact import compact
+from recordings.pieces import Pieces
 from recordings.runs.drawing import RunDrawing
 from recordings.stages.mission import draw_mission, mission_extent
 
@@ -24,19 +25,24 @@ class FieldRecording:
 
     A field run cannot be repeated, so what was told is kept: it is written to `NAME.partial.rrd`, which
     `rerun` opens too and which remains when the writer is killed, and gets its name when it is closed.
+    On a full disk the run goes on: what finds no room waits in memory, which `say` is told once; what has
+    found none at the end is lost, and the file keeps its partial name.
     Reports wait for the mission, because it gives the recording id and the local origin; reports of no
     run are left out, as is everything when no mission came. What is told of a new revision waits for that
     too: the plan stays as it was drawn first, and each run shows what revisions changed, when they did.
     """
 
-    def __init__(self, path: Path, mission: Mission | None = None) -> None:
+    def __init__(
+        self, path: Path, mission: Mission | None = None, *, say: Callable[[str], None] = lambda line: None
+    ) -> None:
         self.path = path
+        self._say = say
         self._waiting: list[Report] = []
         self._runs: dict[str, RunDrawing] = {}
         self._first: Mission | None = None
         self._newest: Mission | None = None
         self._canvas: Canvas | None = None
-        self._partial: Path | None = None
+        self._pieces: Pieces | None = None
         self._port: int | None = None
         self._given = mission
         self._open = ExitStack()
@@ -68,6 +74,7 @@ class FieldRecording:
     def state(self, report: StateReport) -> None:
         """Take a snapshot of the robot's state."""
         self._take(report)
+        self._save()
 
     def pose(self, report: PoseReport) -> None:
         """Take a pose of the robot."""
@@ -76,8 +83,7 @@ class FieldRecording:
     def event(self, event: AnyEvent) -> None:
         """Take a line of the robot's journal; what was told before it is on disk then."""
         self._take(event)
-        if self._canvas is not None:
-            self._canvas.stream.flush()
+        self._save()
 
     @property
     def canvas(self) -> Canvas:
@@ -90,12 +96,33 @@ class FieldRecording:
         if self._canvas is not None:
             for report in self._waiting:
                 self._draw(report)
+            self._save()
         self._open.close()
-        if self._partial is not None:
-            compact(self._partial, self.path)
+        fault = None if self._pieces is None else self._closed(self._pieces)
+        if fault is not None and error is None:
+            raise InputError(fault)
+        if fault is not None:  # what ended the run is told as well, and decides how the command ends
+            self._say(fault)
+
+    def _closed(self, pieces: Pieces) -> str | None:
+        """Give the file its name; what is wrong with it, if it cannot have it."""
+        pieces.close()
+        if pieces.fault is not None:
+            kept = f"what could be is in {pieces.path}" if pieces.path.exists() else "nothing is kept"
+            return f"{self.path}: could not be written whole ({pieces.fault}); {kept}"
+        try:
+            compact(pieces.path, self.path)
+        except InputError as error:
+            return str(error)
+        return None
+
+    def _save(self) -> None:
+        """Hand over to the disk what was drawn."""
+        if self._canvas is not None and self._pieces is not None:
+            self._pieces.add(self._canvas.taken())
 
     def _begin(self, mission: Mission) -> None:
-        self._partial = _free_name(self.path)
+        self._pieces = Pieces(_free_name(self.path), self._say)
         sheet = Sheet(
             recording_id=mission.id,
             name=mission.name,
@@ -103,8 +130,9 @@ class FieldRecording:
             extent=mission_extent(mission),
             of_run=True,
         )
-        self._canvas = self._open.enter_context(open_canvas(self._partial, sheet, port=self._port))
+        self._canvas = self._open.enter_context(open_canvas(sheet, port=self._port))
         draw_mission(self._canvas, mission)
+        self._save()
 
     def _take(self, report: Report) -> None:
         """Draw the report, or let it and all after it wait for the mission it is told of."""

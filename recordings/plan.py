@@ -1,11 +1,9 @@
-"""A plan as a recording: takes each noun as the planner makes it, and writes plan.rrd when the plan ends."""
+"""A plan as a recording: takes each noun as the planner makes it, and draws them when the plan ends."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import rerun as rr
@@ -16,15 +14,7 @@ from mission.floor import FloorPlan
 from mission.geometry import bounds
 from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
 from recordings import entities
-from recordings.canvas import (
-    Canvas,
-    Origin,
-    Sheet,
-    local_origin,
-    mission_origin,
-    must_be_writable,
-    open_canvas,
-)
+from recordings.canvas import Canvas, Origin, Sheet, local_origin, mission_origin, open_canvas
 from recordings.layout import Bounds
 from recordings.read import check
 from recordings.report import Nouns, parameter_values, parameters, plan_report, plan_results
@@ -57,48 +47,35 @@ DRAWINGS: dict[type, tuple[Drawing, ...]] = {
 
 
 class PlanRecording:
-    """Collects the nouns of one plan; leaving the block draws them.
+    """Collects the nouns of one plan, and draws them when it is written.
 
     Drawing waits for the end because the local origin is the mission's, which is known last and which
-    field recordings of the mission know too. The file appears when it is complete and has been read
-    back; a plan that ends otherwise leaves what was there before.
+    field recordings of the mission know too.
     """
 
-    def __init__(self, path: Path, recording_id: str) -> None:
-        self.path = path
+    def __init__(self, recording_id: str) -> None:
         self.recording_id = recording_id
         self._nouns: Nouns = {}
-
-    def __enter__(self) -> PlanRecording:
-        must_be_writable(self.path)
-        return self
 
     def observe(self, noun: object) -> None:
         """Take one noun; of two of a kind the later one counts."""
         self._nouns[type(noun)] = noun
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is None:
-            write_plan(self.path, self.recording_id, self._nouns)
+    def write(self, path: Path) -> None:
+        """Draw the nouns into `path`, and read it back to its end."""
+        path.write_bytes(_drawn(self.recording_id, self._nouns))
+        check(path)
 
 
-def write_plan(path: Path, recording_id: str, nouns: Nouns) -> None:
-    """Draw the nouns into `path`, which appears only when it is complete and readable."""
-    unfinished = path.with_name(f"{path.name}.tmp")
+def _drawn(recording_id: str, nouns: Nouns) -> bytes:
     sheet = Sheet(recording_id=recording_id, name=_name(nouns), origin=_origin(nouns), extent=_extent(nouns))
-    try:
-        with open_canvas(unfinished, sheet) as canvas:
-            for kind, drawings in DRAWINGS.items():
-                for draw in drawings if kind in nouns else ():
-                    draw(canvas, nouns[kind])
-            _draw_planned_drive(canvas, nouns)
-            _tell(canvas, nouns)
-        check(unfinished)
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with open_canvas(sheet) as canvas:
+        for kind, drawings in DRAWINGS.items():
+            for draw in drawings if kind in nouns else ():
+                draw(canvas, nouns[kind])
+        _draw_planned_drive(canvas, nouns)
+        _tell(canvas, nouns)
+        return canvas.taken()
 
 
 def _origin(nouns: Nouns) -> Origin:

@@ -62,7 +62,7 @@ class Review:
     def as_text(self) -> str:
         """The same for a person."""
         held = self.contents
-        ended = "" if held.complete else "; its writer was stopped before it closed the file"
+        ended = "" if held.complete else "; not closed: its writer was stopped, or had no room on the disk"
         lines = [
             f"recording {held.recording_id} (mission of the same id){ended}",
             f"  timelines {', '.join(held.timelines)}; {len(held.rows)} entities, {held.total_rows} rows",

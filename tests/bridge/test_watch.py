@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import queue
 import threading
 import time
+from contextlib import nullcontext
+from pathlib import Path
 
 import pytest
 
 from bridge import agent as agents
+from bridge import cli
 from bridge.agent import Agent
 from bridge.bodies import pose_of
 from bridge.clock import WallClock
@@ -20,11 +24,13 @@ from bridge.protocol import Keys
 from bridge.simulator import SimulatedBase, SimulatedScanner
 from bridge.station import Station
 from bridge.watch import Lines, Table, clock, remaining_s, table_lines, watch_showing
+from mission.__main__ import main
 from mission.document import Mission
 from mission.errors import OutcomeUnknown
 from mission.events import AnyEvent, PoseReport, Scanned, StateReport
 from mission.schedule import schedule
 from tests.bridge.world import Field, corridor
+from tests.disk import small_disk
 
 
 def test_the_time_left_at_the_start_is_the_plan() -> None:
@@ -191,3 +197,26 @@ def test_a_recording_is_handed_every_revision_in_turn_also_when_it_comes_late() 
     field.work()
     watch_showing(field.station(), record, Lines(lambda line: None))
     assert record.revisions == [1, 2, 3]
+
+
+@pytest.mark.parametrize(("verb", "code"), [("pause", 2), ("abort", 1)])
+def test_a_run_is_followed_to_its_end_though_its_recording_finds_no_room(
+    verb: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    field.order(verb)
+    field.order("resume")
+    field.work()
+    monkeypatch.setattr(cli, "reached", lambda way: nullcontext(field.station()))
+    rrd = tmp_path / "field.rrd"
+    with small_disk(0):
+        assert main(["watch", "--robot", "r1", "--rrd", str(rrd), "--json"]) == code
+    told = capsys.readouterr()
+    assert json.loads(told.out)["state"] == {2: "FINISHED", 1: "ABORTED"}[code]
+    assert [line for line in told.err.splitlines() if "field" in line] == [
+        f"{rrd.with_name('field.partial.rrd')}: cannot be written (File too large); "
+        "the recording waits in memory for room",
+        f"{'stopgo: ' * (code == 2)}{rrd}: could not be written whole (File too large); nothing is kept",
+    ]

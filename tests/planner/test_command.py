@@ -14,6 +14,8 @@ import pytest
 from mission.__main__ import main
 from mission.files.mission_json import read
 from mission.settings import Settings, read_settings
+from planner.cli import plan_files
+from tests.disk import small_disk
 from tests.planner.worlds import FLOORS, SHARED
 
 Draw = Callable[["Drawing"], None]
@@ -471,6 +473,41 @@ def test_a_refusal_leaves_an_older_plan_as_it_was(
     code, _, error = run("plan", floor, "-o", tmp_path / "out", "--d-sec", 3)
     assert code == 1
     one_line(error)
+    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+
+
+@pytest.mark.parametrize("room", [0, 2_000, 20_000])
+@pytest.mark.parametrize("older", [False, True])
+def test_a_full_disk_is_2_and_changes_nothing(
+    run: Callable[..., Run], floor: Path, tmp_path: Path, room: int, older: bool
+) -> None:
+    out = tmp_path / "out"
+    if older:
+        run("plan", floor, "-o", out, "--d-sec", 0.8)
+    before = {name: (out / name).read_bytes() for name in FILES} if older else {}
+    with small_disk(room):
+        code, _, error = run("plan", floor, "-o", out)
+    assert code == 2
+    assert f"{out}: cannot be written (File too large)" in one_line(error)
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+@pytest.mark.parametrize("fault", [RuntimeError, KeyboardInterrupt])
+@pytest.mark.parametrize("stage", ["planner.routing.route", "mission.files.plan_svg.plan_svg"])
+def test_a_plan_that_ends_in_the_middle_changes_nothing(
+    floor: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: type[BaseException], stage: str
+) -> None:
+    (tmp_path / "out").mkdir()
+    before = {name: b"before" for name in FILES - {"mission.json"}}
+    for name, data in before.items():
+        (tmp_path / "out" / name).write_bytes(data)
+
+    def fail(*arguments: object, **options: object) -> None:
+        raise fault
+
+    monkeypatch.setattr(stage, fail)
+    with pytest.raises(fault):
+        plan_files(floor, tmp_path / "out", Settings())
     assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
 
 

@@ -46,9 +46,10 @@ def write_revised(path: Path, mission: Mission) -> Path:
 
 
 def write_plan(path: Path, x: float = 0.0, y: float = 0.0) -> Path:
-    with PlanRecording(path, world.MISSION_ID) as recording:
-        for noun in world.nouns_at(x, y):
-            recording.observe(noun)
+    recording = PlanRecording(world.MISSION_ID)
+    for noun in world.nouns_at(x, y):
+        recording.observe(noun)
+    recording.write(path)
     return path
 
 

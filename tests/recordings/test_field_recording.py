@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -17,8 +19,8 @@ from mission.events import PoseReport, StateReport
 from recordings import entities
 from recordings.compact import compact
 from recordings.field import FieldRecording
-from recordings.plan import PlanRecording
 from recordings.read import check
+from tests.disk import ROOMY, small_disk
 from tests.recordings import run, world
 from tests.recordings.conftest import tell, write_field, write_plan
 from tests.recordings.reading import components, on, static
@@ -164,7 +166,6 @@ def test_ctrl_c_keeps_the_run_so_far(tmp_path: Path, mission: Mission) -> None:
     assert check(path).complete
 
 
-@pytest.mark.parametrize("recording", [PlanRecording, FieldRecording])
 @pytest.mark.parametrize(
     ("name", "why"),
     [
@@ -176,11 +177,9 @@ def test_ctrl_c_keeps_the_run_so_far(tmp_path: Path, mission: Mission) -> None:
         (f"{'x' * 250}.rrd", "File name too long"),
     ],
 )
-def test_a_place_without_room_is_refused_before_the_run(
-    tmp_path: Path, recording: type, name: str, why: str
-) -> None:
+def test_a_place_where_no_file_can_be_is_refused_before_the_run(tmp_path: Path, name: str, why: str) -> None:
     (tmp_path / "file").write_text("mine")
-    with pytest.raises(InputError, match=why), recording(tmp_path / name, world.MISSION_ID):
+    with pytest.raises(InputError, match=why), FieldRecording(tmp_path / name):
         raise AssertionError("entered")
     assert [item.name for item in tmp_path.iterdir()] == ["file"]
 
@@ -193,9 +192,83 @@ def test_watching_into_an_unwritable_place_is_refused_before_the_robot_is_asked(
     assert line.startswith("stopgo: /proc/field.rrd: no such file can be made in /proc")
 
 
-def test_a_run_cut_off_by_a_full_disk_is_left_under_its_partial_name(
+# ---- the disk is full ----
+
+
+def test_what_finds_no_room_waits_until_there_is_some(tmp_path: Path, mission: Mission, field: Path) -> None:
+    said: list[str] = []
+    reports = list(run.reports(mission))
+    path, partial = tmp_path / "field.rrd", tmp_path / "field.partial.rrd"
+    with small_disk() as full_at, FieldRecording(path, mission, say=said.append) as recording:
+        for number, report in enumerate(reports):
+            if number == len(reports) // 4:
+                full_at(0)
+            if number == len(reports) // 2:
+                full_at(ROOMY)
+            tell(recording, report)
+    assert said == [
+        f"{partial}: cannot be written (File too large); the recording waits in memory for room",
+        f"{partial}: there is room again; what waited is written",
+    ]
+    held, whole = check(path), check(field)
+    assert held.complete
+    assert held.rows == whole.rows
+    assert os.listdir(tmp_path) == ["field.rrd"]
+
+
+def test_what_finds_no_room_to_the_end_is_told_and_keeps_its_partial_name(
+    tmp_path: Path, mission: Mission, field: Path
+) -> None:
+    path, partial = tmp_path / "field.rrd", tmp_path / "field.partial.rrd"
+    with pytest.raises(InputError) as raised, small_disk(180_000), FieldRecording(path, mission) as recording:
+        for report in run.reports(mission):
+            tell(recording, report)
+    why = "could not be written whole (File too large)"
+    assert str(raised.value) == f"{path}: {why}; what could be is in {partial}"
+    assert os.listdir(tmp_path) == [partial.name]
+    events = check(partial).rows[f"{RUN}/events"]
+    assert 0 < events < check(field).rows[f"{RUN}/events"]
+
+
+def test_how_a_run_ended_is_not_hidden_by_what_became_of_its_recording(
     tmp_path: Path, mission: Mission
 ) -> None:
+    said: list[str] = []
+    path = tmp_path / "field.rrd"
+    with (
+        pytest.raises(KeyboardInterrupt),
+        small_disk(0),
+        FieldRecording(path, mission, say=said.append),
+    ):
+        raise KeyboardInterrupt
+    assert said[-1] == f"{path}: could not be written whole (File too large); nothing is kept"
+    assert not os.listdir(tmp_path)
+
+
+def test_a_recording_whose_folder_went_away_is_told_of(tmp_path: Path, mission: Mission) -> None:
+    folder = tmp_path / "usb"
+    folder.mkdir()
+    with (
+        pytest.raises(InputError, match=r"field\.partial\.rrd: no such file"),
+        FieldRecording(folder / "field.rrd", mission) as recording,
+    ):
+        shutil.rmtree(folder)
+        for report in run.reports(mission):
+            tell(recording, report)
+
+
+def test_without_room_for_two_the_recording_stays_as_it_is(tmp_path: Path, mission: Mission) -> None:
+    """Compacting needs room beside the file; a file not compacted holds the same."""
+    path = tmp_path / "field.rrd"
+    with small_disk() as full_at, FieldRecording(path, mission) as recording:
+        for report in run.reports(mission):
+            tell(recording, report)
+        full_at(1000)
+    assert check(path).rows[f"{RUN}/events"] == 8
+    assert os.listdir(tmp_path) == ["field.rrd"]
+
+
+def test_a_recording_that_was_cut_is_left_under_its_partial_name(tmp_path: Path, mission: Mission) -> None:
     path = tmp_path / "field.rrd"
     whole = write_field(tmp_path / "whole.rrd", mission).read_bytes()
     partial = tmp_path / "field.partial.rrd"
