@@ -12,6 +12,8 @@ HEADER = 12
 """Bytes at the start of a recording: Rerun's mark, its version and options."""
 MESSAGE = struct.Struct("<QQ")
 """What stands before each message: its kind, and how many bytes it has."""
+MOST_WAITING = 256 << 20
+"""Bytes that may wait in memory: hours of a run, and less than any machine that watches one has."""
 END = 0
 """The kind of a recording's last message; what follows tells where things stand in the file."""
 
@@ -29,7 +31,8 @@ def messages(recording: bytes) -> bytes:
 class Pieces:
     """A file that recordings are added to, one after another; together they are one without an end.
 
-    Pieces that find no room on the disk wait in memory, in their order. The file holds whole pieces only.
+    Pieces that find no room on the disk wait in memory, in their order, as long as they are not too much for
+    it. The file holds whole pieces only.
     """
 
     def __init__(self, path: Path, say: Callable[[str], None]) -> None:
@@ -40,18 +43,20 @@ class Pieces:
         self._file: FileIO | None = None
         self._whole = 0
         self._waiting: deque[bytes] = deque()
+        self._lost = False
 
     def add(self, recording: bytes) -> None:
         """Add a recording, and before it what has waited for room."""
-        if recording:
+        if recording and not self._lost:
             first = self._whole == 0 and not self._waiting
             self._waiting.append(recording[:HEADER] * first + messages(recording))
         try:
             self._write()
         except OSError as error:
+            self._lost = self._lost or sum(map(len, self._waiting)) > MOST_WAITING
             self._tell(error.strerror or "unknown")
         else:
-            self._tell(None)
+            self._tell("too much waited for room" if self._lost else None)
 
     def close(self) -> None:
         """Try once more to write what waits, and close the file, which goes if nothing could be written."""

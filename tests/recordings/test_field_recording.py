@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from mission.__main__ import main
 from mission.document import Mission
 from mission.errors import InputError
 from mission.events import PoseReport, StateReport
-from recordings import entities
+from recordings import entities, pieces
 from recordings.compact import compact
 from recordings.field import FieldRecording
 from recordings.read import check
@@ -228,6 +229,24 @@ def test_what_finds_no_room_to_the_end_is_told_and_keeps_its_partial_name(
     assert os.listdir(tmp_path) == [partial.name]
     events = check(partial).rows[f"{RUN}/events"]
     assert 0 < events < check(field).rows[f"{RUN}/events"]
+
+
+def test_what_is_too_much_for_the_memory_is_not_called_whole(
+    tmp_path: Path, mission: Mission, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pieces, "MOST_WAITING", 150_000)
+    path = tmp_path / "field.rrd"
+    why = "could not be written whole (too much waited for room); what could be is in"
+    with (
+        pytest.raises(InputError, match=re.escape(why)),
+        small_disk(0) as full_at,
+        FieldRecording(path, mission) as recording,
+    ):
+        for report in run.reports(mission):
+            tell(recording, report)
+        full_at(ROOMY)
+    assert 0 < check(tmp_path / "field.partial.rrd").rows[f"{RUN}/events"] < 8
+    assert not path.exists()
 
 
 def test_how_a_run_ended_is_not_hidden_by_what_became_of_its_recording(
