@@ -6,8 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from mission.floor import KINDS, Element, FloorPlan, Opening, Room
+from mission.floor import Element, FloorPlan, Opening, Room
 from mission.geometry import Polygon, frozen
+from mission.kinds import KINDS
 
 WALL = 0.2
 DOOR = 0.9

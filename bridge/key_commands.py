@@ -16,7 +16,6 @@ SiteFolder = Annotated[Path, typer.Option("--in", metavar="DIR", help="The site'
 def key_commands() -> typer.Typer:
     """`stopgo keys` with its verbs."""
     commands = typer.Typer(
-        no_args_is_help=True,
         help="Make a site's keys: an authority, and a certificate for every station, viewer and robot."
         "\n\nExample: stopgo keys init site-keys && stopgo keys issue robot r1 --in site-keys",
     )

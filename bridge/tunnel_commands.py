@@ -27,7 +27,6 @@ SAY_EVERY_S = 1.0
 def tunnel_commands() -> typer.Typer:
     """`stopgo tunnel` with its two ends."""
     commands = typer.Typer(
-        no_args_is_help=True,
         help="Carry raw MAVLink frames over zenoh, between a vehicle and ground programs on stations."
         "\n\nExample: stopgo tunnel robot --name r1 --mavlink serial:/dev/ttyAMA1:57600 &&"
         " stopgo tunnel station --robot r1 --mavlink udpout:127.0.0.1:14550",

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
+__version__: str
 
-try:
-    __version__ = version("stopgo")
-except PackageNotFoundError:  # run from a checkout that was never installed
-    __version__ = "0.0.0"
+
+def __getattr__(name: str) -> str:
+    """The version, looked up when it is asked for: no command that does not print it waits for that."""
+    if name != "__version__":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        found = version("stopgo")
+    except PackageNotFoundError:  # run from a checkout that was never installed
+        found = "0.0.0"
+    globals()[name] = found
+    return found

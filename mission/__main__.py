@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import sys
-import threading
-from importlib import import_module
-from typing import NoReturn
+from typing import TYPE_CHECKING
 
-import typer
-from typer.exceptions import TyperException
-
-from mission import __version__
 from mission.errors import MissingExtra, StopgoError
+from mission.process import PIPE_CLOSED, Signals, drop_output, have_output, reader_is_gone
+
+if TYPE_CHECKING:
+    import typer
+    from typer.exceptions import TyperException
 
 FOLDERS = ("planner.cli", "bridge.cli", "recordings.cli", "mission.cli")
 """Each folder's commands; each module has `add_commands(app)` and imports slow libraries where used."""
@@ -27,12 +27,44 @@ EXTRAS = {
 """The extra that installs each optional library."""
 
 
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command; returns its exit code: 0 done, 1 no, 2 bad input, 3 unknown, 130 Ctrl-C.
+
+    Without `arguments` it is the process's own command, and the process must end with that code.
+    """
+    if arguments is not None:
+        return _heeding(arguments, whole_process=False)
+    have_output()
+    code = _heeding(sys.argv[1:], whole_process=True)
+    try:
+        sys.stdout.flush()
+    except OSError:  # and not once more at the very end
+        drop_output()
+    return code
+
+
+def _heeding(arguments: list[str], *, whole_process: bool) -> int:
+    try:
+        with Signals(whole_process=whole_process) as signals:
+            try:
+                code = _run(arguments)
+                sys.stdout.flush()
+                return code
+            except BaseException as error:  # noqa: BLE001  the process ends here
+                return _ended_by(error, signals)
+    except KeyboardInterrupt:  # a second one, while the first was told of
+        return INTERRUPTED
+
+
 def build_app() -> typer.Typer:
     """The `stopgo` command with every folder's verbs."""
+    from importlib import import_module
+
+    import typer
+
     app = typer.Typer(
         name="stopgo",
         help="Plan where a laser scanner must stand, and drive a robot through those stops.",
-        no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
@@ -44,6 +76,8 @@ def build_app() -> typer.Typer:
         version: bool = typer.Option(False, "--version", help="Print the version and leave."),
     ) -> None:
         if version:
+            from mission import __version__
+
             typer.echo(__version__)
             raise typer.Exit
 
@@ -52,40 +86,58 @@ def build_app() -> typer.Typer:
     return app
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run one command; returns its exit code: 0 done, 1 no, 2 bad input, 3 unknown, 130 Ctrl-C."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, _terminated)
-    try:
-        command = typer.main.get_command(build_app())
-        given = sys.argv[1:] if arguments is None else arguments
-        result = command.main(args=given or ["--help"], prog_name="stopgo", standalone_mode=False)
-        if result == INTERRUPTED:  # the command library has caught the Ctrl-C
-            raise KeyboardInterrupt
-        return result if isinstance(result, int) else 0
-    except BrokenPipeError:
-        return 0
-    except (StopgoError, ModuleNotFoundError, TyperException, OSError) as error:
-        return _say(*_told(error))
-    except (KeyboardInterrupt, typer.Abort):
-        return _say("stopped by Ctrl-C", INTERRUPTED)
+def _run(arguments: list[str]) -> int:
+    """The command's own exit code, if it does not raise."""
+    import typer
+
+    command = typer.main.get_command(build_app())
+    with command.make_context("stopgo", list(arguments) or ["--help"]) as context:
+        result = command.invoke(context)
+    return result if isinstance(result, int) else 0
 
 
-def _terminated(number: int, frame: object) -> NoReturn:
-    """Leave by way of every open `with`: links are closed and recordings finished."""
-    raise SystemExit(128 + number)
-
-
-def _told(error: Exception) -> tuple[str, int]:
-    """What a user is told of an error, and the exit code."""
+def _ended_by(error: BaseException, signals: Signals) -> int:
+    """The exit code of a command that has raised, after a line for the user; raises what nobody foresaw."""
     if isinstance(error, StopgoError):
-        return str(error), error.exit_code
+        return _say(str(error), error.exit_code)
+    if isinstance(error, KeyboardInterrupt) or signals.first is not None:
+        return _stopped(signals)
+    if isinstance(error, BrokenPipeError) and reader_is_gone():
+        return PIPE_CLOSED
     if isinstance(error, ModuleNotFoundError):
-        return _missing(error)
+        return _say(*_missing(error))
+    if isinstance(error, OSError):  # such as a full disk under the output
+        return _say(f"{error.filename or 'output'}: {error.strerror}", StopgoError.exit_code)
+    return _left_by(error)
+
+
+def _stopped(signals: Signals) -> int:
+    """The exit code of a command that a signal has ended; only Ctrl-C has somebody to be told."""
+    if signals.first not in (None, signal.SIGINT):
+        return signals.exit_code
+    return _say("stopped by Ctrl-C", INTERRUPTED)
+
+
+def _left_by(error: BaseException) -> int:
+    """The exit code of what the library of commands has raised."""
+    from typer import Abort, Exit
+    from typer.exceptions import TyperException
+
+    if isinstance(error, Exit):
+        return error.exit_code
+    if isinstance(error, Abort):
+        return INTERRUPTED
     if isinstance(error, TyperException):
-        return f"{error.format_message()} (see --help)", StopgoError.exit_code
-    assert isinstance(error, OSError)  # such as a full disk under the output
-    return f"{error.filename or 'output'}: {error.strerror}", StopgoError.exit_code
+        return _say(f"{_misused(error)} (see --help)", StopgoError.exit_code)
+    raise error
+
+
+def _misused(error: TyperException) -> str:
+    """What is wrong with how a command was written; after `stopgo keys`, which verbs there are."""
+    context = getattr(error, "ctx", None)
+    verbs = () if context is None or context.parent is None else getattr(context.command, "commands", ())
+    known = f" {context.command_path} has: {', '.join(verbs)}" if context and verbs else ""
+    return f"{error.format_message()}{known}"
 
 
 def _missing(error: ModuleNotFoundError) -> tuple[str, int]:
@@ -98,7 +150,10 @@ def _missing(error: ModuleNotFoundError) -> tuple[str, int]:
 
 
 def _say(message: str, code: int) -> int:
-    print(f"stopgo: {' '.join(message.split())}", file=sys.stderr)  # noqa: T201
+    from mission.table import printable
+
+    with contextlib.suppress(OSError):  # nobody reads it
+        print(f"stopgo: {printable(' '.join(message.split()))}", file=sys.stderr)  # noqa: T201
     return code
 
 

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import msgspec
 import typer
 
-from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError
-from mission.files.atomic import write_checked
-from mission.files.mission_json import encode, next_revision, read
-from mission.page import identity, json_text, page, report, route_length
-from mission.schedule import schedule
-from mission.sense import Problem, problems_of
-from mission.settings import HOW, read_settings
 
 if TYPE_CHECKING:
+    from mission.document import Mission
     from mission.files.exports.format import FloorDrawing, Supplements
+    from mission.sense import Problem
 
 MissionFile = Annotated[Path, typer.Argument(metavar="MISSION", help="A mission.json.")]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout and nothing else.")]
@@ -45,6 +36,11 @@ def show(mission: MissionFile, as_json: AsJson = False) -> None:
 
     Example: stopgo show out/mission.json
     """
+    from mission.files.mission_json import read
+    from mission.page import json_text, page, report
+    from mission.schedule import schedule
+    from mission.sense import problems_of
+
     document = read(mission)
     for problem in problems_of(document)[:1]:
         raise AnswerIsNo(f"{mission}: {problem} (stopgo check {mission} lists all)")
@@ -62,6 +58,10 @@ def check(mission: MissionFile, floor: Floor = None, as_json: AsJson = False) ->
 
     Example: stopgo check out/mission.json --floor office.dxf
     """
+    from mission.files.mission_json import read
+    from mission.page import identity, json_text
+    from mission.sense import problems_of
+
     document = read(mission)
     problems = (*problems_of(document), *(() if floor is None else _floor_problems(document, floor)))
     if as_json:
@@ -88,6 +88,10 @@ def _floor_problems(mission: Mission, floor: Path) -> tuple[Problem, ...]:
 
 
 def _other_floor(mission: Mission, floor: Path) -> tuple[Problem, ...]:
+    import hashlib
+
+    from mission.sense import Problem
+
     try:
         digest = hashlib.sha256(floor.read_bytes()).hexdigest()
     except OSError as error:
@@ -154,8 +158,11 @@ def export(
 
     Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
     """
+    from mission.files.atomic import write_checked
     from mission.files.exports import FORMATS, check_uses, exported, format_named
     from mission.files.exports.placing import moved, placed
+    from mission.files.mission_json import read
+    from mission.sense import problems_of
 
     document = read(mission)
     there = placed(document, origin=origin, to_map=map_)
@@ -184,6 +191,9 @@ def _keep(out: Path, read_from: dict[str, Path | None]) -> None:
 def _supplements(
     mission: Mission, floor: Path | None, coverage: Path | None, writing: dict[str, str | None]
 ) -> Supplements:
+    from dataclasses import replace
+    from datetime import UTC, datetime
+
     from mission.files.exports.format import written_as
     from mission.files.exports.stretches import read_stretches
 
@@ -215,6 +225,8 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
 def _say_export(report: dict[str, Any], title: str, as_json: bool) -> None:
     for note in report["notes"]:
         typer.echo(f"stopgo: {note}", err=True)
+    from mission.page import json_text
+
     line = f"{report['file']}: {title}, {report['stops']} stops, read back"
     typer.echo(json_text(report) if as_json else line)
 
@@ -242,14 +254,20 @@ def import_command(
 
     Example: stopgo import site.plan -o mission.json --origin 47.3769,8.5417,408,0
     """
+    from msgspec.structs import replace
+
+    from mission.document import sealed
+    from mission.files.atomic import write_checked
     from mission.files.exports.placing import numbers
     from mission.files.imports import read_mission
+    from mission.files.mission_json import encode, next_revision, read
+    from mission.settings import HOW, read_settings
 
     given = {"origin": origin, "start": start}
     told = {key: numbers(text, key, HOW[key]) for key, text in given.items() if text is not None}
     settings = read_settings(parameters, told)
     made, track = read_mission(file, settings, kind=kind, autopilot=autopilot)
-    mission = sealed(msgspec.structs.replace(made, revision=next_revision(out, made)))
+    mission = sealed(replace(made, revision=next_revision(out, made)))
     write_checked(out, encode(mission))
     _say_import(read(out), out, (*track.notes, UNASKED), as_json)
 
@@ -260,6 +278,8 @@ UNASKED = (
 
 
 def _say_import(mission: Mission, out: Path, notes: tuple[str, ...], as_json: bool) -> None:
+    from mission.page import identity, json_text, route_length
+
     for note in notes:
         typer.echo(f"stopgo: {note}", err=True)
     report = {

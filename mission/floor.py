@@ -48,31 +48,6 @@ class Finding:
         return Rank.GRAVE if self.code in GRAVE else Rank.NOTE if self.code in NOTES else Rank.DOUBT
 
 
-@dataclass(frozen=True)
-class Kind:
-    """What an element of a layer means to the laser and to the robot."""
-
-    name: str
-    occludes: bool
-    obstacle: bool
-    target: bool
-
-
-KINDS: dict[str, Kind] = {
-    kind.name: kind
-    for kind in (
-        Kind("walls", occludes=True, obstacle=True, target=True),
-        Kind("columns", occludes=True, obstacle=True, target=True),
-        Kind("beams", occludes=False, obstacle=False, target=True),
-        Kind("stairs", occludes=True, obstacle=True, target=False),
-        Kind("windows", occludes=False, obstacle=True, target=False),
-        Kind("railings", occludes=False, obstacle=True, target=False),
-        Kind("other", occludes=False, obstacle=True, target=False),
-    )
-}
-"""Every element kind with its defaults; `other` is a closed shape on a layer nobody named."""
-
-
 @dataclass(frozen=True, eq=False)
 class Element:
     """A building element's plan: filled shapes, open lines, or both."""

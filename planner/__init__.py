@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from mission.document import Mission
-from mission.floor import FloorPlan
-from mission.planning import Candidates, NavigableSpace
-from mission.settings import Settings
+if TYPE_CHECKING:
+    from mission.document import Mission
+    from mission.floor import FloorPlan
+    from mission.planning import Candidates, NavigableSpace
+    from mission.settings import Settings
 
 Observe = Callable[[Any], None]
 

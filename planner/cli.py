@@ -11,11 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import msgspec
 import typer
 
 from mission.errors import InputError, StopgoError
-from mission.settings import Settings, read_settings, settings_toml
 
 if TYPE_CHECKING:
     from bridge.station import Station
@@ -24,6 +22,7 @@ if TYPE_CHECKING:
     from mission.events import AnyEvent
     from mission.floor import FloorPlan
     from mission.planning import Candidates
+    from mission.settings import Settings
     from planner.report import PlanReport
     from recordings.field import FieldRecording
 
@@ -122,6 +121,8 @@ def plan_command(
     also where floor is left out or the plan is doubtful.
     """
     options = dict(locals())
+    from mission.settings import read_settings, settings_toml
+
     given = {key.rstrip("_"): value for key, value in options.items() if key not in NOT_SETTINGS}
     for key in ("start", "end", "origin"):
         given[key] = None if given[key] is None else numbers(given[key], key)
@@ -272,10 +273,12 @@ WRITTEN = ("recording", "coverage", "picture", "mission")
 
 def _revised(mission: Mission, path: Path) -> Mission:
     """The mission with the revision that replaces what is at `path`."""
+    from msgspec.structs import replace
+
     from mission.document import sealed
     from mission.files.mission_json import next_revision
 
-    return sealed(msgspec.structs.replace(mission, revision=next_revision(path, mission)))
+    return sealed(replace(mission, revision=next_revision(path, mission)))
 
 
 def _observer(
@@ -338,6 +341,7 @@ def demo_command(
 
     from bridge.spawn import robot_process
     from bridge.station import connect
+    from mission.settings import read_settings
     from recordings.compare import compare
 
     if not 0 < speed_up < 1e6:

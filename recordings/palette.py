@@ -64,7 +64,7 @@ KIND_COLOURS: dict[str, Colour] = {
     "railings": (110, 135, 225, 255),
     "other": (150, 130, 105, 255),
 }
-"""Every element kind of `mission.floor.KINDS`."""
+"""Every element kind of `mission.kinds.KINDS`."""
 
 OUTLINE: Colour = (110, 118, 135, 255)
 HOLE: Colour = (175, 95, 120, 255)

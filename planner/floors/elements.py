@@ -9,8 +9,9 @@ from functools import cached_property, partial
 import numpy as np
 import shapely
 
-from mission.floor import KINDS, Element, Finding, IgnoredLine, Room
+from mission.floor import Element, Finding, IgnoredLine, Room
 from mission.geometry import FloatArray, Polygon, frozen
+from mission.kinds import KINDS
 from planner.floors.drawn import Closed, Drawn, Oddity, Open, faces_of, hole_indices, place
 from planner.floors.rings import SNAP, Region, canonical_region, parents, polygons_of, to_shapely
 

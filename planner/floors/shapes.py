@@ -15,7 +15,8 @@ from ezdxf.math import Matrix44
 from ezdxf.xclip import XClip
 
 from mission.errors import InputError
-from mission.floor import KINDS, Finding
+from mission.floor import Finding
+from mission.kinds import KINDS
 from planner.floors.drawing import BROKEN_INPUT, legible
 
 ROLES: dict[str, str] = {

@@ -11,8 +11,9 @@ import shapely
 from ezdxf.entities import LWPolyline
 from ezdxf.math import OCS, Z_AXIS, Matrix44, Vec3
 
-from mission.floor import KINDS, Finding
+from mission.floor import Finding
 from mission.geometry import FloatArray, frozen, ring_area
+from mission.kinds import KINDS
 from planner.floors.curves import LARGEST, Curve, Fineness, curves_of
 from planner.floors.drawing import BROKEN_INPUT, legible
 from planner.floors.rings import depths

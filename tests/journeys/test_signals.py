@@ -1,17 +1,27 @@
-"""A command that is asked to end leaves by its own way out."""
+"""A command that is asked to end leaves by its own way out, and one that nobody reads ends silently."""
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 
+import pytest
+
+import mission.__main__ as front
 from tests.journeys.readme import ROOT
 
-ENDED = """
+RUN = """
 import os, signal, sys
 from contextlib import contextmanager
 import mission.__main__ as front
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background process inherits that it is ignored
+
+def hit(number=signal.SIGINT):
+    os.kill(os.getpid(), number)
 
 @contextmanager
 def left_open():
@@ -20,25 +30,119 @@ def left_open():
     finally:
         print("closed", flush=True)
 
-def app():
-    import typer
-    made = typer.Typer()
-    @made.command()
-    def wait(when: str) -> None:
-        with left_open():
-            os.kill(os.getpid(), signal.SIGTERM)
-            signal.pause()
-    return made
+def run(arguments):
+    {body}
 
-front.build_app = app
-sys.exit(front.main(["now"]))
+front._run = run
+sys.argv[1:] = []
+sys.exit(front.main())
 """
 
 
-def test_sigterm_closes_what_is_open() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", ENDED], cwd=ROOT, capture_output=True, text=True, check=False, timeout=60
-    )
-    assert done.returncode == 128 + signal.SIGTERM
-    assert done.stdout == "closed\n"
-    assert done.stderr == ""
+def process(body: str, **options: object) -> subprocess.CompletedProcess[str]:
+    """A whole process of ours whose command has this body."""
+    lines = "\n    ".join(body.strip().splitlines())
+    return subprocess.run(
+        [sys.executable, "-c", RUN.format(body=lines)],
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "cwd": ROOT, "text": True, "timeout": 60}
+        | options,
+        check=False,
+    )  # type: ignore[call-overload, no-any-return]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_closes_what_is_open(number: signal.Signals) -> None:
+    done = process(f"with left_open():\n    hit({int(number)})\n    signal.pause()")
+    assert (done.returncode, done.stdout, done.stderr) == (128 + number, "closed\n", "")
+
+
+def test_a_second_ctrl_c_on_the_way_out_leaves_no_traceback() -> None:
+    done = process("try:\n    hit()\nfinally:\n    hit()")
+    assert (done.returncode, done.stderr) == (130, "stopgo: stopped by Ctrl-C\n")
+
+
+def test_a_ctrl_c_in_the_end_of_an_object_is_not_lost() -> None:
+    done = process("class Ends:\n    def __del__(self):\n        hit()\nEnds()\nwhile True:\n    pass")
+    assert (done.returncode, done.stderr) == (130, "stopgo: stopped by Ctrl-C\n")
+
+
+def test_a_ctrl_c_when_all_is_done_ends_the_process_at_once() -> None:
+    done = process("import atexit\natexit.register(hit)\nreturn 0")
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
+
+
+def test_a_hangup_that_is_to_be_ignored_is() -> None:
+    done = process("hit(signal.SIGHUP)\nreturn 0", preexec_fn=_ignore_hangup)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def _ignore_hangup() -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+
+class Raises:
+    """A command that is interrupted, and raises something of its own instead."""
+
+    def __init__(self, error: BaseException) -> None:
+        self._error = error
+
+    def __call__(self, arguments: list[str]) -> int:
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+        except KeyboardInterrupt:
+            raise self._error from None
+        return 0
+
+
+@pytest.mark.parametrize("error", [RuntimeError(), ImportError("numpy failed to import"), OSError(4, "no")])
+def test_what_an_interrupted_library_raises_is_still_ctrl_c(
+    error: BaseException, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(front, "_run", Raises(error))
+    assert front.main([]) == 130
+    assert capsys.readouterr().err == "stopgo: stopped by Ctrl-C\n"
+
+
+def test_a_closed_pipe_ends_a_command_silently() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        done = process("print('x' * 100_000)\nreturn 0", stdout=writer)
+        small = process("print('x')\nreturn 0", stdout=writer)
+        told = process("print('x', file=sys.stderr)\nreturn 0", stderr=writer)
+    finally:
+        os.close(writer)
+    assert (done.returncode, done.stderr) == (141, "")
+    assert (small.returncode, small.stderr) == (141, "")
+    assert told.returncode == 141
+
+
+def test_a_broken_pipe_that_is_not_the_output_is_told() -> None:
+    done = process("raise BrokenPipeError(32, 'Broken pipe')")
+    assert (done.returncode, done.stderr) == (2, "stopgo: output: Broken pipe\n")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
+def test_output_without_room_is_2() -> None:
+    with open("/dev/full", "w") as full:
+        done = process("print('x')\nreturn 0", stdout=full)
+        told = process("raise front.StopgoError('no')", stderr=full)
+    assert (done.returncode, done.stderr) == (2, "stopgo: output: No space left on device\n")
+    assert told.returncode == 2
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_process_without_output_works_and_no_file_takes_its_place(number: int) -> None:
+    body = """
+print("told")
+print("said", file=sys.stderr)
+with open(os.devnull) as file:
+    return 40 + file.fileno()
+"""
+    done = process(body, preexec_fn=_closing(number))
+    assert done.returncode > 42
+    assert done.stdout + done.stderr == {1: "said\n", 2: "told\n"}[number]
+
+
+def _closing(number: int) -> Callable[[], None]:
+    return lambda: os.close(number)

@@ -20,8 +20,9 @@ from mission.document import (
     Stop,
     sealed,
 )
-from mission.floor import KINDS, Element, FloorPlan, Opening, Room
+from mission.floor import Element, FloorPlan, Opening, Room
 from mission.geometry import Polygon, frozen
+from mission.kinds import KINDS
 from mission.planning import (
     Candidates,
     NavigableSpace,

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from mission.document import Mission
-from mission.floor import KINDS, Element, FloorPlan, Opening, Room
+from mission.floor import Element, FloorPlan, Opening, Room
 from mission.geometry import FloatArray, Polygon, frozen
+from mission.kinds import KINDS
 from mission.settings import Settings
 from planner import plan
 

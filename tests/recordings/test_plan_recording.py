@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mission.floor import KINDS
 from mission.geometry import frozen
+from mission.kinds import KINDS
 from mission.planning import DROP_REASONS
 from recordings import entities, palette
 from recordings.plan import PlanRecording

@@ -11,7 +11,8 @@ from ezdxf.layouts import Modelspace
 from ezdxf.xclip import XClip
 from floor_drawings import Read, codes, rectangle
 
-from mission.floor import KINDS, FloorPlan
+from mission.floor import FloorPlan
+from mission.kinds import KINDS
 
 
 def lines_around(model: Modelspace, layer: str, corners: list[tuple[float, float]]) -> None:

@@ -1,0 +1,30 @@
+"""The kinds of elements of a floor, and what each means to the laser and to the robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What an element of a layer means to the laser and to the robot."""
+
+    name: str
+    occludes: bool
+    obstacle: bool
+    target: bool
+
+
+KINDS: dict[str, Kind] = {
+    kind.name: kind
+    for kind in (
+        Kind("walls", occludes=True, obstacle=True, target=True),
+        Kind("columns", occludes=True, obstacle=True, target=True),
+        Kind("beams", occludes=False, obstacle=False, target=True),
+        Kind("stairs", occludes=True, obstacle=True, target=False),
+        Kind("windows", occludes=False, obstacle=True, target=False),
+        Kind("railings", occludes=False, obstacle=True, target=False),
+        Kind("other", occludes=False, obstacle=True, target=False),
+    )
+}
+"""Every element kind with its defaults; `other` is a closed shape on a layer nobody named."""
