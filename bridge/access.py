@@ -34,7 +34,7 @@ def access_control(keys: Keys) -> dict[str, Any]:
 
 
 def _watching(keys: Keys) -> list[dict[str, Any]]:
-    every = Keys("*", keys.site)
+    every = Keys.of_every_robot(keys.site)
     asked = [every.info, keys.log, keys.poses, keys.mission("*", "part/*")]
     told = [f"{keys.root}/tel/*"]
     tokens = [every.alive]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bridge.console import Bar, print_json, refusals_in, say
+from bridge.console import Bar, print_json, refusals_in, say, tell
 from bridge.key_commands import key_commands
 from bridge.order_commands import Json, TakeOver, add_orders, status_json
 from bridge.tunnel_commands import tunnel_commands
@@ -290,7 +290,7 @@ def push_over_zenoh(document: Mission, way: Way, *, take_over: bool, json_: bool
     else:
         how = "already held" if accepted.already else "accepted"
         when = "; followed from the next stop on" if accepted.waits else ""
-        typer.echo(f"{robot} {how} {document.name} ({document.id[:12]} revision {document.revision}){when}")
+        tell(f"{robot} {how} {document.name} ({document.id[:12]} revision {document.revision}){when}")
 
 
 def fetch_mission(

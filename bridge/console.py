@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from mission.errors import AnswerIsNo
+from mission.table import printable, printable_lines
 
 KILOBYTES = ("kB", 1000)
 
@@ -38,7 +39,12 @@ class Bar:
 
 def say(line: str) -> None:
     """One line for the person, on stderr."""
-    print(line, file=sys.stderr, flush=True)  # noqa: T201
+    print(printable(line), file=sys.stderr, flush=True)  # noqa: T201
+
+
+def tell(text: str) -> None:
+    """What a command was asked for, on stdout; it may hold what a robot, a vehicle or a file says."""
+    print(printable_lines(text))  # noqa: T201
 
 
 @contextmanager

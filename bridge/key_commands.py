@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bridge.console import print_json
+from bridge.console import print_json, tell
 from mission.errors import InputError
 
 SiteFolder = Annotated[Path, typer.Option("--in", metavar="DIR", help="The site's folder of keys.")]
@@ -33,7 +33,7 @@ def keys_init(folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new 
     from bridge.keys import AUTHORITY, init_site, now_utc
 
     init_site(folder, now=now_utc())
-    typer.echo(f"{folder / AUTHORITY}: the site's authority; keep it away from robots and stations")
+    tell(f"{folder / AUTHORITY}: the site's authority; keep it away from robots and stations")
 
 
 def keys_issue(
@@ -52,7 +52,7 @@ def keys_issue(
     if role not in ROLES:
         raise InputError(f"role {role!r}: one of {', '.join(ROLES)}")
     files = issue(folder, role, name, now=now_utc(), days=days)
-    typer.echo(f"{files.folder}: keys of {role} {name} for {days} days; give it the folder as --keys")
+    tell(f"{files.folder}: keys of {role} {name} for {days} days; give it the folder as --keys")
 
 
 def keys_show(
@@ -80,4 +80,4 @@ def keys_show(
     for who in found:
         left = (who.not_after - now_utc()).days
         until = f"until {who.not_after:%Y-%m-%d}, {left} days" if left >= 0 else "expired"
-        typer.echo(f"{who.role:8} {who.name:20} {until}")
+        tell(f"{who.role:8} {who.name:20} {until}")

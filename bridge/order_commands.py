@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bridge.console import print_json, refusals_in
+from bridge.console import print_json, refusals_in, tell
 from bridge.ways import (
     DEFAULT_ENDPOINT,
     Connect,
@@ -145,7 +145,7 @@ def status(
     if json_:
         print_json(as_json)
     else:
-        typer.echo("\n".join(state_line(report) for report in reports))
+        tell("\n".join(state_line(report) for report in reports))
 
 
 def status_json(report: StateReport) -> dict[str, Any]:
@@ -157,7 +157,7 @@ def report_answer(answer: Answer, robot: str, json_: bool) -> None:
         print_json({"robot": robot, "verb": answer.verb, "outcome": answer.outcome,
                     "run_id": answer.run_id, "state": answer.state})  # fmt: skip
     else:
-        typer.echo(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
+        tell(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
 
 
 def state_line(report: StateReport) -> str:

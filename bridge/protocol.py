@@ -49,13 +49,19 @@ _SITE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}(/[A-Za-z0-9][A-Za-z0-9_.-]{
 
 @dataclass(frozen=True)
 class Keys:
-    """The key expressions of one robot, `[<site>/]sx/1/<robot>/…`; robot `*` stands for every robot."""
+    """The key expressions of one robot, `[<site>/]sx/1/<robot>/…`, or of every robot of a site."""
 
     robot: str
     site: str | None = None
+    every: bool = False
+    """Robot `*` stands for every robot: to ask them or hear them, never to order."""
+
+    @classmethod
+    def of_every_robot(cls, site: str | None) -> Keys:
+        return cls("*", site, every=True)
 
     def __post_init__(self) -> None:
-        if self.robot != "*" and not _NAME.fullmatch(self.robot):
+        if not self.every and not _NAME.fullmatch(self.robot):
             raise InputError(f"robot name {self.robot!r}: use letters, digits, '_', '.' and '-' (at most 64)")
         if self.site is not None and not _SITE.fullmatch(self.site):
             raise InputError(

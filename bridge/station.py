@@ -125,7 +125,7 @@ def fleet(
 
     held = None if keys is None else read_keys(keys, now=now_utc())
     with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
-        station = Station(link, Keys("*", site), commander=whoami(), timeout_s=timeout_s)
+        station = Station(link, Keys.of_every_robot(site), commander=whoami(), timeout_s=timeout_s)
         station.reach(endpoint)
         time.sleep(GATHER_S)
         infos = [decode(reply, Info) for reply in link.ask_all(station.keys.info, timeout_s=TRY_S)]
@@ -164,8 +164,9 @@ class Station:
         seen = threading.Event()
         self.link.watch_presence(self.keys.alive, lambda key, alive: seen.set() if alive else None)
         if not seen.wait(self.timeout_s):
+            who = "no robot showed" if self.keys.every else f"robot {self.keys.robot} did not show"
             raise RobotUnreachable(
-                f"{endpoint}: robot {self.keys.robot} did not show itself within {self.timeout_s:g} s"
+                f"{endpoint}: {who} itself within {self.timeout_s:g} s"
                 f" (key {self.keys.alive}); nothing was sent. Is it running, under this name and site?"
             )
 

@@ -23,6 +23,7 @@ from mission.events import (
     StateReport,
 )
 from mission.schedule import schedule
+from mission.table import printable
 
 REDRAW_S = 0.2
 LAST_EVENTS = 8
@@ -158,7 +159,7 @@ class Table:
     def _draw(self) -> None:
         lines = table_lines(self._mission, self._state, self._pose, tuple(self._events), self._silent_s)
         up = f"\x1b[{self._drawn}A" if self._drawn else ""
-        self._write(up + "".join(f"\x1b[2K{line}\n" for line in lines))
+        self._write(up + "".join(f"\x1b[2K{printable(line)}\n" for line in lines))
         # Lines of a longer table drawn before would stay below: the table never shrinks.
         self._drawn = max(self._drawn, len(lines))
 

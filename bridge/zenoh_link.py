@@ -280,8 +280,10 @@ def check_endpoint(endpoint: str, guard: Guard, *, option: str) -> None:
     protocol, _, rest = endpoint.partition("/")
     address = rest.partition("?")[0].partition("#")[0]
     host, _, port = address.rpartition(":")
-    if protocol not in (*OPEN, *ENCRYPTED) or not host or not port.isdecimal():
+    if protocol not in (*OPEN, *ENCRYPTED) or not host or not re.fullmatch("[0-9]+", port):
         raise InputError(f"{option} {endpoint}: not an endpoint; write it like tcp/127.0.0.1:7447")
+    if not 1 <= int(port) <= 65535:
+        raise InputError(f"{option} {endpoint}: {port} is no port (1 to 65535)")
     if guard.keys is None and protocol in ENCRYPTED:
         raise InputError(f"{option} {endpoint}: {protocol} needs --keys DIR; make them with stopgo keys")
     if guard.keys is not None and protocol in OPEN:
@@ -308,4 +310,4 @@ def _parameters(parameters: zenoh.Parameters) -> dict[str, str]:
 def _short(error: zenoh.ZError) -> str:
     """The part of zenoh's message that a person can use: the operating system's, if there is one."""
     found = re.search(r"[A-Z][A-Za-z ]+ \(os error \d+\)", str(error))
-    return found.group() if found else str(error).splitlines()[0][:200]
+    return found.group() if found else re.sub(r" at \S+\.rs:\d+\S*", "", str(error).splitlines()[0])[:200]

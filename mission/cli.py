@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -67,7 +68,9 @@ def check(mission: MissionFile, floor: Floor = None, as_json: AsJson = False) ->
     if as_json:
         typer.echo(json_text(_verdict(mission, document, problems)))
     elif problems:
-        typer.echo("\n".join(map(str, problems)))
+        from mission.table import printable_lines
+
+        typer.echo(printable_lines("\n".join(map(str, problems))))
     else:
         typer.echo(f"{mission}: in order; {identity(document)}, {len(document.stops)} stops")
     if problems:
@@ -222,9 +225,15 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
     return FloorDrawing(lambda: open_drawing(data, source=path)[0], metres_in(drawing, source=path))
 
 
+def _say_notes(notes: Iterable[str]) -> None:
+    from mission.table import printable
+
+    for note in notes:
+        typer.echo(f"stopgo: {printable(note)}", err=True)
+
+
 def _say_export(report: dict[str, Any], title: str, as_json: bool) -> None:
-    for note in report["notes"]:
-        typer.echo(f"stopgo: {note}", err=True)
+    _say_notes(report["notes"])
     from mission.page import json_text
 
     line = f"{report['file']}: {title}, {report['stops']} stops, read back"
@@ -280,8 +289,7 @@ UNASKED = (
 def _say_import(mission: Mission, out: Path, notes: tuple[str, ...], as_json: bool) -> None:
     from mission.page import identity, json_text, route_length
 
-    for note in notes:
-        typer.echo(f"stopgo: {note}", err=True)
+    _say_notes(notes)
     report = {
         **{"mission": str(out), "id": mission.id, "revision": mission.revision, "digest": mission.digest},
         **{"imported": mission.origin.floor, "stops": len(mission.stops), "route_m": route_length(mission)},

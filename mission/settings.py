@@ -210,7 +210,7 @@ def _shown(value: object) -> str:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -291,6 +291,9 @@ def _check_choices(settings: Settings) -> None:
         name, _, role = entry.rpartition("=")
         if not name.strip() or role.strip().lower() not in LAYER_ROLES:
             raise InputError(f"layers = {entry}: write NAME=KIND; kinds: {', '.join(LAYER_ROLES)}")
+    for x, y, radius in settings.avoid:
+        if radius <= 0:
+            raise InputError(f"avoid = {x:g},{y:g},{radius:g}: the radius must be greater than 0")
     if settings.targets == ():
         raise InputError(f"targets is empty; known: {', '.join(KINDS)}")
     if settings.tour == "closed" and settings.end is not None:

@@ -23,6 +23,11 @@ def printable(content: str) -> str:
     return "".join(letter if letter.isprintable() else "\ufffd" for letter in content)
 
 
+def printable_lines(content: str) -> str:
+    """Text of several lines, each of them `printable`."""
+    return "\n".join(map(printable, content.split("\n")))
+
+
 def duration(seconds: float) -> str:
     """Seconds as a person reads them: `0:42`, `12:05`, `1:02:03`."""
     minutes, rest = divmod(round(seconds), 60)

@@ -147,7 +147,9 @@ NOT_SETTINGS = ("floor", "out", "parameters", "all_parts", "strict", "print_conf
 
 def _print(reports: list[PlanReport], *, as_json: bool) -> None:
     if not as_json:
-        typer.echo("\n".join(report.as_text() for report in reports))
+        from mission.table import printable_lines
+
+        typer.echo(printable_lines("\n".join(report.as_text() for report in reports)))
         return
     told = reports[0].as_json()
     if len(reports) > 1:

@@ -29,8 +29,10 @@ def review(
         told = [item.as_json() for item in reviews]
         typer.echo(json.dumps(told[0] if len(told) == 1 else {"recordings": told}, ensure_ascii=False))
     else:
+        from mission.table import printable_lines
+
         lines = (f"{path}: {item.as_text()}" for path, item in zip(recordings, reviews, strict=True))
-        typer.echo("\n".join(lines))
+        typer.echo(printable_lines("\n".join(lines)))
     if view:
         from recordings.viewer import open_viewer
 

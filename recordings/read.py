@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import warnings
@@ -16,6 +15,9 @@ from rerun.chunk import Chunk, RrdReader, StoreEntry
 
 from mission.errors import InputError
 from recordings import entities
+
+MARK = b"RRF2"
+"""How a recording begins that this Rerun can read."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ def check_apart(path: Path) -> Contents:
 
     So another process reads the file first.
     """
+    _must_look_like_one(path)
     script = "import sys, pathlib, recordings.read as r; r.check(pathlib.Path(sys.argv[1]))"
     reader = subprocess.run([sys.executable, "-c", script, str(path)], capture_output=True, check=False)
     if reader.returncode < 0:
@@ -112,10 +115,7 @@ def _take_property(properties: dict[str, dict[str, Any]], chunk: Chunk) -> None:
 
 
 def _open(path: Path) -> tuple[RrdReader, list[StoreEntry]]:
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    if os.path.getsize(path) == 0:
-        raise InputError(f"{path}: is empty")
+    _must_look_like_one(path)
     try:
         with warnings.catch_warnings():
             # A file without a footer is told by `Contents.complete`.
@@ -124,6 +124,22 @@ def _open(path: Path) -> tuple[RrdReader, list[StoreEntry]]:
             return reader, reader.recordings()
     except (RuntimeError, ValueError) as error:
         raise InputError(f"{path}: {_fault(path, error)}") from None
+
+
+def _must_look_like_one(path: Path) -> None:
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name the recordings in it, as {path}/*.rrd")
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    try:
+        with path.open("rb") as file:
+            begin = file.read(len(MARK))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    if not begin:
+        raise InputError(f"{path}: is empty")
+    if begin != MARK:
+        raise InputError(f"{path}: is not a Rerun recording")
 
 
 def _fault(path: Path, error: Exception) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
-from bridge.console import Bar, print_json, say
+from bridge.console import Bar, print_json, say, tell
 from bridge.mavlink.desk.logbook import forget, logbook, remember
 from bridge.mavlink.desk.standing import check_run_over
 from bridge.mavlink.line.origin import check_origin
@@ -105,9 +105,9 @@ def fetch_mission(line: Line, *, out: Path | None, as_json: bool) -> None:
         shown = {"file": str(out)} if out is not None else {"items": [_item_json(item) for item in own]}
         print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot, "count": len(own), **shown})
     elif out is not None:
-        print(f"{out}: the {len(own)} items that {peer} holds")  # noqa: T201
+        tell(f"{out}: the {len(own)} items that {peer} holds")
     else:
-        print(_page(peer, own))  # noqa: T201
+        tell(_page(peer, own))
 
 
 def clear_mission(line: Line, *, state: Path | None, while_running: bool, as_json: bool) -> None:
@@ -120,7 +120,7 @@ def clear_mission(line: Line, *, state: Path | None, while_running: bool, as_jso
     if as_json:
         print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot, "had": had})
     else:
-        print(f"{peer} holds no mission (it had {had} items)")  # noqa: T201
+        tell(f"{peer} holds no mission (it had {had} items)")
 
 
 def _translated(mission: Mission, autopilot: str, writing: Writing) -> ItemList:
@@ -172,7 +172,7 @@ def _report_push(
         })  # fmt: skip
         return
     how = "held it already" if done.already else "read back and compared"
-    print(  # noqa: T201
+    tell(
         f"{peer} holds {mission.name} ({mission.id[:12]} revision {mission.revision}): "
         f"{done.items} items for {len(mission.stops)} stops, {how}"
     )

@@ -94,7 +94,7 @@ class _Repeated:
 
 def _parse_json(data: bytes, name: str) -> dict[str, Any]:
     try:
-        document = json.loads(data.decode("utf-8"), object_pairs_hook=_object)
+        document = json.loads(data.decode("utf-8-sig"), object_pairs_hook=_object)
         _check_values(document, name)
     except UnicodeDecodeError as error:
         raise InputError(f"{name}: not UTF-8 text (byte {error.start}); give a mission.json") from None

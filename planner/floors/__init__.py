@@ -27,11 +27,11 @@ def read_floor(path: Path, *, d_dis: float, layers: Mapping[str, str] | None = N
     InputError
         One line naming the file, what is wrong with it, and the way out.
     """
+    data = _bytes_of(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         known = ", ".join(READERS)
         raise InputError(f"{path}: unknown kind of file '{path.suffix}'; floors are read from {known}")
-    data = _bytes_of(path)
     digest = hashlib.sha256(data).hexdigest()
     return reader(data, source=path, digest=digest, d_dis=d_dis, layers=layers or {})
 

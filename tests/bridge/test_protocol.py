@@ -54,11 +54,11 @@ def test_keys_are_those_of_the_document() -> None:
         assert key.startswith("north/hall/sx/1/r1/")
         assert f"`{key.removeprefix('north/hall/sx/1/r1/')}`" in TEXT
     assert str(protocol.VERSION) in keys.root
-    assert Keys("*", "north").robot_of("north/sx/1/r7/alive") == "r7"
+    assert Keys.of_every_robot("north").robot_of("north/sx/1/r7/alive") == "r7"
 
 
 @pytest.mark.parametrize(
-    ("robot", "site"), [("", None), ("a/b", None), ("**", None), ("r1", "a//b"), ("r1", "/a")]
+    ("robot", "site"), [("", None), ("a/b", None), ("*", None), ("**", None), ("r1", "a//b"), ("r1", "/a")]
 )
 def test_names_that_are_no_keys_are_refused(robot: str, site: str | None) -> None:
     with pytest.raises(InputError, match="use letters"):

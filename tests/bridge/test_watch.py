@@ -16,6 +16,7 @@ from bridge import cli
 from bridge.agent import Agent
 from bridge.bodies import pose_of
 from bridge.clock import WallClock
+from bridge.console import say, tell
 from bridge.controller import Controller
 from bridge.follow import Report, Silence
 from bridge.journal import memory_journal
@@ -27,7 +28,7 @@ from bridge.watch import Lines, Table, clock, remaining_s, table_lines, watch_sh
 from mission.__main__ import main
 from mission.document import Mission
 from mission.errors import OutcomeUnknown
-from mission.events import AnyEvent, PoseReport, Scanned, StateReport
+from mission.events import AnyEvent, Held, PoseReport, Scanned, StateReport
 from mission.schedule import schedule
 from tests.bridge.world import Field, corridor
 from tests.disk import small_disk
@@ -92,6 +93,24 @@ def test_lines_tell_events_and_silence_but_not_every_pose() -> None:
         lines.show(report)
     assert len(said) == len(field.journal.events()) + 1
     assert said[-1] == "no word for 3 s"
+
+
+def test_a_robot_cannot_colour_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    held = Held(
+        number=1, robot="r1", boot_id="b", run_id="1", mission_id="m", revision=1, robot_ns=0,
+        mission_time_s=0.0, reason=RED,
+    )  # fmt: skip
+    written: list[str] = []
+    table = Table(written.append)
+    table.show(Field().controller.report())
+    table.show(held)
+    Lines(say).show(held)
+    tell(f"one\n{RED}")
+    assert RED not in written[-1]
+    assert RED not in "".join(capsys.readouterr())
+
+
+RED = "\x1b[31m"
 
 
 def test_a_duration_reads_as_a_clock() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,7 +58,7 @@ def read_stretches(path: Path, mission: Mission) -> Stretches:
         When the file cannot be read, or tells the coverage of another mission.
     """
     try:
-        coverage = msgspec.json.decode(path.read_bytes(), type=_Coverage)
+        coverage = msgspec.json.decode(path.read_bytes().removeprefix(BOM_UTF8), type=_Coverage)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give a coverage.json") from None
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
