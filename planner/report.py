@@ -159,7 +159,7 @@ def coverage_lines(figures: Figures) -> list[str]:
     whole, unit = figures.whole, figures.unit
     lines = [
         f"  coverage    {percent(whole.coverage)} of the {percent(whole.visible_share)} that can be seen "
-        f"({whole.seen:.0f} of {whole.visible:.0f} of {whole.total:.0f} {unit})"
+        f"(seen {whole.seen:.0f} of visible {whole.visible:.0f} of all {whole.total:.0f} {unit})"
     ]
     lines += [_line("kind", share, unit) for share in figures.kinds]
     lines += [_line("room", share, unit) for share in figures.rooms[:MOST_ROOMS]]

@@ -58,7 +58,7 @@ def facts_of(route: Route, mission: Mission, *, date: str) -> list[tuple[str, st
         ("Floor digest", mission.origin.floor_digest[:12]),
         ("Date", date),
         ("Scanner", f"{mission.scanner.profile}, range {mission.scanner.range:g} m"),
-        ("Stops", f"{len(mission.stops)}; of these candidates at least {selection.bound} are needed"),
+        ("Stops", f"{len(mission.stops)}, of these candidates at least {selection.bound}"),
         (
             "Coverage",
             f"{100 * selection.coverage:.1f} % of what is in sight, {_required(selection.required)}",
