@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -28,6 +29,12 @@ class Mesh:
     @property
     def triangles(self) -> int:
         return len(self.corners)
+
+    @cached_property
+    def tree(self) -> shapely.STRtree:
+        """The triangles in metres."""
+        xy = self.vertices[self.corners] * GRID
+        return shapely.STRtree(shapely.polygons(np.concatenate([xy, xy[:, :1]], axis=1)))
 
 
 def mesh_of(region: BaseGeometry) -> Mesh:
@@ -103,8 +110,7 @@ def _neighbours(corners: IntArray) -> IntArray:
 
 def containing(mesh: Mesh, points: NDArray[np.int64]) -> tuple[IntArray, IntArray]:
     """(point, triangle) pairs for every triangle, edges included, that holds a grid point."""
-    tree = shapely.STRtree(_triangle_shapes(mesh))
-    point, triangle = tree.query(shapely.points(points * GRID), predicate="dwithin", distance=2 * GRID)
+    point, triangle = mesh.tree.query(shapely.points(points * GRID), predicate="dwithin", distance=2 * GRID)
     inside = np.ones(len(point), dtype=bool)
     q = points[point]
     for k in range(3):
@@ -114,8 +120,3 @@ def containing(mesh: Mesh, points: NDArray[np.int64]) -> tuple[IntArray, IntArra
         inside &= turn >= 0
     order = np.lexsort((triangle[inside], point[inside]))
     return point[inside][order], triangle[inside][order]
-
-
-def _triangle_shapes(mesh: Mesh) -> NDArray[np.object_]:
-    xy = mesh.vertices[mesh.corners] * GRID
-    return shapely.polygons(np.concatenate([xy, xy[:, :1]], axis=1))

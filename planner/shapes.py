@@ -111,7 +111,7 @@ def _in_steps(shape: BaseGeometry) -> BaseGeometry:
 
 
 def _in_metres(steps: BaseGeometry) -> BaseGeometry:
-    return shapely.transform(steps, lambda xy: np.rint(xy) * GRID)
+    return shapely.transform(steps, lambda xy: np.rint(xy) / round(1 / GRID))  # 0.3, not 0.30000000000000004
 
 
 def _settled(steps: BaseGeometry) -> BaseGeometry:

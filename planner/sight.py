@@ -124,9 +124,7 @@ def _units_in_triangles(
         return np.empty(0, np.int64), np.empty(0, np.int64)
     odd, pieces = 2 * number + 1, 2 * units
     middle = (a + (odd / pieces)[:, None] * (b - a)) * GRID
-    xy = mesh.vertices[mesh.corners] * GRID
-    tree = shapely.STRtree(shapely.polygons(np.concatenate([xy, xy[:, :1]], axis=1)))
-    unit, triangle = tree.query(shapely.points(middle), predicate="dwithin", distance=2 * GRID)
+    unit, triangle = mesh.tree.query(shapely.points(middle), predicate="dwithin", distance=2 * GRID)
     inside = np.ones(len(unit), dtype=bool)
     for k in range(3):
         p = mesh.vertices[mesh.corners[triangle, k]]
@@ -140,30 +138,50 @@ def _turns(p: IntArray, q: IntArray, r: IntArray) -> IntArray:
     return (q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0])
 
 
-def sight(scene: Scene, viewpoints: NDArray[np.int64], *, reach: float | None) -> Runs:
-    """Everything each viewpoint (grid steps) sees within `reach` metres (None: no limit)."""
-    point, triangle = containing(scene.mesh, viewpoints)
+def sight(
+    scene: Scene, viewpoints: NDArray[np.int64], *, reach: float | None, between: IntArray | None = None
+) -> Runs:
+    """Everything each viewpoint (n, 2), in grid steps, sees within `reach` metres (None: no limit).
+
+    With `between` (n, 2, 2) it looks only from the direction of the first point on, to the left, to that of
+    the second, less than a half turn; all round where both points are the viewpoint itself.
+    """
+    mesh = scene.mesh
+    point, triangle = containing(mesh, viewpoints)
     start = np.searchsorted(point, np.arange(len(viewpoints) + 1)).astype(np.int64)
+    limits = np.empty((0, 2, 2), dtype=np.int64) if between is None else between
+    right, left = (_limits(mesh, viewpoints, limits, side)[point] for side in range(2))
+    vertices = np.concatenate([mesh.vertices, limits[:, 0], limits[:, 1]])
     steps = -1 if reach is None else min(round(reach / GRID), FARTHEST)
     arrays = [
         np.ascontiguousarray(array, dtype=np.int64)
         for array in (
-            *(viewpoints[:, 0], viewpoints[:, 1], start, triangle),
-            *(scene.mesh.vertices[:, 0], scene.mesh.vertices[:, 1]),
-            *(scene.mesh.corners.ravel(), scene.mesh.neighbour.ravel(), scene.face.ravel()),
+            *(viewpoints[:, 0], viewpoints[:, 1], start, triangle, right, left),
+            *(vertices[:, 0], vertices[:, 1]),
+            *(mesh.corners.ravel(), mesh.neighbour.ravel(), scene.face.ravel()),
             *(scene.bucket_pointer, scene.bucket_segment, scene.bucket_low, scene.bucket_high),
             *(scene.a[:, 0], scene.a[:, 1], scene.b[:, 0], scene.b[:, 1], scene.units),
         )
     ]
-    work = len(viewpoints) * scene.mesh.triangles * (UNLIMITED if reach is None else 1)
+    work = len(viewpoints) * mesh.triangles * (UNLIMITED if reach is None else 1)
     if work > COMPILE_ABOVE:
-        return _run(compiled(look_all, *HELPERS), arrays, steps, interpreted=False)
-    return _run(look_all, [array.tolist() for array in arrays], steps, interpreted=True)
+        return _run(compiled(look_all, *HELPERS), arrays, steps, mesh.triangles, interpreted=False)
+    return _run(look_all, [array.tolist() for array in arrays], steps, mesh.triangles, interpreted=True)
 
 
-def _run(kernel: Callable[..., int], arrays: list[Any], reach: int, *, interpreted: bool) -> Runs:
+def _limits(mesh: Mesh, viewpoints: IntArray, limits: IntArray, side: int) -> IntArray:
+    """The vertex, after those of the mesh, that limits what each viewpoint looks at on one side; else -1."""
+    if not len(limits):
+        return np.full(len(viewpoints), -1, dtype=np.int64)
+    number = len(mesh.vertices) + side * len(limits) + np.arange(len(limits))
+    return np.where((limits[:, side] == viewpoints).all(axis=1), -1, number)
+
+
+def _run(
+    kernel: Callable[..., int], arrays: list[Any], reach: int, triangles: int, *, interpreted: bool
+) -> Runs:
     """Call the kernel, again with more room for its output whenever that ran out."""
-    rows, triangles = len(arrays[0]), len(arrays[8]) // 3
+    rows = len(arrays[0])
     stack = _zeros(4 * (2 * triangles + 16), interpreted=interpreted)
     pointer = _zeros(rows + 1, interpreted=interpreted)
     out = [_zeros(max(4096, 32 * rows), interpreted=interpreted) for _ in range(3)]

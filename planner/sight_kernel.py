@@ -37,6 +37,11 @@ def turn(px: int, py: int, qx: int, qy: int, rx: int, ry: int) -> int:
     return (qx - px) * (ry - py) - (qy - py) * (rx - px)
 
 
+def between(px: int, py: int, rx: int, ry: int, qx: int, qy: int, lx: int, ly: int) -> bool:
+    """Whether the ray from p to q lies strictly between those to r and, less than a half turn on, to l."""
+    return turn(px, py, rx, ry, qx, qy) > 0 and turn(px, py, qx, qy, lx, ly) > 0
+
+
 def not_negative(at_a: Any, at_b: Any, odd: Any, pieces: Any) -> Any:
     """Whether the linear function that is `at_a` at a and `at_b` at b is >= 0 at the fraction odd / pieces.
 
@@ -160,6 +165,8 @@ def look(
     qy: Any,
     start_pointer: Any,
     start_triangle: Any,
+    start_right: Any,
+    start_left: Any,
     vx: Any,
     vy: Any,
     corner: Any,
@@ -187,7 +194,8 @@ def look(
     Parameters
     ----------
     qx, qy
-        Viewpoints. `start_pointer[row]` to `start_pointer[row + 1]` index the triangles that hold one.
+        Viewpoints. `start_pointer[row]` to `start_pointer[row + 1]` index the triangles that hold one,
+        and the vertices right and left of what it looks at, less than a half turn; or -1 for all round.
     vx, vy, corner, neighbour, face
         The mesh, three entries per triangle; `face` is the target segment on that edge or -1.
     bucket_pointer, bucket_segment, bucket_low, bucket_high
@@ -206,7 +214,8 @@ def look(
     count = begin
     top = 0
     for s in range(start_pointer[row], start_pointer[row + 1]):
-        stack[top], stack[top + 1], stack[top + 2], stack[top + 3] = start_triangle[s], -1, -1, -1
+        stack[top], stack[top + 1] = start_triangle[s], -1
+        stack[top + 2], stack[top + 3] = start_right[s], start_left[s]
         top += 4
     while top > 0:
         top -= 4
@@ -216,7 +225,7 @@ def look(
             segment = bucket_segment[item]
             low, high = bucket_low[item], bucket_high[item]
             n = units[segment]
-            if entry >= 0:
+            if right >= 0:
                 at_a = turn(x, y, vx[right], vy[right], ax[segment], ay[segment])
                 at_b = turn(x, y, vx[right], vy[right], bx[segment], by[segment])
                 low, high = clip_side(at_a, at_b, n, low, high)
@@ -240,6 +249,14 @@ def look(
                 if turn(x, y, vx[a], vy[a], vx[b], vy[b]) <= 0:
                     continue
                 new_right, new_left = a, b
+                if right >= 0:
+                    if not between(x, y, vx[right], vy[right], vx[a], vy[a], vx[left], vy[left]):
+                        to_right = turn(x, y, vx[a], vy[a], vx[right], vy[right])
+                        if to_right < 0 or turn(x, y, vx[right], vy[right], vx[b], vy[b]) <= 0:
+                            continue
+                        new_right = right
+                    if not between(x, y, vx[right], vy[right], vx[b], vy[b], vx[left], vy[left]):
+                        new_left = left
             else:
                 new_right, new_left = right, left
                 if turn(x, y, vx[right], vy[right], vx[a], vy[a]) > 0:
@@ -302,6 +319,7 @@ def look_all(first_row: int, pointer: Any, qx: Any, *scene_and_output: Any) -> i
 
 HELPERS = (
     turn,
+    between,
     not_negative,
     within_reach,
     first_not_negative,

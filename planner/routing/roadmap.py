@@ -21,6 +21,8 @@ from planner.routing.ways import Ways, shortest_ways
 from planner.shapes import GRID, local_origin, polygon_parts, snapped, to_grid, to_shape, whole_steps
 from planner.sight import scene_of, sight
 
+PAIRS = 1_000_000
+"""Pairs of nodes held at a time, about 200 bytes each."""
 TOUCH = 1e-9
 """Products of areas (m⁴) below this are float noise."""
 
@@ -34,8 +36,12 @@ def ways_between(space: NavigableSpace, points: FloatArray) -> Ways:
     nodes = np.concatenate([points - origin, corners.xy, ends, anchors])
     links = crossing.reshape(-1, 2) + len(points) + len(corners.xy)
     to_anchors = np.stack([anchored, np.arange(len(nodes) - len(anchors), len(nodes))], axis=1)
-    seen = _tangent(_in_sight(space, nodes), nodes, corners, first=len(points))
-    edges = [seen, links, on_crossings(points - origin, nodes, links), to_anchors]
+    edges = [
+        _pieces(space, nodes, corners, first=len(points)),
+        links,
+        on_crossings(points - origin, nodes, links),
+        to_anchors,
+    ]
     return shortest_ways(nodes + origin, np.concatenate(edges), len(points))
 
 
@@ -60,9 +66,9 @@ def outward_corners(space: NavigableSpace) -> Corners:
     """Every corner once, in a canonical order."""
     found, sides = [np.empty((0, 2))], [np.empty((0, 2, 2))]
     for piece in polygon_parts(_drive_area(space)):
-        for ring, sign in _oriented_rings(piece):
+        for ring in _oriented_rings(piece):
             back, on = np.roll(ring, 1, axis=0) - ring, np.roll(ring, -1, axis=0) - ring
-            outward = sign * _cross(back, on) > 0
+            outward = _cross(back, on) > 0
             found.append(ring[outward])
             sides.append(np.stack([back, on], axis=1)[outward])
     xy, first, times = np.unique(np.concatenate(found), axis=0, return_index=True, return_counts=True)
@@ -74,11 +80,10 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return product
 
 
-def _oriented_rings(piece: shapely.Polygon) -> list[tuple[FloatArray, float]]:
+def _oriented_rings(piece: shapely.Polygon) -> list[FloatArray]:
     """Rings with the drive area on the left: the exterior counter-clockwise, holes clockwise."""
-    rings = [(np.asarray(piece.exterior.coords), piece.exterior.is_ccw)]
-    rings += [(shapely.get_coordinates(hole), not hole.is_ccw) for hole in piece.interiors]
-    return [(ring[:-1], 1.0 if along else -1.0) for ring, along in rings]
+    turned = shapely.orient_polygons(piece)
+    return [shapely.get_coordinates(ring)[:-1] for ring in (turned.exterior, *turned.interiors)]
 
 
 def _drive_area(space: NavigableSpace) -> BaseGeometry:
@@ -95,27 +100,48 @@ def on_crossings(points: FloatArray, nodes: FloatArray, links: IntArray) -> IntA
     return np.stack([np.repeat(point, 2), links[way].ravel()], axis=1).astype(np.int64)
 
 
-def _in_sight(space: NavigableSpace, nodes: FloatArray) -> IntArray:
-    """Pairs (m, 2) of nodes that see each other."""
-    mesh = mesh_of(whole_steps(_drive_area(space)))
-    ones = np.ones(len(nodes), dtype=np.int64)
-    scene = scene_of(mesh, nodes, nodes, ones, np.zeros(len(nodes), dtype=bool))
-    runs = sight(scene, to_grid(nodes), reach=None)
-    start = np.repeat(np.arange(len(nodes)), np.diff(runs.pointer))
-    return np.stack([start, runs.segment], axis=1)
+def _pieces(space: NavigableSpace, nodes: FloatArray, corners: Corners, *, first: int) -> IntArray:
+    """Pairs (m, 2) of nodes that see each other and between which a shortest way may lead straight.
 
-
-def _tangent(edges: IntArray, nodes: FloatArray, corners: Corners, *, first: int) -> IntArray:
-    """The edges that a shortest way may use: straight on from a corner, they pass by it.
-
-    Where both sides of a corner do not lie on one side of the edge, the way would cut the corner shorter.
-    Nodes from `first` on are the corners. What is too close to tell is kept.
+    Nodes from `first` on are the corners. Among round columns some hundred times as many pairs see each
+    other, so from a corner only those are looked for that pass by it, and PAIRS are held at a time.
     """
     sides = np.zeros((len(nodes), 2, 2))
     sides[first : first + len(corners.xy)] = corners.sides
-    along = (nodes[edges[:, 1]] - nodes[edges[:, 0]])[:, None]
-    useful = np.ones(len(edges), dtype=bool)
+    ones = np.ones(len(nodes), dtype=np.int64)
+    mesh = mesh_of(whole_steps(_drive_area(space)))
+    scene = scene_of(mesh, nodes, nodes, ones, np.zeros(len(nodes), dtype=bool))
+    node, between = views_of(to_grid(nodes), to_grid(sides))
+    rows = 1 + PAIRS // len(nodes)
+    found = []
+    for k in range(0, len(node), rows):
+        chosen = node[k : k + rows]
+        runs = sight(scene, to_grid(nodes[chosen]), reach=None, between=between[k : k + rows])
+        pairs = np.stack([np.repeat(chosen, np.diff(runs.pointer)), runs.segment], axis=1)
+        found.append(_tangent(pairs, nodes, sides))
+    return np.concatenate(found)
+
+
+def views_of(nodes: IntArray, sides: IntArray) -> tuple[IntArray, IntArray]:
+    """Which nodes look and between which two points (n, 2, 2): all round, or to both sides past a corner.
+
+    A way that passes by a corner leaves it between one of its sides and the other one drawn on beyond it.
+    """
+    back, on = nodes + sides[:, 0], nodes + sides[:, 1]
+    left, right = np.stack([on, nodes - sides[:, 0]], axis=1), np.stack([nodes - sides[:, 1], back], axis=1)
+    corner = np.flatnonzero(sides.any(axis=(1, 2)))
+    node = np.concatenate([np.arange(len(nodes)), corner])
+    return node, np.concatenate([left, right[corner]])
+
+
+def _tangent(edges: IntArray, nodes: FloatArray, sides: FloatArray) -> IntArray:
+    """The edges that a shortest way may use: straight on from a corner, they pass by it.
+
+    Where both sides of a corner (n, 2, 2) do not lie on one side of the edge, the way would cut the corner
+    shorter. What is too close to tell is kept.
+    """
     for end in range(2):
+        along = (nodes[edges[:, 1]] - nodes[edges[:, 0]])[:, None]
         turn = _cross(along, sides[edges[:, end]])
-        useful &= turn[:, 0] * turn[:, 1] >= -TOUCH
-    return edges[useful]
+        edges = edges[turn[:, 0] * turn[:, 1] >= -TOUCH]
+    return edges

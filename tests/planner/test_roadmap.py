@@ -10,13 +10,16 @@ import pytest
 import shapely
 
 from mission.floor import FloorPlan
+from mission.geometry import Polygon
 from mission.planning import NavigableSpace
 from mission.settings import Settings
+from planner.floors import read_floor
 from planner.navigable import navigable
 from planner.routing import roadmap
 from planner.routing.roadmap import outward_corners, ways_between
+from planner.routing.ways import Ways
 from planner.shapes import local_origin, snapped, to_shape
-from tests.planner.worlds import SHARED, box, column, hall, two_rooms, wall
+from tests.planner.worlds import PAPER, SHARED, box, column, element, hall, two_rooms, wall
 
 SETTINGS = Settings(robot_radius=0.3, edge=0.3)
 
@@ -70,12 +73,20 @@ def test_ways_are_as_short_as_over_every_corner(seed: int) -> None:
             assert np.isclose(np.hypot(*np.diff(line, axis=0).T).sum(), found.lengths[a, b])
 
 
+def look_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let all nodes look all round, and keep whatever they see."""
+    monkeypatch.setattr(roadmap, "_tangent", lambda edges, *_: edges)
+    monkeypatch.setattr(
+        roadmap, "views_of", lambda nodes, _: (np.arange(len(nodes)), np.stack([nodes, nodes], axis=1))
+    )
+
+
 @pytest.mark.parametrize("seed", range(8, 14))
 def test_edges_that_cut_corners_are_not_missed(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     space = navigable(random_floor(seed), SETTINGS)
     points = free_points(space, 8, seed)
     reduced = ways_between(space, points)
-    monkeypatch.setattr(roadmap, "_tangent", lambda edges, *_, **__: edges)
+    look_everywhere(monkeypatch)
     full = ways_between(space, points)
     assert np.array_equal(reduced.lengths, full.lengths)
 
@@ -99,13 +110,56 @@ def test_points_in_rooms_that_are_not_connected_have_no_way() -> None:
     assert np.isinf(lengths[0, 1])
 
 
-@pytest.mark.skipif(not SHARED.exists(), reason="the shared floors are not here")
-def test_the_reduction_keeps_every_length_on_a_real_floor(monkeypatch: pytest.MonkeyPatch) -> None:
-    from planner.floors import read_floor
+def columned(across: int) -> NavigableSpace:
+    """A hall with across × across round columns, one every 4 m."""
+    angles = np.arange(40) * (2 * np.pi / 40)
+    ring = np.c_[np.cos(angles), np.sin(angles)] * 0.3
+    places = [(4.0 * i + 2, 4.0 * k + 2) for i in range(across) for k in range(across)]
+    columns = [element(f"c{k}", "columns", Polygon.of(ring + xy)) for k, xy in enumerate(places)]
+    return navigable(hall(4.0 * across, 4.0 * across, *columns), SETTINGS)
 
-    space = navigable(read_floor(SHARED / "layered" / "fzk-haus-eg.dxf", d_dis=0.05), Settings())
+
+def test_among_round_columns_few_pairs_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    space = columned(3)
+    points = np.array([(0.5, 0.5), (11.5, 11.5), (4.0, 8.0)])
+    few, looked_at = counted(space, points, monkeypatch)
+    look_everywhere(monkeypatch)
+    full, everywhere = counted(space, points, monkeypatch)
+    assert np.array_equal(few.lengths, full.lengths)
+    assert looked_at < 0.15 * everywhere
+
+
+def counted(space: NavigableSpace, points: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> tuple[Ways, int]:
+    """The ways, and how many pairs of nodes were looked at."""
+    pairs: list[int] = []
+    tangent = roadmap._tangent
+
+    def counting(edges: np.ndarray, *others: np.ndarray) -> np.ndarray:
+        pairs.append(len(edges))
+        return tangent(edges, *others)
+
+    with monkeypatch.context() as context:
+        context.setattr(roadmap, "_tangent", counting)
+        return ways_between(space, points), sum(pairs)
+
+
+def test_pairs_are_looked_at_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    space = columned(2)
+    points = np.array([(0.5, 0.5), (7.5, 7.5)])
+    whole = ways_between(space, points)
+    monkeypatch.setattr(roadmap, "PAIRS", 1000)
+    pieces = ways_between(space, points)
+    assert np.array_equal(whole.lengths, pieces.lengths)
+    assert np.array_equal(whole.graph.indices, pieces.graph.indices)
+
+
+@pytest.mark.parametrize("name", ["layered/fzk-haus-eg.dxf", "layered/duplex-l1.dxf", *PAPER])
+def test_the_reduction_keeps_every_length_on_a_real_floor(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not (SHARED / name).exists():
+        pytest.skip(f"{SHARED / name} is not there")
+    space = navigable(read_floor(SHARED / name, d_dis=0.05), Settings())
     area = to_shape(space.drive_area, np.zeros(2))
     points = np.array([part.representative_point().coords[0] for part in shapely.get_parts(area)])
     reduced = ways_between(space, points)
-    monkeypatch.setattr(roadmap, "_tangent", lambda edges, *_, **__: edges)
+    look_everywhere(monkeypatch)
     assert np.array_equal(reduced.lengths, ways_between(space, points).lengths)

@@ -12,6 +12,7 @@ import planner.sight
 from planner.mesh import containing, mesh_of
 from planner.shapes import GRID, polygon_parts, snapped_union, to_grid, whole_steps
 from planner.sight import Runs, Scene, scene_of, sight
+from planner.sightlines import Midpoints
 from planner.targets import face_segments, units_on
 from tests.planner.oracle import visible_pairs
 
@@ -52,6 +53,12 @@ class World:
         """Look from these points, but for those within occluders."""
         inside = shapely.contains_properly(self.occluders, shapely.points(viewpoints))
         self.viewpoints = to_grid(viewpoints[~inside])
+
+    def ways(self) -> np.ndarray:
+        """From each viewpoint to each unit's midpoint, times its pieces (viewpoints, units, 2)."""
+        mid = Midpoints.of(to_grid(self.a), to_grid(self.b), self.units, self.is_face)
+        at = (mid.pieces - mid.odd)[:, None] * mid.a + mid.odd[:, None] * mid.b
+        return at - mid.pieces[:, None] * self.viewpoints[:, None]
 
     def scene(self) -> Scene:
         return scene_of(mesh_of(self.open), self.a, self.b, self.units, self.is_face)
@@ -130,6 +137,32 @@ def test_sight_between_free_points_is_symmetric(reach: float | None) -> None:
         seen = point_sight(world, reach)
         assert np.array_equal(seen, seen.T), seed
         assert seen.diagonal().all()
+
+
+@pytest.mark.parametrize("compile_above", [-1, np.inf])
+def test_a_limited_look_sees_what_lies_between_its_limits(
+    compile_above: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What lies on a limit may need a ray turned beyond it, so only what lies between is certain."""
+    monkeypatch.setattr(planner.sight, "COMPILE_ABOVE", compile_above)
+    for seed in range(20):
+        world = lattice_world(6000 + seed)
+        random = np.random.default_rng(seed)
+        way = random.integers(-8, 9, (len(world.viewpoints), 2, 2)) * 10_000
+        way[turn_to(way[:, 0], way[:, 1]) <= 0] = 0
+        between = world.viewpoints[:, None] + way
+        found = sight(world.scene(), world.viewpoints, reach=4.0, between=between)
+        limited, whole = matrix(found, world.units), world.by_kernel(4.0)
+        right, left = (turn_to(way[:, k, None], world.ways()) * (1 - 2 * k) for k in range(2))
+        everywhere = ~way.any(axis=(1, 2))[:, None]
+        assert not (limited & ~whole).any()
+        assert not (limited & ~everywhere & ((right < 0) | (left < 0))).any()
+        assert not (whole & ~limited & (everywhere | ((right > 0) & (left > 0)))).any()
+
+
+def turn_to(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Above 0 where the other way leads to the left of the one."""
+    return one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]
 
 
 def test_more_range_never_sees_less() -> None:
