@@ -30,7 +30,7 @@ faults: $(STAMP)
 	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults
 
 benchmarks: $(STAMP)
-	for name in paper visibility tours growth bridge fleet mavlink; do $(BIN)/python -m benchmarks.$$name || exit 1; done
+	for name in paper shares visibility tours growth bridge fleet mavlink; do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 clean:
 	rm -rf $(VENV) recordings/demo .pytest_cache .mypy_cache .ruff_cache

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from mission.figures import Figures, Share, worst_first
@@ -25,23 +27,32 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
     reached = _reached_m2(candidates, parts)
     findings = (*space.findings, *doubts_of(route, reached_m2=reached))
     touching = {id(item) for item in findings if near_a_leg(item, route)}
-    ledger = _Ledger(selection)
-    paper = settings.coverage_rule == "paper"
+    whole, rooms, kinds = shares_of(selection, why={item.room: item.why for item in left_out})
     return Figures(
         rule=settings.coverage_rule,
-        whole=ledger.share("all", ledger.everything, required=settings.coverage),
-        rooms=_rooms(ledger, selection, {item.room: item.why for item in left_out}),
-        kinds=worst_first(
-            [
-                ledger.share(kind, ledger.of_kind(kind), required=None if paper else settings.kind_coverage)
-                for kind in ledger.kinds
-            ]
-        ),
+        whole=whole,
+        rooms=rooms,
+        kinds=kinds,
         rooms_m2=sum(polygon.area for room in space.rooms for polygon in room.area),
         reached_m2=reached,
         unreached=left_out,
         findings=ranked(findings, touching),
     )
+
+
+def shares_of(
+    selection: Selection, *, why: Mapping[str, str] | None = None
+) -> tuple[Share, tuple[Share, ...], tuple[Share, ...]]:
+    """What the stops see of the whole, of every room and of every kind, the least seen first."""
+    space = selection.visibility.candidates.space
+    settings, ledger = space.settings, _Ledger(selection)
+    paper = settings.coverage_rule == "paper"
+    kinds = [
+        ledger.share(kind, ledger.of_kind(kind), required=None if paper else settings.kind_coverage)
+        for kind in ledger.kinds
+    ]
+    whole = ledger.share("all", ledger.everything, required=settings.coverage)
+    return whole, _rooms(ledger, selection, why or {}), worst_first(kinds)
 
 
 def ranked(findings: tuple[Finding, ...], touching: set[int]) -> tuple[Finding, ...]:
@@ -53,7 +64,7 @@ def ranked(findings: tuple[Finding, ...], touching: set[int]) -> tuple[Finding, 
     return tuple(sorted(findings, key=key))
 
 
-def _rooms(ledger: _Ledger, selection: Selection, why: dict[str, str]) -> tuple[Share, ...]:
+def _rooms(ledger: _Ledger, selection: Selection, why: Mapping[str, str]) -> tuple[Share, ...]:
     """Rooms with targets, then what faces none of them."""
     space = selection.visibility.candidates.space
     settings = space.settings
