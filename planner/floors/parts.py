@@ -12,6 +12,7 @@ from mission.floor import Element, Finding, IgnoredLine, Opening, Room
 from mission.geometry import Polygon
 from planner.floors.drawn import Drawn, drawn, outline_faces
 from planner.floors.elements import elements_of
+from planner.floors.joints import without_joints
 from planner.floors.openings import openings_of
 from planner.floors.rings import GAP, SNAP, Region, canonical_region, even_odd
 from planner.floors.rooms import rooms_of
@@ -70,11 +71,12 @@ def _drawn_by_role(strokes: Iterable[Stroke]) -> defaultdict[str, Drawn]:
 
 
 def _outline(floor: Drawn) -> tuple[Region, list[Finding]]:
-    """The region on layer FLOOR: rings in rings are holes, overlapping parts are one."""
+    """The region on layer FLOOR: rings in rings are holes, parts that overlap or nearly touch are one."""
     faces, findings = outline_faces(floor.open, layer="FLOOR", merge=True)
     rings = (*floor.closed, *faces)
     findings += [odd.about("FLOOR") for ring in rings for odd in ring.odd]
-    return even_odd([ring.region for ring in rings]), findings
+    outline, joints = without_joints(even_odd([ring.region for ring in rings]))
+    return outline, [*findings, *joints]
 
 
 def _why_no_outline(floor: Drawn) -> str:

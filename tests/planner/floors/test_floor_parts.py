@@ -8,6 +8,7 @@ from itertools import pairwise
 import pytest
 import shapely
 from ezdxf.layouts import Modelspace
+from ezdxf.math import Matrix44
 from ezdxf.xclip import XClip
 from floor_drawings import Read, codes, rectangle
 
@@ -56,6 +57,97 @@ def test_floor_parts_that_overlap_are_one(read: Read) -> None:
 def test_floor_parts_that_lie_apart_stay_apart(read: Read) -> None:
     plan = read(lambda m: rectangle(m, "FLOOR", 12, 0, 14, 4))
     assert [round(part.area) for part in plan.outline] == [80, 8]
+
+
+JOINTS = {0.0004: "0.4 mm", 0.004: "4.0 mm", 0.02: "20.0 mm"}
+
+
+def beside(model: Modelspace, joint: float, degrees: float = 0.0) -> None:
+    """A slab of 6 by 8 m beside the floor of 10 by 8 m, all turned round 0, 0."""
+    for x0, x1 in ((0.0, 10.0), (10.0 + joint, 16.0 + joint)):
+        rectangle(model, "FLOOR", x0, 0, x1, 8)
+    turn = Matrix44.z_rotate(math.radians(degrees))
+    for slab in model:
+        slab.transform(turn)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 17.0, 45.0, 200.0])
+@pytest.mark.parametrize("joint", JOINTS)
+def test_a_joint_between_slabs_is_closed_and_told(read: Read, joint: float, degrees: float) -> None:
+    plan = read(lambda model: beside(model, joint, degrees), floor=False)
+    assert len(plan.outline) == 1
+    assert plan.area == pytest.approx((16 + joint) * 8, abs=1e-6)
+    assert [finding.code for finding in plan.findings] == ["joint_closed"]
+    assert JOINTS[joint] in plan.findings[0].message
+    assert plan.findings[0].at is not None
+
+
+@pytest.mark.parametrize("degrees", range(0, 360, 10))
+def test_slabs_that_touch_are_one_at_any_angle(read: Read, degrees: int) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "FLOOR", 0, 0, 3.3, 8)
+        for y in (0, 2.7, 5.1):
+            rectangle(model, "FLOOR", 3.3, y, 10, y + 2.7 if y < 5 else 8)
+        turn = Matrix44.z_rotate(math.radians(degrees))
+        for slab in model:
+            slab.transform(turn)
+
+    plan = read(draw, floor=False)
+    assert plan.area == pytest.approx(80)
+    assert sum(len(part.rings) for part in plan.outline) == 1
+    assert codes(plan) == []
+
+
+def test_a_gap_wider_than_a_joint_stays_open(read: Read) -> None:
+    plan = read(lambda model: beside(model, 0.021), floor=False)
+    assert [round(part.area) for part in plan.outline] == [80, 48]
+    assert codes(plan) == []
+
+
+def test_where_joints_cross_no_hole_is_left(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        for x in (0, 5.02):
+            for y in (0, 4.02):
+                rectangle(model, "FLOOR", x, y, x + 5, y + 4)
+
+    plan = read(draw, floor=False)
+    assert plan.area == pytest.approx(10.02 * 8.02)
+    assert [len(part.holes) for part in plan.outline] == [0]
+
+
+def test_a_joint_that_ends_within_the_floor_is_closed(read: Read) -> None:
+    """The slabs are one in the north: the joint is a slot in it."""
+
+    def draw(model: Modelspace) -> None:
+        slot = [(5, 0), (5, 6), (5.004, 6), (5.004, 0)]
+        corners = [(0, 0), *slot, (10, 0), (10, 8), (0, 8)]
+        model.add_lwpolyline(corners, close=True, dxfattribs={"layer": "FLOOR"})
+
+    plan = read(draw, floor=False)
+    assert plan.area == pytest.approx(80)
+    assert codes(plan) == ["joint_closed"]
+
+
+def test_a_joint_as_a_hole_is_closed_and_a_shaft_is_not(read: Read) -> None:
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "FLOOR", 5, 1, 5.01, 7)
+        rectangle(model, "FLOOR", 8, 1, 8.3, 1.3)
+
+    plan = read(draw)
+    assert plan.area == pytest.approx(80 - 0.09)
+    assert codes(plan) == ["joint_closed"]
+
+
+def test_slabs_that_cross_keep_their_corners(read: Read) -> None:
+    """Edges that meet at right angles, inwards or outwards, are no joint."""
+
+    def draw(model: Modelspace) -> None:
+        rectangle(model, "FLOOR", 4, -3, 6, 11)
+        rectangle(model, "COLUMNS", 1, 1, 2, 2)
+
+    plan = read(draw)
+    assert plan.area == pytest.approx(80 + 2 * 2 * 3, abs=1e-9)
+    assert codes(plan) == []
 
 
 def test_lines_turned_by_an_odd_angle_still_meet(read: Read) -> None:
