@@ -25,6 +25,7 @@ GRAVE = (
 )
 NOTES = (
     *("duplicate", "repeated_points", "no_length", "text_outside_rooms", "gap_closed", "repaired"),
+    "joint_closed",
     *("layer_as_told", "exterior_opening", "rooms_overlap"),
 )
 
