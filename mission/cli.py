@@ -121,7 +121,7 @@ def _verdict(path: Path, mission: Mission, problems: tuple[Problem, ...]) -> dic
 OriginOption = Annotated[
     str | None, typer.Option(metavar="LAT,LON,ALT,HEADING", help="Where on earth the drawing's origin is.")
 ]
-FORMAT_NAMES = "plan, waypoints, dxf, csv, geojson, nav2, mcap or vda5050, whatever the suffix."
+FORMAT_NAMES = "plan, waypoints, dxf, csv, geojson, nav2, mcap, vda5050 or vda5050-2.1, whatever the suffix."
 AutopilotOption = Annotated[str | None, typer.Option(help="ardupilot, px4 or generic")]
 
 
@@ -157,7 +157,7 @@ def export(
     """Write a mission in a format that others open.
 
     .plan (QGroundControl), .waypoints (QGC WPL 110), .dxf, .csv, .geojson, .nav2.yaml, .mcap (nav_msgs/Path),
-    .vda5050.json; docs/exports.md tells what opens where.
+    .vda5050.json (3.0), .vda5050-2.1.json; docs/exports.md tells what opens where.
 
     Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
     """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 from mission.document import Mission
@@ -56,8 +57,12 @@ FORMATS: dict[str, Format] = {
         uses=("map",), notes=path_mcap.notes,
     ),
     "vda5050": Format(
-        ".vda5050.json", "VDA 5050 order", vda5050.write, vda5050.read_back, 1e-5,
+        ".vda5050.json", "VDA 5050 order, version 3.0", vda5050.write, vda5050.read_back, 1e-5,
         uses=("map",), notes=vda5050.notes,
+    ),
+    "vda5050-2.1": Format(
+        ".vda5050-2.1.json", "VDA 5050 order, version 2.1", partial(vda5050.write, edition=vda5050.V2_1),
+        vda5050.read_back, 1e-5, uses=("map",), notes=vda5050.notes,
     ),
 }  # fmt: skip
 """Every format by its name, which `--to` takes; without it the file's suffix decides."""

@@ -1,9 +1,14 @@
-"""Writes the stops as the waypoints file of Nav2's RViz panel ("save WPs"), for its waypoint follower."""
+"""Writes the stops as the waypoints file of Nav2's RViz panel ("save WPs"), each with the leg to it.
+
+The panel reads `pose` and `orientation` of every waypoint and passes over other keys: `approach` and `return`
+are for programs that let Nav2 follow the mission's legs.
+"""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 
 from mission.document import Mission, Point, Stop
 from mission.files.exports.format import Supplements
@@ -16,10 +21,13 @@ _POSE = re.compile(rf"^    pose: \[{_NUMBER}, {_NUMBER}, {_NUMBER}\]$", re.MULTI
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:
-    """One waypoint per stop, on the robot's map; Nav2 finds its own way between them."""
+    """One waypoint per stop, on the robot's map, and the way back."""
+    there = mapped(mission)
     lines = [*_head(mission), "waypoints:"]
-    for number, stop in enumerate(mapped(mission).stops):
+    for number, stop in enumerate(there.stops):
         lines += _waypoint(number, stop)
+    if there.return_ is not None:
+        lines.append(f"return: {_polyline(there.return_)}")
     return ("\n".join(lines) + "\n").encode()
 
 
@@ -32,7 +40,10 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
     """What Nav2 does otherwise than the mission says."""
-    way = "Nav2 plans its own way between the stops: the mission's legs are not in this file"
+    way = (
+        "Nav2's panel plans its own way between the waypoints; the mission's legs are their 'approach', "
+        "for a program that sends them to Nav2's FollowPath"
+    )
     return (way, *unmapped(mission))
 
 
@@ -53,6 +64,7 @@ def _head(mission: Mission) -> list[str]:
     return [
         f"# Scan stops of mission {name}, id {mission.id} revision {mission.revision}",
         f"# Frame: {which}; metres; orientation is w, x, y, z",
+        "# approach: corners of the leg from the stop before, or the start, to the waypoint, both included",
     ]
 
 
@@ -62,4 +74,9 @@ def _waypoint(number: int, stop: Stop) -> list[str]:
         f"  waypoint{number}:  # {printable(stop.id)}",
         f"    pose: [{stop.x + 0.0:.6f}, {stop.y + 0.0:.6f}, 0.0]",
         f"    orientation: [{w + 0.0:.9f}, 0.0, 0.0, {z + 0.0:.9f}]",
+        f"    approach: {_polyline(stop.approach)}",
     ]
+
+
+def _polyline(points: Sequence[Point]) -> str:
+    return f"[{', '.join(f'[{x + 0.0:.6f}, {y + 0.0:.6f}]' for x, y in points)}]"

@@ -1,4 +1,4 @@
-"""Writes the mission as an order of VDA 5050, version 2.1: what a fleet's master control sends to a vehicle.
+"""Writes the mission as an order of VDA 5050, version 3.0 or 2.1: what a fleet control sends to a vehicle.
 
 Every pose of the way is a node and every straight piece between two an edge, so that a vehicle drives the
 mission's legs and no others. A scan is an action at the stop's node.
@@ -7,7 +7,8 @@ mission's legs and no others. A scan is an action at the stop's node.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -19,23 +20,48 @@ from mission.files.exports.nav2_yaml import unmapped
 from mission.files.exports.way import Waypoint, frame_name, mapped, way
 from mission.turning import SAME, turned_back
 
-VERSION = "2.1.0"
+
+@dataclass(frozen=True)
+class Edition:
+    """What an order says otherwise in one version of VDA 5050 than in another."""
+
+    version: str
+    told: str
+    """How keys of texts for people end: `nodeDescriptor`."""
+    max_speed: str
+    edge_names_its_nodes: bool
+    deviation: Callable[[float], object]
+    """`allowedDeviationXY` for a tolerance in metres."""
+    retriable: bool
+    """Whether an action can say that it may be tried again."""
+
+
+def _ellipse(tolerance: float) -> object:
+    return {"a": tolerance, "b": tolerance, "theta": 0.0}
+
+
+def _radius(tolerance: float) -> object:
+    return tolerance
+
+
+V3_0 = Edition("3.0.0", "Descriptor", "maximumSpeed", False, _ellipse, True)
+V2_1 = Edition("2.1.0", "Description", "maxSpeed", True, _radius, False)
 UNNAMED = "unknown"
 """Manufacturer and serial number: the sender knows the vehicle, the mission does not."""
 
 
-def write(mission: Mission, supplements: Supplements) -> bytes:
-    """The order; master control sets headerId, timestamp, manufacturer and serialNumber when it sends it."""
+def write(mission: Mission, supplements: Supplements, *, edition: Edition = V3_0) -> bytes:
+    """The order; fleet control sets headerId, timestamp, manufacturer and serialNumber when it sends it."""
     poses = way(mapped(mission))
     nodes = [
-        _node(waypoint, name, 2 * number, mission)
+        _node(waypoint, name, 2 * number, mission, edition)
         for number, (waypoint, name) in enumerate(zip(poses, _names(poses), strict=True))
     ]
-    edges = [_edge(one, other, mission) for one, other in pairwise(nodes)]
+    edges = [_edge(one, other, mission, edition) for one, other in pairwise(nodes)]
     order = {
         "headerId": 0,
         "timestamp": supplements.written.strftime("%Y-%m-%dT%H:%M:%S.000Z"),
-        **{"version": VERSION, "manufacturer": UNNAMED, "serialNumber": UNNAMED},
+        **{"version": edition.version, "manufacturer": UNNAMED, "serialNumber": UNNAMED},
         **{"orderId": f"{mission.id}-{mission.revision}", "orderUpdateId": 0},
         **{"nodes": nodes, "edges": edges},
     }
@@ -52,7 +78,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
     """What the sender has to fill in."""
-    header = "manufacturer and serialNumber are 'unknown': master control names the vehicle when it sends"
+    header = "manufacturer and serialNumber are 'unknown': fleet control names the vehicle when it sends"
     return (header, *unmapped(mission))
 
 
@@ -68,31 +94,31 @@ def _names(poses: Sequence[Waypoint]) -> list[str]:
     return names
 
 
-def _node(waypoint: Waypoint, name: str, sequence: int, mission: Mission) -> dict[str, Any]:
+def _node(waypoint: Waypoint, name: str, sequence: int, mission: Mission, edition: Edition) -> dict[str, Any]:
     stop = waypoint.stop
     return {
         "nodeId": name,
         "sequenceId": sequence,
-        "nodeDescription": "passed on the way" if stop is None else "scan stop",
+        f"node{edition.told}": "passed on the way" if stop is None else "scan stop",
         "released": True,
         "nodePosition": {
             **{"x": round(waypoint.x, 6), "y": round(waypoint.y, 6)},
-            **({} if stop is None else _arrival(waypoint, stop, mission)),
+            **({} if stop is None else _arrival(waypoint, stop, mission, edition)),
             "mapId": frame_name(mission),
         },
-        "actions": [] if stop is None else [_scan(stop)],
+        "actions": [] if stop is None else [_scan(stop, edition)],
     }
 
 
-def _arrival(waypoint: Waypoint, stop: Stop, mission: Mission) -> dict[str, float]:
+def _arrival(waypoint: Waypoint, stop: Stop, mission: Mission, edition: Edition) -> dict[str, object]:
     """How exactly a vehicle must stand at a stop; one that scans all round may face anywhere."""
-    arrival = {"theta": waypoint.heading, "allowedDeviationXY": stop.tolerance_m}
+    arrival = {"theta": waypoint.heading, "allowedDeviationXY": edition.deviation(stop.tolerance_m)}
     if mission.scanner.fov_deg == 360.0:
         arrival["allowedDeviationTheta"] = math.pi
     return arrival
 
 
-def _scan(stop: Stop) -> dict[str, Any]:
+def _scan(stop: Stop, edition: Edition) -> dict[str, Any]:
     """A vehicle must know this action; HARD: neither driving nor another action meanwhile."""
     parameters = {
         **{"stop": stop.id, "profile": stop.scan.profile, "settle": stop.settle_s},
@@ -101,20 +127,22 @@ def _scan(stop: Stop) -> dict[str, Any]:
     return {
         "actionType": "scan",
         "actionId": f"scan-{stop.id}",
-        "actionDescription": "settle, then scan; times in seconds",
+        f"action{edition.told}": "settle, then scan; times in seconds",
         "blockingType": "HARD",
         "actionParameters": [{"key": key, "value": value} for key, value in parameters.items()],
+        **({"retriable": stop.on_failure in ("retry", "ask")} if edition.retriable else {}),
     }
 
 
-def _edge(one: dict[str, Any], other: dict[str, Any], mission: Mission) -> dict[str, Any]:
+def _edge(one: dict[str, Any], other: dict[str, Any], mission: Mission, edition: Edition) -> dict[str, Any]:
+    between = {"startNodeId": one["nodeId"], "endNodeId": other["nodeId"]}
     begin, end = (node["nodePosition"] for node in (one, other))
     return {
         "edgeId": f"edge-{one['sequenceId'] + 1}",
         "sequenceId": one["sequenceId"] + 1,
         "released": True,
-        **{"startNodeId": one["nodeId"], "endNodeId": other["nodeId"]},
-        "maxSpeed": mission.robot.speed,
+        **(between if edition.edge_names_its_nodes else {}),
+        edition.max_speed: mission.robot.speed,
         "length": round(math.dist((begin["x"], begin["y"]), (end["x"], end["y"])), 6),
         "actions": [],
     }

@@ -86,7 +86,7 @@ def test_the_suffix_names_the_format() -> None:
 
 @pytest.mark.parametrize("path", ["site.yaml", "site.json", "site", "site.dwg"])
 def test_an_unknown_suffix_lists_the_formats(path: str) -> None:
-    with pytest.raises(InputError, match=r"known: \.plan, .*\.vda5050\.json \(or name one with --to\)"):
+    with pytest.raises(InputError, match=r"known: \.plan, .*\.vda5050-2\.1\.json \(or name one with --to\)"):
         format_named(None, Path(path))
 
 

@@ -6,21 +6,23 @@ import json
 import math
 from collections.abc import Callable
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 
 import jsonschema
 import msgspec
+import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from ruamel.yaml import YAML
 
-from mission.document import Mission, Transform
-from mission.files.exports import FORMATS, exported
+from mission.document import Mission, OnFailure, Transform
+from mission.files.exports import FORMATS, exported, format_named
 from mission.files.exports.format import Supplements
 from mission.files.exports.way import mapped, way
 from mission.turning import turned, turned_back
-from tests.mission.exports.vda5050_order import ORDER
+from tests.mission.exports.vda5050_order import ORDERS
 from tests.mission.exports.worlds import MAP, laboratory, on_a_map
 from tests.mission.worlds import mission_of, square_tour, stop
 
@@ -40,8 +42,14 @@ def test_the_way_is_start_corners_stops_and_back() -> None:
     assert headings == pytest.approx([0.0, 0.0, 90.0, back])
 
 
-def test_nav2_reads_a_pose_per_stop(mission: Mission) -> None:
+def nav2(mission: Mission) -> dict[str, dict[str, dict[str, list[float]]]]:
     document = YAML(typ="safe").load(exported(mission, "nav2", Supplements()).decode())
+    assert isinstance(document, dict)
+    return document
+
+
+def test_nav2_reads_a_pose_per_stop(mission: Mission) -> None:
+    document = nav2(mission)
     assert list(document["waypoints"]) == [f"waypoint{number}" for number in range(len(mission.stops))]
     for waypoint, there in zip(document["waypoints"].values(), mapped(mission).stops, strict=True):
         x, y, z = waypoint["pose"]
@@ -53,11 +61,21 @@ def test_nav2_reads_a_pose_per_stop(mission: Mission) -> None:
         assert all(isinstance(value, float) for value in (*waypoint["pose"], *waypoint["orientation"]))
 
 
+def test_nav2_is_given_every_leg_and_the_way_back(mission: Mission) -> None:
+    document, there = nav2(mission), mapped(mission)
+    for waypoint, stop_ in zip(document["waypoints"].values(), there.stops, strict=True):
+        assert np.allclose(waypoint["approach"], stop_.approach, rtol=0, atol=1e-6)
+        assert waypoint["approach"][-1] == waypoint["pose"][:2]
+    assert ("return" in document) == (there.return_ is not None)
+    if there.return_ is not None:
+        assert np.allclose(np.array(document["return"]), there.return_, rtol=0, atol=1e-6)
+
+
 def test_nav2_says_in_which_frame_it_is() -> None:
     assert b"# Frame: the robot's map;" in exported(on_a_map(), "nav2", Supplements())
     assert b"# Frame: the site 'room', not turned" in exported(laboratory(), "nav2", Supplements())
     (way_, *_) = FORMATS["nav2"].notes(on_a_map(), Supplements())
-    assert "Nav2 plans its own way" in way_
+    assert "plans its own way" in way_
     assert len(FORMATS["nav2"].notes(laboratory(), Supplements())) == 2
 
 
@@ -84,25 +102,36 @@ def test_rosbags_reads_path_and_stops(mission: Mission, file: FileOf) -> None:
     assert qos.durability.name == "TRANSIENT_LOCAL"
 
 
-def order_of(mission: Mission) -> dict[str, list[dict[str, object]]]:
-    document = json.loads(exported(mission, "vda5050", Supplements()))
-    jsonschema.Draft202012Validator(ORDER).validate(document)
+@pytest.fixture(params=ORDERS)
+def edition(request: pytest.FixtureRequest) -> str:
+    assert isinstance(request.param, str)
+    return request.param
+
+
+def order_of(mission: Mission, edition: str = "vda5050") -> dict[str, list[dict[str, object]]]:
+    document = json.loads(exported(mission, edition, Supplements()))
+    jsonschema.Draft202012Validator(ORDERS[edition]).validate(document)
+    assert isinstance(document, dict)
     return document
 
 
-def test_an_order_is_a_chain_of_nodes_and_edges(mission: Mission) -> None:
-    order = order_of(mission)
+def test_an_order_is_a_chain_of_nodes_and_edges(mission: Mission, edition: str) -> None:
+    order = order_of(mission, edition)
     nodes, edges = order["nodes"], order["edges"]
     assert [node["sequenceId"] for node in nodes] == list(range(0, 2 * len(nodes), 2))
     assert [edge["sequenceId"] for edge in edges] == list(range(1, 2 * len(nodes) - 1, 2))
     assert len({node["nodeId"] for node in nodes}) == len(nodes)
-    for edge, begin, end in zip(edges, nodes, nodes[1:], strict=False):
-        assert (edge["startNodeId"], edge["endNodeId"]) == (begin["nodeId"], end["nodeId"])
+    speed = {"vda5050": "maximumSpeed", "vda5050-2.1": "maxSpeed"}[edition]
+    assert {edge[speed] for edge in edges} == {mission.robot.speed}
+    if edition == "vda5050-2.1":
+        ends = [(edge["startNodeId"], edge["endNodeId"]) for edge in edges]
+        assert ends == [(one["nodeId"], other["nodeId"]) for one, other in pairwise(nodes)]
     assert all(part["released"] for part in (*nodes, *edges))
 
 
-def test_an_order_scans_at_every_stop_and_nowhere_else(mission: Mission) -> None:
-    scans = [(node["nodeId"], node["actions"]) for node in order_of(mission)["nodes"] if node["actions"]]
+def test_an_order_scans_at_every_stop_and_nowhere_else(mission: Mission, edition: str) -> None:
+    nodes = order_of(mission, edition)["nodes"]
+    scans = [(node["nodeId"], node["actions"]) for node in nodes if node["actions"]]
     assert [name for name, _ in scans] == [stop.id for stop in mission.stops]
     for stop_, (_, (action,)) in zip(mission.stops, scans, strict=True):
         told = {item["key"]: item["value"] for item in action["actionParameters"]}
@@ -119,7 +148,26 @@ def test_an_order_asks_for_headings_only_where_they_matter() -> None:
     ):
         stops = [node["nodePosition"] for node in order_of(mission)["nodes"] if node["actions"]]
         assert all(("allowedDeviationTheta" in place) is free for place in stops)
-        assert all(place["allowedDeviationXY"] == 0.05 for place in stops)
+        assert all(place["allowedDeviationXY"] == {"a": 0.05, "b": 0.05, "theta": 0} for place in stops)
+    stops = [
+        node["nodePosition"] for node in order_of(laboratory(), "vda5050-2.1")["nodes"] if node["actions"]
+    ]
+    assert all(place["allowedDeviationXY"] == 0.05 for place in stops)
+
+
+@pytest.mark.parametrize(
+    ("policy", "retriable"),
+    [("retry", True), ("ask", True), ("skip", False), ("abort", False), ("home", False)],
+)
+def test_a_scan_may_be_tried_again_where_the_mission_lets_it(policy: OnFailure, retriable: bool) -> None:
+    stops = tuple(msgspec.structs.replace(stop, on_failure=policy) for stop in laboratory().stops)
+    nodes = order_of(msgspec.structs.replace(laboratory(), stops=stops))["nodes"]
+    assert {action["retriable"] for node in nodes for action in node["actions"]} == {retriable}
+
+
+def test_the_file_says_which_version_it_is_of(tmp_path: Path) -> None:
+    for name, edition in (("a.vda5050.json", "vda5050"), ("a.vda5050-2.1.json", "vda5050-2.1")):
+        assert format_named(None, tmp_path / name) == edition
 
 
 def test_a_corner_never_takes_the_name_of_a_stop() -> None:

@@ -55,10 +55,11 @@ def any_word(test):
 
 
 @any_word
-def test_yaml_holds_the_poses_and_nothing_else(word: str) -> None:
+def test_yaml_holds_poses_and_legs_and_nothing_else(word: str) -> None:
     document = YAML(typ="safe").load(exported(named(word), "nav2", Supplements()).decode())
-    assert list(document) == ["waypoints"]
-    assert [set(waypoint) for waypoint in document["waypoints"].values()] == [{"pose", "orientation"}] * 3
+    assert list(document) == ["waypoints", "return"]
+    kinds = [set(waypoint) for waypoint in document["waypoints"].values()]
+    assert kinds == [{"pose", "orientation", "approach"}] * 3
 
 
 @any_word
