@@ -14,7 +14,7 @@ from mission.figures import LEG_OVER_IGNORED
 from mission.floor import Finding, FloorPlan
 from mission.geometry import FloatArray
 from mission.planning import NavigableSpace, Route
-from planner.shapes import HAIRLINE, local_origin, to_shape
+from planner.shapes import HAIRLINE, local_origin, to_shape, union
 from planner.targets import solid_of
 
 BESIDE_WALL = 0.35
@@ -116,12 +116,18 @@ def _little_reached(space: NavigableSpace, reached_m2: float) -> Iterator[Findin
 
 
 def _missing_walls(space: NavigableSpace) -> Iterator[Finding]:
-    """Rooms with hardly a wall around them, which show nothing and hide nothing."""
+    """Rooms with hardly a wall around them, which show nothing and hide nothing.
+
+    Shapes on unknown layers do not count: they hide nothing, whatever they are.
+    """
     origin = local_origin(space.floor)
     rooms = [room for room in space.rooms if room.room is not None]
     if not rooms:
         return
-    walls = to_shape((*space.obstacles, *space.occluders), origin).buffer(BESIDE_WALL, quad_segs=2)
+    known = [
+        item for item in space.floor.elements if item.kind != "other" and (item.obstacle or item.occludes)
+    ]
+    walls = union([solid_of(item, origin, HAIRLINE) for item in known]).buffer(BESIDE_WALL, quad_segs=2)
     shapely.prepare(walls)
     outlines = [shapely.boundary(to_shape(room.area, origin)) for room in rooms]
     bare = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -206,6 +206,8 @@ STOP_EDGES = (7.0, 21.0, 35.0, 48.0, 58.0, 68.0, 82.0)
 SHARE_EDGES = (2.0, 48.0, 59.0, 70.0, 82.0)
 STOP_HEAD = Row(("no", "x m", "y m", "heading °", "units", "new", "time"), STOP_EDGES, bold=True)
 
+SHARE_HEAD = Row(("coverage", "all", "visible", "seen", "seen %"), SHARE_EDGES, bold=True, to_left=True)
+
 
 def stop_rows(mission: Mission) -> list[Row]:
     """A row per stop, as the robot meets them; a doorway stop has a `d` after its number."""
@@ -228,7 +230,7 @@ def figure_rows(figures: Figures) -> list[Row]:
     """What is seen of the whole, of every kind and every room; what is left out; what is doubtful."""
     shares = [figures.whole, *figures.kinds, *figures.rooms]
     rows = [
-        Row(("coverage", f"all {figures.unit}", "visible", "seen", "seen %"), SHARE_EDGES, True, True),
+        replace(SHARE_HEAD, cells=("coverage", f"all {figures.unit}", *SHARE_HEAD.cells[2:])),
         *(_share_row(share) for share in shares[:MOST_ROWS]),
     ]
     if figures.unreached:
@@ -258,8 +260,9 @@ def _chunk(rows: list[Row], chunk: Chunk) -> str:
     box = chunk.box
     shown = rows[chunk.first : chunk.first + chunk.count]
     lines = [_frame(box)]
-    if shown[0].edges == STOP_EDGES:
-        lines.append(_row(STOP_HEAD, box.x, box.y + HEADER - 1.5))
+    head = {STOP_EDGES: STOP_HEAD, SHARE_EDGES: SHARE_HEAD}.get(shown[0].edges)
+    if head is not None and not shown[0].bold:
+        lines.append(_row(head, box.x, box.y + HEADER - 1.5))
     for index, row in enumerate(shown):
         top = box.y + HEADER + ROW * index
         if index % 2 == 0:

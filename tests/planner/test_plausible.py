@@ -88,6 +88,13 @@ def test_rooms_without_walls_are_grave() -> None:
     assert "2 of 2 rooms" in found[0].message
 
 
+def test_walls_on_an_unknown_layer_are_missing_though_they_stand_in_the_way() -> None:
+    floor = two_rooms(0.9, more=(column("c", 2, 1),))
+    other = [replace(item, kind="other", occludes=False, target=False) for item in floor.elements[:3]]
+    floor = replace(floor, elements=(*other, *floor.elements[3:]))
+    assert [item.code for item in figures_of(floor).grave] == ["walls_missing"]
+
+
 def test_layers_that_are_not_read_are_named_beside_missing_walls() -> None:
     floor = with_lines(rooms_without_walls(), [(0.0, 0.01), (8.0, 0.01)], layer="A-WALL")
     grave = [item.message for item in figures_of(floor).grave if item.code == "walls_missing"]
