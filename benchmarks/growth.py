@@ -40,7 +40,7 @@ def observe(noun):
     now = time.perf_counter()
     laps[type(noun).__name__] = now - last[0]
     last[0] = now
-mission = plan(floor, Settings(), observe=observe)
+mission = plan(floor, Settings(), observe=observe).mission
 print(json.dumps({"laps": laps, "stops": len(mission.stops), "rooms": len(floor.rooms),
     "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3}))
 """

@@ -90,14 +90,10 @@ def plan_rows(name: str, path: Path, options: dict[str, float]) -> Iterator[list
     """What a plan comes to by either rule, told by length."""
     for rule in ("paper", "length"):
         settings = Settings(**options, coverage_rule=rule)
-        nouns: dict[type, object] = {}
         begin = time.perf_counter()
-        floor = read_floor(path, d_dis=settings.d_dis)
-        plan(floor, settings, observe=lambda noun, known=nouns: known.update({type(noun): noun}))
+        made = plan(read_floor(path, d_dis=settings.d_dis), settings)
         took = time.perf_counter() - begin
-        selection, figures = nouns[Selection], nouns[Figures]
-        assert isinstance(selection, Selection)
-        assert isinstance(figures, Figures)
+        selection, figures = made.selection, made.figures
         told = _by_length(selection, figures)
         rooms = [share for share in told.rooms if share.name != "in no room"]
         yield [

@@ -32,13 +32,8 @@ THINNER = 0.2
 
 def draw(folder: Path) -> None:
     """Plan the office, export it over its drawing, and draw what is then in the file."""
-    nouns: dict[type, object] = {}
-    mission = plan(
-        read_floor(OFFICE, d_dis=0.05), Settings(), observe=lambda noun: nouns.update({type(noun): noun})
-    )
-    route = nouns[Route]
-    assert isinstance(route, Route)
-    drawing = _layers(mission, route, folder)
+    made = plan(read_floor(OFFICE, d_dis=0.05), Settings())
+    drawing = _layers(made.mission, made.route, folder)
     (folder / "exports-dxf.svg").write_text(_picture(drawing), encoding="utf-8")
 
 

@@ -16,11 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from mission.document import Mission, Stop
+from mission.document import Stop
 from mission.files.floor_drawing import LOOKS, kinds_of
 from mission.files.svg import circle, group, line, line_data, path, polygon, rect, ring_data, text, text_width
 from mission.floor import FloorPlan
 from mission.geometry import BoolArray, FloatArray, IntArray, Polygon
+from mission.plan import PartPlan
 from mission.planning import (
     AT_EDGE,
     IN_HOLE,
@@ -29,10 +30,7 @@ from mission.planning import (
     SLIVER,
     TOO_CLOSE,
     TOO_SMALL,
-    Candidates,
     NavigableSpace,
-    Route,
-    Selection,
     Visibility,
 )
 from mission.seen import runs_of, seen_units
@@ -50,19 +48,6 @@ INK, WAY, SEEN, MISSED, HIDDEN = "#2a0f5c", "#5a2ca0", "#1a8f3c", "#d7191c", "#e
 DRIVE, STAND, LIGHT = "#cfe3f7", "#8fbfe8", "#ffe9a8"
 Mark = tuple[str, str]
 """A sign of the legend, drawn about 0, 0, and what it means."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Every noun of one plan."""
-
-    floor: FloorPlan
-    space: NavigableSpace
-    candidates: Candidates
-    visibility: Visibility
-    selection: Selection
-    route: Route
-    mission: Mission
 
 
 @dataclass(frozen=True)
@@ -94,12 +79,10 @@ class Window:
         return (ring_data(self(ring)) for part in polygons for ring in part.rings)
 
 
-def office(**changes: Any) -> Plan:
+def office(**changes: Any) -> PartPlan:
     """The sample office, planned."""
     settings = Settings(**changes)
-    nouns: list[Any] = []
-    plan(read_floor(OFFICE, d_dis=settings.d_dis), settings, observe=nouns.append)
-    return Plan(*nouns)
+    return plan(read_floor(OFFICE, d_dis=settings.d_dis), settings).first
 
 
 def picture(window: Window, layers: Iterable[str], legend: Iterable[Mark]) -> str:
@@ -178,7 +161,7 @@ def units(visibility: Visibility, mask: BoolArray, window: Window, **style: obje
     return path((line_data(window(np.stack(pair))) for pair in pairs), fill="none", **style)
 
 
-def draw_floor(drawn: Plan) -> str:
+def draw_floor(drawn: PartPlan) -> str:
     """What is read from the drawing."""
     window = Window()
     names = []
@@ -199,7 +182,7 @@ def draw_floor(drawn: Plan) -> str:
     return picture(window, [*building(drawn.floor, window), *lines, *names], legend)
 
 
-def draw_navigable(drawn: Plan) -> str:
+def draw_navigable(drawn: PartPlan) -> str:
     """Where the robot's centre may drive, and where it may stop."""
     window, space = Window(), drawn.space
     even: dict[str, Any] = {"fill_rule": "evenodd"}
@@ -219,7 +202,7 @@ def draw_navigable(drawn: Plan) -> str:
     return picture(window, layers, legend)
 
 
-def draw_candidates(drawn: Plan) -> str:
+def draw_candidates(drawn: PartPlan) -> str:
     """Candidates that are kept, and why the others are not."""
     window, found = Window(), drawn.candidates
     looks = {
@@ -264,13 +247,13 @@ def row_at(visibility: Visibility, place: tuple[float, float]) -> int:
     return int(np.argmin(np.hypot(*(xy - place).T)))
 
 
-def _mask(drawn: Plan, seen: IntArray) -> BoolArray:
+def _mask(drawn: PartPlan, seen: IntArray) -> BoolArray:
     mask = np.zeros(drawn.visibility.targets.total, dtype=bool)
     mask[seen] = True
     return mask
 
 
-def draw_visibility(drawn: Plan) -> str:
+def draw_visibility(drawn: PartPlan) -> str:
     """What one candidate sees: wedges of light onto faces, and beams overhead."""
     window, seen = Window(), drawn.visibility
     targets, row = seen.targets, row_at(seen, VIEW)
@@ -299,7 +282,7 @@ def draw_visibility(drawn: Plan) -> str:
     return picture(window, layers, legend)
 
 
-def draw_raster(drawn: Plan) -> str:
+def draw_raster(drawn: PartPlan) -> str:
     """The same candidate over the paper's raster: what the raster hides."""
     window, seen = Window((10.2, 0.9), (21.4, 8.6), 70.0), drawn.visibility
     row = row_at(seen, VIEW)
@@ -323,7 +306,7 @@ def draw_raster(drawn: Plan) -> str:
     return picture(window, layers, legend)
 
 
-def draw_selection(drawn: Plan) -> str:
+def draw_selection(drawn: PartPlan) -> str:
     """The chosen stops in the order of choice, and what they leave unseen."""
     window, chosen = Window(), drawn.selection
     seen, visible = seen_units(chosen), drawn.visibility.visible
@@ -352,7 +335,7 @@ def disc(x: float, y: float, words: str) -> str:
     return circle(x, y, 10.0, fill="#ffffff", stroke=INK, stroke_width=1.5) + shown
 
 
-def draw_route(drawn: Plan) -> str:
+def draw_route(drawn: PartPlan) -> str:
     """The way over the stops, in the area the robot's centre may drive in."""
     window, driven = Window(), drawn.route
     legs = (line_data(window(leg)) for leg in driven.approaches if len(leg) > 1)
@@ -374,7 +357,7 @@ def draw_route(drawn: Plan) -> str:
     return picture(window, layers, legend)
 
 
-def draw_mission(drawn: Plan) -> str:
+def draw_mission(drawn: PartPlan) -> str:
     """One stop as the robot gets it: approach, heading, and what is kept clear."""
     stop = max(drawn.mission.stops, key=lambda item: len(item.approach))
     x, y = stop.x, stop.y
@@ -421,7 +404,7 @@ def _heading(stop: Stop, window: Window, *, long: float = 0.75) -> str:
     return path([line_data(window([at, back]))], stroke=INK, stroke_width=4) + head
 
 
-def draw_headings(drawn: Plan) -> str:
+def draw_headings(drawn: PartPlan) -> str:
     """Stops of a scanner that does not look all round: each has a heading."""
     window, settings = Window(), drawn.space.settings
     half, reach = math.radians(settings.fov) / 2, settings.range
@@ -447,7 +430,7 @@ def draw_headings(drawn: Plan) -> str:
     return picture(window, layers, legend)
 
 
-def draw_vertex(_: Plan) -> str:
+def draw_vertex(_: PartPlan) -> str:
     """The rule for sight lines through a vertex, as four sketches."""
     window = Window((0.0, 0.3), (15.6, 4.0), 52.0)
     cases: tuple[Any, ...] = (
@@ -480,7 +463,7 @@ def draw_vertex(_: Plan) -> str:
     return picture(window, layers, legend)
 
 
-PICTURES: dict[str, Callable[[Plan], str]] = {
+PICTURES: dict[str, Callable[[PartPlan], str]] = {
     "floor": draw_floor,
     "navigable": draw_navigable,
     "candidates": draw_candidates,
@@ -491,7 +474,7 @@ PICTURES: dict[str, Callable[[Plan], str]] = {
     "route": draw_route,
     "mission": draw_mission,
 }
-OTHERS: dict[str, tuple[Callable[[Plan], str], dict[str, Any]]] = {
+OTHERS: dict[str, tuple[Callable[[PartPlan], str], dict[str, Any]]] = {
     "triangulation": (draw_candidates, {"candidates": "triangulation"}),
     "headings": (draw_headings, {"fov": 120.0}),
 }

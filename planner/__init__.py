@@ -1,21 +1,26 @@
-"""Floor -> mission: where the scanner must stand, and by which route a robot visits those stops."""
+"""Floor -> plan: where the scanner must stand, and by which route a robot visits those stops."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from mission.document import Mission
-    from mission.floor import FloorPlan
-    from mission.planning import Candidates, NavigableSpace
-    from mission.settings import Settings
+from mission.floor import FloorPlan
+from mission.plan import PartPlan, Plan
+from mission.planning import Candidates, NavigableSpace
+from mission.settings import Settings
 
 Observe = Callable[[Any], None]
 
 
-def plan(floor: FloorPlan, settings: Settings, *, observe: Observe = lambda noun: None) -> Mission:
-    """Plan the part of the floor that holds the start, else the largest.
+def plan(
+    floor: FloorPlan,
+    settings: Settings,
+    *,
+    observe: Observe = lambda noun: None,
+    all_parts: bool = False,
+) -> Plan:
+    """Plan the part of the floor that holds the start, else the largest; with `all_parts` the others too.
 
     Every noun on the way is handed to `observe` as soon as it is made.
 
@@ -32,16 +37,13 @@ def plan(floor: FloorPlan, settings: Settings, *, observe: Observe = lambda noun
     observe(floor)
     space = navigable(floor, settings)
     observe(space)
-    return plan_part(candidates(space), observe=observe)
+    found = parts_to_plan(space) if all_parts else [candidates(space)]
+    planned = frozenset(part.chosen_part for part in found)
+    return Plan(tuple(_plan_part(part, k, planned, observe) for k, part in enumerate(found)))
 
 
-def plan_part(
-    found: Candidates, *, observe: Observe, number: int = 0, planned: frozenset[int] | None = None
-) -> Mission:
-    """Plan from candidates on; `number` tells the missions of one floor apart.
-
-    `planned` are all parts of the floor that some plan of it enters; by default this one.
-    """
+def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
+    """Plan from candidates on; `planned` are all parts of the floor that the plan enters."""
     from planner.appraisal import figures_of
     from planner.assemble import assemble
     from planner.refine import refined
@@ -53,16 +55,14 @@ def plan_part(
     seen = visibility(found)
     observe(seen)
     selection = refined(select(seen))
-    if selection.visibility is not seen:
-        observe(selection.visibility.candidates)
-        observe(selection.visibility)
     observe(selection)
     driven = route(selection)
     observe(driven)
-    observe(figures_of(driven, planned=planned))
+    figures = figures_of(driven, planned=planned)
+    observe(figures)
     mission = assemble(driven, part=number)
     observe(mission)
-    return mission
+    return PartPlan(driven, figures, mission)
 
 
 def parts_to_plan(space: NavigableSpace) -> list[Candidates]:
@@ -78,4 +78,4 @@ def parts_to_plan(space: NavigableSpace) -> list[Candidates]:
     return [first, *(candidates(space, part=part) for part in sorted(found - {first.chosen_part}))]
 
 
-__all__ = ["Observe", "parts_to_plan", "plan", "plan_part"]
+__all__ = ["Observe", "plan"]

@@ -6,10 +6,10 @@ import datetime
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mission.document import Mission
     from mission.events import AnyEvent
     from mission.floor import FloorPlan
-    from mission.planning import Candidates
+    from mission.plan import PartPlan
     from mission.settings import Settings
     from planner.report import PlanReport
     from recordings.field import FieldRecording
@@ -159,27 +159,21 @@ def _print(reports: list[PlanReport], *, as_json: bool) -> None:
 
 def plan_files(floor: Path, out: Path, settings: Settings, *, all_parts: bool = False) -> list[PlanReport]:
     """Plan a floor's file into a folder; one report per part, the main part first."""
-    from planner import parts_to_plan
+    from planner import plan
     from planner.floors import read_floor
-    from planner.navigable import navigable
+    from planner.outputs import names
+    from recordings.canvas import must_be_writable
 
     watch = Stopwatch()
     read = read_floor(floor, d_dis=settings.d_dis, layers=settings.layer_roles)
-    watch.lap("read")
     folder = _folder(out)
+    for path in names(folder, 0).values():
+        must_be_writable(path)
     with _telling_findings(read):
-        if not all_parts:
-            report = _plan_part(read, folder, settings, watch)
-            _set_aside(folder, 1, read, settings)
-            return [report]
-        parts = parts_to_plan(navigable(read, settings))
-        planned = frozenset(found.chosen_part for found in parts)
-        reports = [
-            _plan_part(read, folder, settings, Stopwatch(watch), found=found, number=number, planned=planned)
-            for number, found in enumerate(parts)
-        ]
-        _set_aside(folder, len(parts), read, settings)
-        return reports
+        made = plan(read, settings, observe=watch.observe, all_parts=all_parts)
+    reports = [_write_part(part, folder, number, watch) for number, part in enumerate(made.parts)]
+    _set_aside(folder, len(reports), read, settings)
+    return reports
 
 
 @contextmanager
@@ -216,27 +210,15 @@ def _folder(out: Path) -> Path:
     return out
 
 
-def _plan_part(
-    floor: FloorPlan,
-    folder: Path,
-    settings: Settings,
-    watch: Stopwatch,
-    *,
-    found: Candidates | None = None,
-    number: int = 0,
-    planned: frozenset[int] | None = None,
-) -> PlanReport:
-    """Plan one part; its files appear together when all of it is done, mission.json last."""
-    from mission import __version__
-    from mission.document import mission_id
-    from mission.figures import Figures
+def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch) -> PlanReport:
+    """Write the plan of one part; its files appear together, mission.json last."""
+    from dataclasses import replace
+
     from mission.files.atomic import replacing
     from mission.files.coverage_json import coverage_json
     from mission.files.mission_json import encode
     from mission.files.plan_svg import plan_svg
-    from mission.planning import Route
     from mission.schedule import schedule
-    from planner import plan, plan_part
     from planner.outputs import names
     from planner.report import PlanReport
     from recordings.canvas import must_be_writable
@@ -245,28 +227,19 @@ def _plan_part(
     files = names(folder, number)
     for path in files.values():
         must_be_writable(path)
-    nouns: dict[type, Any] = {}
-    recording = PlanRecording(mission_id(floor.digest, settings, __version__, number))
-    observe = _observer(recording.observe, nouns, watch)
-    if found is None:
-        made = plan(floor, settings, observe=observe)
-    else:
-        for noun in (floor, found.space):
-            observe(noun)
-        made = plan_part(found, observe=observe, number=number, planned=planned)
-    mission = _revised(made, files["mission"])
-    recording.observe(mission)
-    recording.observe(schedule(mission))
-    route, figures = nouns[Route], nouns[Figures]
+    mission = _revised(part.mission, files["mission"])
+    recording = PlanRecording(mission.id)
+    for noun in (*part.nouns(), mission, schedule(mission)):
+        recording.observe(noun)
     with replacing(*(files[key] for key in WRITTEN)) as (recorded, coverage, picture, document):
         recording.write(recorded)
         watch.lap("recording")
-        coverage.write_bytes(coverage_json(route, mission, figures))
+        coverage.write_bytes(coverage_json(part.route, mission, part.figures))
         today = datetime.date.today().isoformat()
-        picture.write_bytes(plan_svg(route, mission, figures, date=today))
+        picture.write_bytes(plan_svg(part.route, mission, part.figures, date=today))
         document.write_bytes(encode(mission))
     watch.lap("files")
-    return PlanReport(route=route, mission=mission, files=files, times_s=watch.times(), figures=figures)
+    return PlanReport(part=replace(part, mission=mission), files=files, times_s=watch.times())
 
 
 WRITTEN = ("recording", "coverage", "picture", "mission")
@@ -281,21 +254,6 @@ def _revised(mission: Mission, path: Path) -> Mission:
     from mission.files.mission_json import next_revision
 
     return sealed(replace(mission, revision=next_revision(path, mission)))
-
-
-def _observer(
-    record: Callable[[Any], None], nouns: dict[type, Any], watch: Stopwatch
-) -> Callable[[Any], None]:
-    """Hand every noun but the mission to the recording, which takes the mission with its revision."""
-    from mission.document import Mission
-
-    def observe(noun: Any) -> None:
-        nouns[type(noun)] = noun
-        if not isinstance(noun, Mission):
-            record(noun)
-        watch.lap(STAGES.get(type(noun).__name__, "other"))
-
-    return observe
 
 
 STAGES = {
@@ -314,9 +272,13 @@ STAGES = {
 class Stopwatch:
     """Seconds per stage; tells on a terminal's stderr which stage has ended."""
 
-    def __init__(self, other: Stopwatch | None = None) -> None:
-        self._laps: dict[str, float] = dict(other._laps) if other is not None else {}
+    def __init__(self) -> None:
+        self._laps: dict[str, float] = {}
         self._begin = self._last = time.perf_counter()
+
+    def observe(self, noun: object) -> None:
+        """Count the time since the last noun to the stage that ends with this one."""
+        self.lap(STAGES.get(type(noun).__name__, "other"))
 
     def lap(self, stage: str) -> None:
         """Count the time since the last lap to a stage."""

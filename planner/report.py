@@ -14,7 +14,8 @@ from mission.document import Mission
 from mission.figures import Figures, Share, percent
 from mission.floor import Finding, Rank
 from mission.geometry import FloatArray
-from mission.planning import IN_HOLE, OUTSIDE, SLIVER, TOO_SMALL, Route
+from mission.plan import PartPlan
+from mission.planning import IN_HOLE, OUTSIDE, SLIVER, TOO_SMALL
 from mission.schedule import schedule
 from mission.table import printable
 
@@ -23,11 +24,17 @@ from mission.table import printable
 class PlanReport:
     """A finished plan with its files and the seconds each stage took."""
 
-    route: Route
-    mission: Mission
+    part: PartPlan
     files: dict[str, Path]
     times_s: dict[str, float]
-    figures: Figures
+
+    @property
+    def mission(self) -> Mission:
+        return self.part.mission
+
+    @property
+    def figures(self) -> Figures:
+        return self.part.figures
 
     @property
     def answer(self) -> int:
@@ -41,7 +48,7 @@ class PlanReport:
 
     def as_json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
-        selection = self.route.selection
+        selection = self.part.selection
         visibility = selection.visibility
         candidates = visibility.candidates
         space, targets = candidates.space, visibility.targets
@@ -74,11 +81,11 @@ class PlanReport:
             },
             "coverage": coverage_table(self.figures),
             "route": {
-                "length_m": self.route.length,
-                "bound_m": self.route.bound,
-                "method": self.route.method,
-                "tour": self.route.tour,
-                "start": self.route.start_reason,
+                "length_m": self.part.route.length,
+                "bound_m": self.part.route.bound,
+                "method": self.part.route.method,
+                "tour": self.part.route.tour,
+                "start": self.part.route.start_reason,
             },
             "schedule": {
                 "drive_s": times.drive_s,
@@ -96,7 +103,7 @@ class PlanReport:
         }
 
     def _floor(self) -> dict[str, Any]:
-        floor = self.route.selection.visibility.candidates.space.floor
+        floor = self.part.space.floor
         return {
             "name": floor.name,
             "area_m2": floor.area,

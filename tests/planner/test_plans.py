@@ -14,8 +14,9 @@ from mission.document import Mission
 from mission.files.mission_json import encode
 from mission.floor import FloorPlan
 from mission.geometry import polyline_length
-from mission.planning import Candidates, NavigableSpace, Selection
+from mission.planning import NavigableSpace, Selection
 from mission.settings import Settings
+from planner import plan
 from planner.floors import read_floor
 from tests.planner.checks import check_plan, check_rooms_are_joined
 from tests.planner.worlds import FLOORS, SHARED, changed, moved, planned, shifted, turned
@@ -122,17 +123,9 @@ def test_a_shifted_floor_has_the_shifted_plan() -> None:
 
 
 def test_all_parts_of_the_duplex_are_planned_apart() -> None:
-    from planner import parts_to_plan, plan_part
-
-    space = the_plan("layered/duplex-l1.dxf")[1][NavigableSpace]
-    found = parts_to_plan(space)
-    assert len(found) >= 2
-    for number, candidates in enumerate(found):
-        nouns: dict[type, Any] = {FloorPlan: space.floor, NavigableSpace: space}
-
-        def observe(noun: Any, nouns: dict[type, Any] = nouns) -> None:
-            nouns[type(noun)] = noun
-
-        mission = plan_part(candidates, observe=observe, number=number)
-        check_plan(mission, nouns, space.settings)
-        assert nouns[Candidates].chosen_part == candidates.chosen_part
+    _, nouns = the_plan("layered/duplex-l1.dxf")
+    made = plan(nouns[FloorPlan], nouns[NavigableSpace].settings, all_parts=True)
+    assert len(made.parts) >= 2
+    assert len({part.candidates.chosen_part for part in made.parts}) == len(made.parts)
+    for part in made.parts:
+        check_plan(part.mission, {type(noun): noun for noun in part.nouns()}, made.settings)

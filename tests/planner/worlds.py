@@ -164,7 +164,7 @@ def planned(floor: FloorPlan, settings: Settings | None = None) -> tuple[Mission
     def observe(noun: Any) -> None:
         nouns[type(noun)] = noun
 
-    return plan(floor, settings or Settings(), observe=observe), nouns
+    return plan(floor, settings or Settings(), observe=observe).mission, nouns
 
 
 def changed(settings: Settings) -> list[str]:

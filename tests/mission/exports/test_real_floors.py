@@ -41,11 +41,10 @@ pytestmark = pytest.mark.skipif(not LAYERED.is_dir(), reason=f"the real inputs a
 @cache
 def planned(name: str) -> tuple[Mission, bytes]:
     """The mission of a floor and its coverage.json, planned once."""
-    nouns: dict[str, object] = {}
     floor = read_floor(LAYERED / f"{name}.dxf", d_dis=0.05)
     settings = Settings(origin=(47.3769, 8.5417, 408.0, 30.0))
-    mission = plan(floor, settings, observe=lambda noun: nouns.update({type(noun).__name__: noun}))
-    return mission, coverage_json(nouns["Route"], mission)
+    made = plan(floor, settings)
+    return made.mission, coverage_json(made.route, made.mission)
 
 
 def supplements(name: str, folder: Path) -> Supplements:

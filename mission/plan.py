@@ -1,0 +1,104 @@
+"""A plan: the missions of a floor, and every noun on the way to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from mission.document import Mission
+from mission.figures import Figures, percent
+from mission.floor import FloorPlan
+from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
+from mission.settings import Settings
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PartPlan:
+    """The plan of one connected part of a floor."""
+
+    route: Route
+    figures: Figures
+    mission: Mission
+
+    @property
+    def selection(self) -> Selection:
+        return self.route.selection
+
+    @property
+    def visibility(self) -> Visibility:
+        return self.selection.visibility
+
+    @property
+    def candidates(self) -> Candidates:
+        return self.visibility.candidates
+
+    @property
+    def space(self) -> NavigableSpace:
+        return self.candidates.space
+
+    @property
+    def floor(self) -> FloorPlan:
+        return self.space.floor
+
+    def nouns(self) -> Iterator[Any]:
+        """Every noun from the floor to the figures, in the order in which they are made."""
+        yield from (self.floor, self.space, self.candidates, self.visibility)
+        yield from (self.selection, self.route, self.figures)
+
+    def __repr__(self) -> str:
+        share, length = percent(self.figures.whole.coverage), self.route.length
+        return f"PartPlan({self.mission.name}: {len(self.mission.stops)} stops, {share} seen, {length:.1f} m)"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan:
+    """The plans of a floor's parts; the first is of the part that holds the start, else of the largest."""
+
+    parts: tuple[PartPlan, ...]
+
+    @property
+    def first(self) -> PartPlan:
+        return self.parts[0]
+
+    @property
+    def mission(self) -> Mission:
+        """The first part's mission."""
+        return self.first.mission
+
+    @property
+    def missions(self) -> tuple[Mission, ...]:
+        return tuple(part.mission for part in self.parts)
+
+    @property
+    def space(self) -> NavigableSpace:
+        return self.first.space
+
+    @property
+    def floor(self) -> FloorPlan:
+        return self.space.floor
+
+    @property
+    def settings(self) -> Settings:
+        return self.space.settings
+
+    @property
+    def figures(self) -> Figures:
+        return self.first.figures
+
+    @property
+    def route(self) -> Route:
+        return self.first.route
+
+    @property
+    def selection(self) -> Selection:
+        return self.first.selection
+
+    def __repr__(self) -> str:
+        return f"Plan({', '.join(map(repr, self.parts))})"
+
+    def _repr_svg_(self) -> str:
+        """The printed plan of the first part, for notebooks."""
+        from mission.files.plan_svg import plan_svg
+
+        return plan_svg(self.route, self.mission, self.figures, date="").decode()
