@@ -68,14 +68,28 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
 def parts_to_plan(space: NavigableSpace) -> list[Candidates]:
     """Candidates of every part that has any: the part of `plan` first, then the others by area.
 
-    Parts that hold no room are left out where the floor has rooms: they lie behind exterior doors.
+    Parts that hold no room are left out where nothing is to be seen from them, as from a landing.
     """
     from planner.candidates import candidates
 
     first = candidates(space)
-    in_room = [space.rooms[k].room is not None or not space.floor.rooms for k in first.room]
-    found = {int(part) for part, inside in zip(first.part, in_room, strict=True) if part >= 0 and inside}
-    return [first, *(candidates(space, part=part) for part in sorted(found - {first.chosen_part}))]
+    rooms = {
+        int(part) for part, k in zip(first.part, first.room, strict=True) if space.rooms[k].room is not None
+    }
+    others = sorted(set(first.part.tolist()) - {-1, first.chosen_part})
+    found = [candidates(space, part=part) for part in others]
+    return [first, *(item for item in found if item.chosen_part in rooms or _see_anything(item))]
+
+
+def _see_anything(found: Candidates) -> bool:
+    from mission.errors import AnswerIsNo
+    from planner.visibility import visibility
+
+    try:
+        visibility(found)
+    except AnswerIsNo:
+        return False
+    return True
 
 
 __all__ = ["Observe", "plan"]

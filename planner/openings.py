@@ -60,7 +60,7 @@ def _crossing(
         return Crossing(opening, shapely.LineString(), (None, None), "its line has no length")
     clear = widest_clear(line, obstacles)
     sides = (None, None) if clear.is_empty else _sides(clear, rooms)
-    return Crossing(opening, clear, sides, _closed(clear, sides, rooms, outline, opening, settings))
+    return Crossing(opening, clear, sides, _closed(clear, sides, outline, opening, settings))
 
 
 def widest_clear(line: BaseGeometry, obstacles: BaseGeometry) -> BaseGeometry:
@@ -131,7 +131,6 @@ def middle_and_normal(line: BaseGeometry) -> tuple[FloatArray, FloatArray]:
 def _closed(
     clear: BaseGeometry,
     sides: tuple[int | None, int | None],
-    rooms: shapely.STRtree,
     outline: BaseGeometry,
     opening: Opening,
     settings: Settings,
@@ -140,22 +139,23 @@ def _closed(
         return "obstacles fill it"
     if clear.length < settings.door_access - SLACK:
         return f"{clear.length:.3f} m clear, less than door_access {settings.door_access:.3f} m"
-    if opening.kind == "door" and _is_exterior(clear, sides, rooms, outline):
-        return "exterior: no room on one side"
+    if opening.kind == "door" and _is_exterior(clear, sides, outline):
+        return "exterior: no floor on one side"
     return ""
 
 
-def _is_exterior(
-    clear: BaseGeometry,
-    sides: tuple[int | None, int | None],
-    rooms: shapely.STRtree,
-    outline: BaseGeometry,
-) -> bool:
-    if len(rooms):
-        return None in sides
+def _is_exterior(clear: BaseGeometry, sides: tuple[int | None, int | None], outline: BaseGeometry) -> bool:
+    """Whether there is neither a room nor any floor on one side, past what walls are thick."""
+    return any(
+        room is None and not outline.intersects(end) for room, end in zip(sides, _ends(clear), strict=True)
+    )
+
+
+def _ends(clear: BaseGeometry) -> tuple[BaseGeometry, BaseGeometry]:
+    """The places on either side where an opening leads to."""
     middle, across = middle_and_normal(clear)
-    probes = [shapely.Point(middle + sign * PROBES[-1] * across) for sign in (1.0, -1.0)]
-    return not all(outline.intersects(probe) for probe in probes)
+    left, right = (shapely.Point(middle + sign * PROBES[-1] * across) for sign in (1.0, -1.0))
+    return left, right
 
 
 def threshold(crossing: Crossing) -> BaseGeometry:

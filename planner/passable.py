@@ -1,9 +1,10 @@
-"""Which openings the robot gets through into both rooms, and what is in its way where it does not."""
+"""Which openings the robot gets through, to what lies on both sides, and what is in its way."""
 
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -25,7 +26,7 @@ from planner.targets import LINE_WALL, solid_of
 NEAR_OPENING = 1.6
 """How far from an opening (m) the obstacle that blocks it is looked for."""
 REACHED_SHARE = 0.2
-"""An opening leads into a room if it reaches this share of where the robot may drive there …"""
+"""An opening leads somewhere if it reaches this share of where the robot may drive there …"""
 REACHED_AREA = 0.5
 """… or at least this much of it (m²)."""
 
@@ -37,12 +38,13 @@ def opening_states(
     parts = parts_of(drive_area, gaps)
 
     @cache
-    def free_in(room: int) -> dict[int, float]:
-        return parts.area_by_part(to_shape(ground.floor.rooms[room].polygons, ground.origin))
+    def led_into(room: int | None) -> LedInto:
+        return _led_into(room, parts, ground)
 
     states, findings = [], []
     for crossing in ground.crossings:
-        why = crossing.closed_because or _not_reached(crossing, parts, free_in, ground, settings)
+        sides = [] if crossing.closed_because else [led_into(room) for room in crossing.rooms]
+        why = crossing.closed_because or _not_reached(crossing, parts, sides, ground, settings)
         states.append(OpeningState(crossing.opening, crossing.rooms, crossing.width, not why, why))
         if why and not why.startswith("exterior"):
             findings.append(_opening_finding(crossing, why, ground))
@@ -57,35 +59,45 @@ def _opening_finding(crossing: Crossing, why: str, ground: Ground) -> Finding:
     return Finding(code, message, crossing.opening.id, (float(x), float(y)))
 
 
-def _not_reached(
-    crossing: Crossing,
-    parts: Parts,
-    free_in: Callable[[int], dict[int, float]],
-    ground: Ground,
-    settings: Settings,
-) -> str:
-    """Why the robot does not get from the opening into both rooms; empty if it does."""
-    here = parts.touching(crossing.clear)
-    wanted = {side: _main_parts(free_in(side)) for side in crossing.rooms if side is not None}
-    if here and all(here & main or not main for main in wanted.values()):
-        return ""
-    return _narrowest(crossing, parts, wanted, ground, settings)
+@dataclass(frozen=True)
+class LedInto:
+    """What lies on one side of an opening."""
+
+    shape: BaseGeometry
+    main: frozenset[int]
+    """Parts that make up a good share of where the robot may drive there."""
 
 
-def _main_parts(free: dict[int, float]) -> set[int]:
-    """Parts that make up a good share of where the robot may drive in a room."""
+def _led_into(room: int | None, parts: Parts, ground: Ground) -> LedInto:
+    """A room, or for None the floor outside every room."""
+    if room is None:
+        rooms = [to_shape(item.polygons, ground.origin) for item in ground.floor.rooms]
+        shape = ground.outline.difference(shapely.union_all(rooms))
+    else:
+        shape = to_shape(ground.floor.rooms[room].polygons, ground.origin)
+    free = parts.area_by_part(shape)
     enough = min(REACHED_AREA, REACHED_SHARE * sum(free.values()))
-    return {part for part, area in free.items() if area >= enough and area > 0}
+    return LedInto(shape, frozenset(part for part, area in free.items() if area >= enough and area > 0))
+
+
+def _not_reached(
+    crossing: Crossing, parts: Parts, sides: Sequence[LedInto], ground: Ground, settings: Settings
+) -> str:
+    """Why the robot does not get from the opening to what lies on both sides; empty if it does."""
+    here = parts.touching(crossing.clear)
+    if here and all(here & side.main or not side.main for side in sides):
+        return ""
+    return _narrowest(crossing, parts, sides, ground, settings)
 
 
 def _narrowest(
-    crossing: Crossing, parts: Parts, wanted: dict[int, set[int]], ground: Ground, settings: Settings
+    crossing: Crossing, parts: Parts, sides: Sequence[LedInto], ground: Ground, settings: Settings
 ) -> str:
     """The place near an opening that is widest among those a robot must pass, in words."""
     window = shapely.Point(middle_and_normal(crossing.clear)[0]).buffer(NEAR_OPENING)
     walls = ground.walls(settings).near(window)
     gaps = gaps_between(walls, short=-2 * float(walls.clearance.max(initial=0.0)) + 0.05, long=-SLACK)
-    cells = [_cells_of(parts, main, ground, room, window) for room, main in wanted.items()]
+    cells = [_cells_of(parts, side, window) for side in sides]
     gaps = sorted(gaps, key=lambda item: -item.width)
 
     def opens(gap: Gap) -> bool:
@@ -100,13 +112,10 @@ def _narrowest(
     return f"{gap.width:.3f} m between {names} near it, the robot needs {need:.3f} m"
 
 
-def _cells_of(
-    parts: Parts, main: set[int], ground: Ground, room: int, window: BaseGeometry
-) -> NDArray[np.object_]:
-    """Where the robot drives in a room near an opening, leaving out pockets it cannot get to."""
-    shape = to_shape(ground.floor.rooms[room].polygons, ground.origin).intersection(window)
-    near = parts.tree.query(shape, predicate="intersects")
-    return parts.cells[near[np.isin(parts.cell_part[near], sorted(main))]]
+def _cells_of(parts: Parts, side: LedInto, window: BaseGeometry) -> NDArray[np.object_]:
+    """Where the robot drives on one side near an opening, leaving out pockets it cannot get to."""
+    near = parts.tree.query(side.shape.intersection(window), predicate="intersects")
+    return parts.cells[near[np.isin(parts.cell_part[near], sorted(side.main))]]
 
 
 def _opens(

@@ -10,6 +10,7 @@ import shapely
 
 from mission.planning import AT_EDGE, IN_HOLE, OTHER_PART, TOO_CLOSE, UNREACHABLE, Candidates, Unreached
 from planner.candidates.place import Place
+from planner.openings import PROBES
 from planner.reach import reach_of
 from planner.shapes import local_origin, to_shape
 
@@ -62,8 +63,6 @@ def _middle(candidates: Candidates, part: int, room: shapely.Geometry) -> tuple[
 def _why(candidates: Candidates, index: int, reasons: set[int]) -> str:
     settings = candidates.space.settings
     closed = _closed_openings(candidates, index)
-    if candidates.space.rooms[index].room is None and candidates.space.floor.rooms:
-        return "outside every room, and no inner opening leads there"
     if OTHER_PART in reasons:
         told = f"in another part of the floor ({closed})" if closed else "in another part of the floor"
         return f"{told}; --all-parts plans it too"
@@ -91,10 +90,15 @@ def _smaller_d_sec(candidates: Candidates, index: int) -> str:
 
 def _closed_openings(candidates: Candidates, index: int) -> str:
     """The openings of a room that are not passable, in words; or that it has none."""
-    room = candidates.space.rooms[index].room
-    if room is None:
+    space = candidates.space
+    room = space.rooms[index].room
+    if room is None and not space.floor.rooms:
         return ""
-    its = [item for item in candidates.space.openings if room in item.rooms]
+    its = [item for item in space.openings if room in item.rooms]
+    if room is None:
+        shape = to_shape(space.rooms[index].area, local_origin(space.floor))
+        lines = [shapely.LineString(item.opening.line - local_origin(space.floor)) for item in its]
+        its = [item for item, line in zip(its, lines, strict=True) if line.distance(shape) <= PROBES[-1]]
     if not its:
         return "no door or passage is drawn on its outline"
     return "; ".join(

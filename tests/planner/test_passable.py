@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from mission.floor import FloorPlan
+from mission.floor import Element, FloorPlan
 from mission.geometry import Polygon
 from mission.planning import NavigableSpace, OpeningState
 from mission.settings import Settings
@@ -191,28 +192,44 @@ def test_a_column_in_the_door_line_leaves_the_wider_piece() -> None:
     assert found.passable
 
 
-def exterior() -> FloorPlan:
-    """A room with a door to a terrace that is floor too, and another room beside it."""
+def terrace(until: float, *, kind: str = "door", more: Iterable[Element] = ()) -> FloorPlan:
+    """A room with a door in the wall at 3.9 to 4.1, and floor in no room behind it, as far as x = `until`."""
     return floor_of(
-        box(0, 0, 8, 4),
+        box(0, 0, until, 4),
         rooms=(room("left", box(0, 0, 3.9, 4)),),
-        openings=(door("out", (4, 1.5), (4, 2.5)),),
-        elements=(shell(0, 0, 8, 4), wall("s", box(3.9, 0, 4.1, 1.5)), wall("n", box(3.9, 2.5, 4.1, 4))),
+        openings=(door("out", (4, 1.5), (4, 2.5), kind=kind),),
+        elements=(
+            shell(0, 0, 8, 4),
+            wall("s", box(3.9, 0, 4.1, 1.5)),
+            wall("n", box(3.9, 2.5, 4.1, 4)),
+            *more,
+        ),
     )
 
 
-def test_an_exterior_door_is_not_driven_through() -> None:
-    found = state(exterior())
+@pytest.mark.parametrize("until", [3.9, 4.1, 4.5])
+@pytest.mark.parametrize("with_rooms", [True, False])
+def test_a_door_with_no_floor_beyond_it_is_exterior(until: float, with_rooms: bool) -> None:
+    floor = terrace(until)
+    found = state(floor if with_rooms else replace(floor, rooms=()))
     assert not found.passable
-    assert found.why.startswith("exterior")
-    assert way(exterior()) == np.inf
+    assert found.why == "exterior: no floor on one side"
 
 
-def test_an_exterior_passage_is_driven_through() -> None:
-    floor = exterior()
-    floor = replace(floor, openings=(replace(floor.openings[0], kind="passage"),))
+@pytest.mark.parametrize("kind", ["door", "passage"])
+def test_an_opening_to_floor_in_no_room_is_driven_through(kind: str) -> None:
+    floor = terrace(8.0, kind=kind)
     assert state(floor).passable
     assert way(floor) < 6.5
+
+
+def test_a_door_to_floor_in_no_room_may_be_blocked() -> None:
+    # A planter before the door leaves 0.6 m between itself and the wall.
+    floor = terrace(8.0, more=(element("planter", "other", box(4.7, 1.2, 5.2, 2.8)),))
+    found = state(floor)
+    assert not found.passable
+    assert "0.600 m between" in found.why
+    assert "planter" in found.why
 
 
 def test_a_door_beside_a_gap_in_the_same_wall_leaves_the_gap_open() -> None:

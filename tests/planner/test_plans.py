@@ -14,10 +14,13 @@ from mission.document import Mission
 from mission.files.mission_json import encode
 from mission.floor import FloorPlan
 from mission.geometry import polyline_length
-from mission.planning import NavigableSpace, Selection
+from mission.planning import Candidates, NavigableSpace, Selection
 from mission.settings import Settings
 from planner import plan
+from planner.candidates import candidates
 from planner.floors import read_floor
+from planner.navigable import navigable
+from planner.unreached import unreached
 from tests.planner.checks import check_plan, check_rooms_are_joined
 from tests.planner.worlds import FLOORS, SHARED, changed, moved, planned, shifted, turned
 
@@ -120,6 +123,32 @@ def test_a_shifted_floor_has_the_shifted_plan() -> None:
         assert np.allclose(np.subtract((one.x, one.y), by), (other.x, other.y), atol=1e-5)
         lengths = [polyline_length(np.array(stop.approach)) for stop in (one, other)]
         assert lengths[0] == pytest.approx(lengths[1], abs=1e-4)
+
+
+SAMPLE = Path(__file__).parents[2] / "recordings" / "samples" / "office.dxf"
+
+
+def test_a_floor_with_one_room_not_drawn_is_planned_all_the_same() -> None:
+    office = read_floor(SAMPLE, d_dis=0.05)
+    mission, nouns = planned(office)
+    for name in ("105 Corridor", "104 Open office"):
+        less = replace(office, rooms=tuple(room for room in office.rooms if room.name != name))
+        there, others = planned(less)
+        check_plan(there, others, Settings(), brute=False)
+        assert unreached(others[Candidates]) == ()
+        assert abs(len(there.stops) - len(mission.stops)) <= 1
+        seen = [found[Selection].visibility.visible.sum() for found in (nouns, others)]
+        assert seen[1] == pytest.approx(seen[0], rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["140 OPEN OFFICE", "151 BOC"])
+def test_the_office_with_one_room_not_drawn_is_reached_all_the_same(name: str) -> None:
+    office = floor("layered/office-l1.dxf")
+    less = replace(office, rooms=tuple(room for room in office.rooms if room.name != name))
+    assert len(less.rooms) == len(office.rooms) - 1
+    here, there = (candidates(navigable(one, Settings())) for one in (office, less))
+    assert there.part_area[0] == pytest.approx(here.part_area[0], rel=1e-3)
+    assert len(there.kept) == pytest.approx(len(here.kept), rel=0.02)
 
 
 def test_all_parts_of_the_duplex_are_planned_apart() -> None:

@@ -228,26 +228,22 @@ def test_the_larger_part_is_planned_without_a_start() -> None:
     assert all(stop.x < 4 for stop in mission.stops)
 
 
-def test_floor_behind_an_exterior_door_is_not_planned() -> None:
+@pytest.mark.parametrize("kind", ["door", "passage"])
+def test_floor_in_no_room_is_planned_as_a_room_without_a_name(kind: str) -> None:
     floor = floor_of(
         box(0, 0, 8, 4),
         rooms=(room("left", box(0, 0, 3.9, 4)),),
-        openings=(door("out", (4, 1.5), (4, 2.5)),),
-        elements=(shell(0, 0, 8, 4), wall("s", box(3.9, 0, 4.1, 1.5)), wall("n", box(3.9, 2.5, 4.1, 4))),
-    )
-    mission, _ = planned(floor)
-    assert all(stop.x < 4 for stop in mission.stops)
-
-
-def test_floor_behind_an_open_passage_is_planned_as_a_room_without_a_name() -> None:
-    floor = floor_of(
-        box(0, 0, 8, 4),
-        rooms=(room("left", box(0, 0, 3.9, 4)),),
-        openings=(door("p", (4, 1.5), (4, 2.5), kind="passage"),),
+        openings=(door("p", (4, 1.5), (4, 2.5), kind=kind),),
         elements=(shell(0, 0, 8, 4), wall("s", box(3.9, 0, 4.1, 1.5)), wall("n", box(3.9, 2.5, 4.1, 4))),
     )
     mission, _ = planned(floor, Settings(range=3.0, coverage=1.0))
     assert {stop.x < 4 for stop in mission.stops} == {True, False}
+
+
+def test_floor_in_no_room_behind_a_narrow_door_is_told_of_with_the_door() -> None:
+    floor = two_rooms(0.6)
+    told = told_of(replace(floor, rooms=floor.rooms[:1]))
+    assert told["unnamed 1"].startswith("in another part of the floor (door d: 0.600 m clear")
 
 
 def test_a_start_as_near_to_a_wall_as_the_robot_fits_is_taken() -> None:
