@@ -10,6 +10,7 @@ import shapely
 
 from mission.planning import AT_EDGE, IN_HOLE, OTHER_PART, TOO_CLOSE, UNREACHABLE, Candidates, Unreached
 from planner.candidates.place import Place
+from planner.floor_gaps import gap_before
 from planner.openings import PROBES
 from planner.reach import reach_of
 from planner.shapes import local_origin, to_shape
@@ -34,7 +35,7 @@ def unreached(candidates: Candidates, planned: frozenset[int] | None = None) -> 
             told += _cut_off(candidates, index, parts)
         elif area > LEAST_AREA:
             reasons = set(candidates.reason[here].tolist())
-            told.append(Unreached(room.name, _why(candidates, index, reasons), area))
+            told.append(Unreached(room.name, _why(candidates, index, reasons, parts), area))
     return tuple(told)
 
 
@@ -46,7 +47,9 @@ def _cut_off(candidates: Candidates, index: int, parts: frozenset[int]) -> Itera
     for part, area in sorted(found.area_by_part(shape).items()):
         if part not in parts and area >= LEAST_PIECE:
             x, y = _middle(candidates, part, shape)
-            why = f"in another part of the floor round ({x:.1f}, {y:.1f}); --all-parts plans it too"
+            gap = gap_before(space, shape, parts)
+            beyond = f" ({gap})" if gap else ""
+            why = f"in another part of the floor round ({x:.1f}, {y:.1f}){beyond}; --all-parts plans it too"
             yield Unreached(f"a piece of {space.rooms[index].name}", why, area)
 
 
@@ -60,18 +63,19 @@ def _middle(candidates: Candidates, part: int, room: shapely.Geometry) -> tuple[
     return float(point.x + origin[0]), float(point.y + origin[1])
 
 
-def _why(candidates: Candidates, index: int, reasons: set[int]) -> str:
+def _why(candidates: Candidates, index: int, reasons: set[int], parts: frozenset[int]) -> str:
     settings = candidates.space.settings
-    closed = _closed_openings(candidates, index)
+    closed = _barriers(candidates, index, parts)
     if OTHER_PART in reasons:
         told = f"in another part of the floor ({closed})" if closed else "in another part of the floor"
         return f"{told}; --all-parts plans it too"
     if UNREACHABLE in reasons:
         return f"the robot does not fit in ({closed or 'too narrow'})"
+    if AT_EDGE in reasons:  # of places far enough from elements
+        gap = _gap(candidates, index, parts)
+        return f"no place {settings.edge:g} m from the floor's edges{f' ({gap})' if gap else ''}"
     if TOO_CLOSE in reasons:
         return f"no place {settings.d_sec:g} m from every element{_smaller_d_sec(candidates, index)}"
-    if AT_EDGE in reasons:
-        return f"no place {settings.edge:g} m from the floor's edges"
     return "no floor in it" if IN_HOLE in reasons else "no place for a stop"
 
 
@@ -86,6 +90,19 @@ def _smaller_d_sec(candidates: Candidates, index: int) -> str:
     d_sec = math.floor(100 * float(place.to_element(middle)[0]) + 1e-6) / 100
     fits = d_sec >= space.settings.radius and place.to_edge(middle)[0] >= space.settings.edge
     return f"; --d-sec {d_sec:g} leaves one" if fits and d_sec < space.settings.d_sec else ""
+
+
+def _barriers(candidates: Candidates, index: int, parts: frozenset[int]) -> str:
+    """The openings of a room that are not passable, and the gap in the floor before it, in words."""
+    told = (_closed_openings(candidates, index), _gap(candidates, index, parts))
+    return "; ".join(item for item in told if item)
+
+
+def _gap(candidates: Candidates, index: int, parts: frozenset[int]) -> str:
+    """The gap in the floor between a room and what is planned, in words."""
+    space = candidates.space
+    shape = to_shape(space.rooms[index].area, local_origin(space.floor))
+    return gap_before(space, shape, parts)
 
 
 def _closed_openings(candidates: Candidates, index: int) -> str:

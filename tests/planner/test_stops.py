@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from mission.errors import AnswerIsNo
 from mission.floor import Element, FloorPlan
+from mission.geometry import Polygon
 from mission.planning import DROP_REASONS, KEPT, Candidates
 from mission.settings import Settings
 from planner.candidates import STRATEGIES, candidates
@@ -204,6 +207,60 @@ def test_a_room_behind_a_narrow_door_is_told_of_with_the_door() -> None:
     assert "another part" in why
     assert "door d" in why
     assert "0.600" in why
+
+
+def slabs(gap: float, **parts: Any) -> FloorPlan:
+    """Slabs west of x = 4 and east of x = 4 + gap, in walls all round."""
+    return floor_of(box(0, 0, 4, 4), box(4 + gap, 0, 8, 4), elements=(shell(0, 0, 8, 4),), **parts)
+
+
+ROOMS = {"rooms": (room("left", box(0, 0, 4, 4)), room("right", box(4, 0, 8, 4)))}
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0])
+@pytest.mark.parametrize("parts", [{}, ROOMS, {"rooms": ROOMS["rooms"][:1]}], ids=["none", "two", "one"])
+@pytest.mark.parametrize("gap", [0.03, 0.5])
+def test_a_gap_in_the_floor_is_named_with_width_and_place(gap: float, parts: Any, degrees: float) -> None:
+    told = told_of(moved(slabs(gap, **parts), turned(degrees)))
+    ((_, why),) = told.items()
+    assert f"a gap of {gap:.3f} m in the floor" in why
+    x, y = map(float, re.findall(r"at \((-?[\d.]+), (-?[\d.]+)\)", why)[0])
+    place = turned(-degrees)(np.array([x, y]))
+    assert place[0] == pytest.approx(4 + gap / 2, abs=0.02)
+    assert 0 < place[1] < 4
+
+
+def test_a_gap_that_ends_within_the_floor_is_named() -> None:
+    slot = [(4.06, 4), (4.06, 0.3), (4, 0.3), (4, 4)]  # the slabs are one in the south, beside the wall
+    slab = Polygon.of([(0, 0), (8, 0), (8, 4), *slot, (0, 4)])
+    why = told_of(floor_of(slab, elements=(shell(0, 0, 8, 4),), **ROOMS))
+    assert "a gap of 0.060 m in the floor at (4.03," in next(iter(why.values()))
+
+
+def test_a_strip_between_two_gaps_is_told_with_one_of_them() -> None:
+    strip = (box(0, 0, 4, 4), box(4.1, 0, 4.7, 4), box(4.8, 0, 8, 4))
+    floor = floor_of(
+        *strip,
+        rooms=(*ROOMS["rooms"][:1], room("strip", strip[1]), room("right", strip[2])),
+        elements=(shell(0, 0, 8, 4),),
+    )
+    told = told_of(floor)
+    assert told["strip"].startswith(
+        "no place 0.35 m from the floor's edges (a gap of 0.100 m in the floor at"
+    )
+
+
+def test_each_of_three_slabs_is_told_with_its_gap() -> None:
+    three = (box(0, 0, 4, 4), box(4.1, 0, 7, 4), box(7.2, 0, 9, 4))
+    told = told_of(floor_of(*three, elements=(shell(0, 0, 9, 4),)))
+    assert "a gap of 0.100 m in the floor at (4.05," in told["floor 2"]
+    assert "a gap of 0.200 m in the floor at (7.10," in told["floor 3"]
+
+
+def test_a_wall_between_slabs_is_no_gap() -> None:
+    floor = slabs(0.1, **ROOMS)
+    told = told_of(replace(floor, elements=(*floor.elements, wall("w", box(4, 0, 4.1, 4)))))
+    assert "gap" not in next(iter(told.values()))
 
 
 def test_a_room_too_small_for_d_sec_is_told_of() -> None:
