@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from bridge.clock import Clock
 from bridge.mavlink.desk.progress import Sight
 from bridge.mavlink.desk.visits import Course
-from bridge.mavlink.gateway.local import FAR_DEG, LocalFrame, local_frame
+from bridge.mavlink.gateway.local import LocalFrame, local_frame
 from bridge.mavlink.line.captures import Capture, capture_of
 from bridge.mavlink.line.modes import Modes
-from bridge.mavlink.line.peer import Origin
+from bridge.mavlink.line.peer import Origin, origin_of
 from bridge.mavlink.line.wire import Message, dialect
 from bridge.run import Run
-from mission.document import SiteOrigin
 from mission.events import Arrived, Pose
 from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic, heading_of
 from mission.mavlink.autopilots import autopilot_named
+from mission.mavlink.origin import is_elsewhere
 
 STILL_M_PER_S = 0.05
 """An estimator's speed of a robot that stands is not zero."""
@@ -252,19 +252,13 @@ class Lookout:
         told = self._newest.get("GPS_GLOBAL_ORIGIN")
         if course is None or told is None:
             return None
-        steps, message = STEPS_PER_DEGREE, told.message
-        origin = Origin(message.latitude / steps, message.longitude / steps, message.altitude / 1000)
-        if apart_deg(course.sent.origin, origin) > FAR_DEG:
+        origin = origin_of(told.message)
+        if is_elsewhere(course.sent.origin, origin.place):
             return None
         if self._frame is None or self._frame[:2] != (course, origin):
             rule = autopilot_named(course.sent.autopilot).rule
             self._frame = (course, origin, local_frame(course.sent.origin, origin, rule))
         return self._frame[2]
-
-
-def apart_deg(site: SiteOrigin, origin: Origin) -> float:
-    """The greater of the differences in latitude and longitude, degrees."""
-    return max(abs(origin.lat - site.lat), abs(math.remainder(origin.lon - site.lon, 360.0)))
 
 
 UNKNOWN_TOTAL = 65_535

@@ -33,7 +33,7 @@ from bridge.protocol import Answer, Command, Lease, Reason, encode
 from bridge.run import Change, Run
 from mission.document import Mission
 from mission.events import Pose
-from mission.mavlink.autopilots import autopilot_named, differences
+from mission.mavlink.autopilots import differences
 
 ORDERING_NS = 20 * 10**9
 """One step of an order takes no longer; then what the vehicle does counts as somebody else's again."""
@@ -119,14 +119,14 @@ class Orders:
         """Where the vehicle stands means something only if it counts from the mission's origin."""
         if self._consent.any_origin:
             return None
-        origin, sent = self._peer.origin(), course.sent
+        origin = self._peer.origin()
         if origin is None:
             return Refused(
                 "wrong_origin",
                 "the vehicle has no origin (GPS_GLOBAL_ORIGIN), so its metres count from nowhere, or does not"
                 " tell it; set it to the mission's (stopgo push --set-origin)",
             )
-        wrong = apart(sent.origin, origin, autopilot_named(sent.autopilot).rule)
+        wrong = apart(course.sent.origin, origin)
         satellites = "; or add --any-origin, if it finds its place by satellites"
         return Refused("wrong_origin", wrong + satellites) if wrong else None
 

@@ -13,12 +13,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from bridge.mavlink.gateway.driving import Driving, Mode, driving_of
-from bridge.mavlink.line.peer import Origin, Peer, found
+from bridge.mavlink.line.peer import Origin, Peer, found, origin_of
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import Box, Message, Who, dialect, wire
 from mission.document import Point
 from mission.errors import OutcomeUnknown, RobotUnreachable
-from mission.geodesy import STEPS_PER_DEGREE
 
 ON_BOARD = Who(253, dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
 """Ourselves: neither QGroundControl (255) nor a station of ours (254)."""
@@ -173,10 +172,7 @@ class Autopilot:
     def origin(self) -> Origin | None:
         """What its metres count from; `None` if it has none, or not yet again since it was started."""
         told = self._heard.newest("GPS_GLOBAL_ORIGIN", ORIGIN_S)
-        if told is None:
-            return None
-        steps = STEPS_PER_DEGREE
-        return Origin(lat=told.latitude / steps, lon=told.longitude / steps, alt=told.altitude / 1000)
+        return None if told is None else origin_of(told)
 
     def mode(self) -> Mode:
         return self.driving.mode_of(self.peer.heartbeat.custom_mode)

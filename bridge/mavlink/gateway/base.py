@@ -93,7 +93,7 @@ class MavlinkBase:
                 f"the scanner sees {mission.scanner.fov_deg:g}°, so its stops need their headings,"
                 f" and {self.autopilot.peer.autopilot} turns to none by order"
             )
-        return "" if origin is None else apart(site, origin, driving.rule)
+        return "" if origin is None else apart(site, origin)
 
     def not_ready(self) -> str:
         away = self.autopilot.out_of_reach()
@@ -259,7 +259,7 @@ class MavlinkBase:
         rule = self.autopilot.driving.rule
         if site is None:
             return UNPLACED
-        if origin is None or apart(site, origin, rule):
+        if origin is None or apart(site, origin):
             return LocalFrame(site)
         return local_frame(site, origin, rule)
 

@@ -8,12 +8,8 @@ from dataclasses import dataclass
 from bridge.mavlink.line.peer import Origin
 from mission.document import Point, SiteOrigin
 from mission.events import Pose
-from mission.geodesy import Geodetic, bearing_deg, from_geodetic, heading_of
-
-SAME_PLACE_M = 0.05
-"""Origins that are nearer are the same: each is written in steps of a centimetre."""
-FAR_DEG = 0.01
-"""Beyond this (a kilometre) two origins are not of one site, and no metres are worth counting."""
+from mission.geodesy import bearing_deg, from_geodetic, heading_of
+from mission.mavlink.origin import how_far_off
 
 
 @dataclass(frozen=True)
@@ -51,20 +47,13 @@ UNPLACED = LocalFrame(SiteOrigin(lat=0.0, lon=0.0, alt=0.0, heading_deg=0.0))
 
 def local_frame(site: SiteOrigin, origin: Origin, rule: str) -> LocalFrame:
     """The autopilot's frame in the site's; the origins must be near one another (`apart`)."""
-    return LocalFrame(site, from_geodetic(site, Geodetic(lat=origin.lat, lon=origin.lon), rule))
+    return LocalFrame(site, from_geodetic(site, origin.place, rule))
 
 
-def apart(site: SiteOrigin, origin: Origin, rule: str) -> str:
+def apart(site: SiteOrigin, origin: Origin) -> str:
     """Why an autopilot that counts from `origin` cannot drive in `site`; empty if it can."""
-    d_lat, d_lon = origin.lat - site.lat, math.remainder(origin.lon - site.lon, 360.0)
-    if max(abs(d_lat), abs(d_lon)) > FAR_DEG:
-        away = "more than a kilometre"
-    else:
-        metres = math.hypot(*local_frame(site, origin, rule).origin)
-        if metres <= SAME_PLACE_M:
-            return ""
-        away = f"{metres:.2f} m"
-    return (
+    away = how_far_off(site, origin.place)
+    return away and (
         f"the autopilot's origin ({origin.lat:.7f}, {origin.lon:.7f}) lies {away} from the mission's"
         f" ({site.lat:.7f}, {site.lon:.7f}); set the same one (most take one per boot), or plan with that"
     )

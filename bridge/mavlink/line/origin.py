@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from bridge.mavlink.line.peer import Origin, Peer
 from mission.document import SiteOrigin
 from mission.errors import AnswerIsNo
-from mission.geodesy import Geodetic, from_geodetic
-
-NEAR_M = 0.1
-"""Two origins that are so close are the same."""
+from mission.mavlink.origin import how_far_off
 
 
 def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> Origin:
@@ -36,18 +31,14 @@ def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> Origi
             f"{peer} has no origin, {tried}, or --any-origin if it finds its place by satellites; "
             "nothing was sent"
         )
-    away_m = _distance_m(site, held)
-    if away_m > NEAR_M:
+    away = how_far_off(site, held.place)
+    if away:
         raise AnswerIsNo(
-            f"{peer}: its origin {_told(held)} is {away_m:.2f} m from the mission's {_told(wanted)}, "
+            f"{peer}: its origin {_told(held)} is {away} from the mission's {_told(wanted)}, "
             "and so would every stop be; an origin is taken once per boot: restart it and push with "
             "--set-origin, or --any-origin if it finds its place by satellites; nothing was sent"
         )
     return held
-
-
-def _distance_m(site: SiteOrigin, held: Origin) -> float:
-    return math.hypot(*from_geodetic(site, Geodetic(lat=held.lat, lon=held.lon)))
 
 
 def _told(origin: Origin) -> str:

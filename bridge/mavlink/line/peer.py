@@ -18,7 +18,7 @@ from bridge.mavlink.line.round_trips import RoundTrips
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import SIGNATURE, Box, Message, Who, Wire, dialect, sender, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
-from mission.geodesy import STEPS_PER_DEGREE
+from mission.geodesy import STEPS_PER_DEGREE, Geodetic
 
 PATIENCE_S = 5.0
 """Silence after which a vehicle is given up."""
@@ -75,6 +75,16 @@ class Origin:
     lat: float
     lon: float
     alt: float
+
+    @property
+    def place(self) -> Geodetic:
+        return Geodetic(lat=self.lat, lon=self.lon)
+
+
+def origin_of(message: Message) -> Origin:
+    """What a GPS_GLOBAL_ORIGIN tells."""
+    steps = STEPS_PER_DEGREE
+    return Origin(lat=message.latitude / steps, lon=message.longitude / steps, alt=message.altitude / 1000)
 
 
 class Newest(Box):
@@ -263,7 +273,7 @@ class Peer:
     def origin(self, *, patience_s: float | None = None) -> Origin | None:
         """What its metres count from (GPS_GLOBAL_ORIGIN); `None` if it is not set, or not told."""
         message = self.ask(dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, patience_s=patience_s)
-        return None if message is None else _origin(message)
+        return None if message is None else origin_of(message)
 
     def set_origin(self, origin: Origin, *, patience_s: float | None = None) -> Origin | None:
         """Tell it what its metres count from, and the origin it then has: the old one if it had one."""
@@ -487,8 +497,3 @@ def _why_none(wire: Wire) -> str:
         return f" ({wire.gone})"
     dropped = wire.dropped[SIGNATURE]
     return f" ({dropped} frames had a {SIGNATURE}: is the signing key the vehicle's?)" if dropped else ""
-
-
-def _origin(message: Message) -> Origin:
-    steps = STEPS_PER_DEGREE
-    return Origin(lat=message.latitude / steps, lon=message.longitude / steps, alt=message.altitude / 1000)

@@ -86,7 +86,7 @@ def test_a_site_that_bears_30_degrees_turns_north_and_east() -> None:
 def test_an_origin_two_centimetres_off_is_the_same_and_counted() -> None:
     # 2e-7° of latitude are 2.2 cm north by ArduPilot's scale.
     origin = Origin(lat=SITE.lat + 2e-7, lon=SITE.lon, alt=0.0)
-    assert apart(SITE, origin, "ardupilot") == ""
+    assert apart(SITE, origin) == ""
     frame = local_frame(SITE, origin, "ardupilot")
     north = frame.pose(0.0, 0.0, 0.0)
     assert math.hypot(north.x, north.y) == pytest.approx(0.02226, abs=1e-4)
@@ -101,4 +101,4 @@ def test_an_origin_two_centimetres_off_is_the_same_and_counted() -> None:
     ],
 )
 def test_another_origin_is_told_with_its_distance(origin: Origin, away: str) -> None:
-    assert f"lies {away} from the mission's (47.4000000, 8.5000000)" in apart(SITE, origin, "px4")
+    assert f"lies {away} from the mission's (47.4000000, 8.5000000)" in apart(SITE, origin)

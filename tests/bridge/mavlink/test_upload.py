@@ -416,13 +416,13 @@ def peer() -> Any:
         yield vehicle, peer
 
 
-def test_an_origin_within_a_decimetre_is_the_same(peer: tuple[Scripted, Peer]) -> None:
+def test_an_origin_within_five_centimetres_is_the_same(peer: tuple[Scripted, Peer]) -> None:
     vehicle, it = peer
-    vehicle.origin = (470_000_008, 80_000_000, 0)  # 0.089 m north
+    vehicle.origin = (470_000_004, 80_000_000, 0)  # 0.044 m north
     check_origin(it, SITE)
-    vehicle.origin = (470_000_010, 80_000_000, 0)
+    vehicle.origin = (470_000_007, 80_000_000, 0)
     with pytest.raises(
-        AnswerIsNo, match=r"is 0\.11 m from the mission's 47\.0000000, 8\.0000000.*once per boot"
+        AnswerIsNo, match=r"is 0\.08 m from the mission's 47\.0000000, 8\.0000000.*once per boot"
     ):
         check_origin(it, SITE, set_it=True)
 
