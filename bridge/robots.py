@@ -10,22 +10,9 @@ import msgspec
 
 from mission.document import Mission, Point, RobotSpec, Scan
 from mission.events import Pose
+from mission.scans import ScanFailed, ScanResult
 
 Outcome = Literal["arrived", "interrupted", "blocked"]
-
-
-class ScanResult(msgspec.Struct, frozen=True, kw_only=True):
-    """What the scanner says it has written."""
-
-    file: str
-    """Id of the file, never used twice by a scanner."""
-    size: int
-    sha256: str
-    points: int
-
-
-class ScanFailed(msgspec.Struct, frozen=True, kw_only=True):
-    reason: str
 
 
 class Rest(msgspec.Struct, frozen=True, kw_only=True):

@@ -13,7 +13,6 @@ from typing import Literal
 
 import msgspec
 
-from bridge.robots import ScanFailed, ScanResult
 from mission.document import Mission, Stop
 from mission.events import (
     Aborted,
@@ -32,6 +31,7 @@ from mission.events import (
     State,
     StopState,
 )
+from mission.scans import ScanFailed, ScanResult, missing_in
 
 After = Literal["FINISHED", "ABORTED", "PAUSED"]
 
@@ -148,26 +148,17 @@ def verified(run: Run, mission: Mission, pose: Pose) -> Change:
     stop, scan = mission.stops[run.at], run.scan
     if scan is None:
         return Change(changed(run, stop_state="WAITING"))
-    wrong = what_is_wrong(scan)
-    if wrong:
-        return failed(changed(run, scan=None), mission, f"scan not confirmed: {wrong}")
+    missing = missing_in(scan)
+    if missing:
+        told = f"{scan.file} ({scan.size} bytes, {scan.points} points)"
+        reason = f"scan not confirmed: {told} without {', '.join(missing)}"
+        return failed(changed(run, scan=None), mission, reason)
     telling = partial(
         Scanned, stop=stop.id, pose=pose,
         file=scan.file, size=scan.size, sha256=scan.sha256, points=scan.points,
     )  # fmt: skip
     done = next_stop(changed(run, done=(*run.done, stop.id)), mission)
     return Change(done.run, (telling, *done.events))
-
-
-def what_is_wrong(scan: ScanResult) -> str:
-    """Why a scanner's result is no scan; empty if it is one."""
-    if not scan.file:
-        return "no file id"
-    if scan.size <= 0 or scan.points <= 0:
-        return f"{scan.file} has {scan.size} bytes and {scan.points} points"
-    if len(scan.sha256) != 64:
-        return f"{scan.file} has no sha256"
-    return ""
 
 
 def next_stop(run: Run, mission: Mission) -> Change:

@@ -16,10 +16,11 @@ import msgspec
 
 from bridge.clock import Clock
 from bridge.motion import Brake, Motion, along
-from bridge.robots import Outcome, Rest, ScanFailed, ScanResult
+from bridge.robots import Outcome, Rest
 from mission.document import Mission, Point, RobotSpec, Scan
 from mission.errors import InputError
 from mission.events import Pose
+from mission.scans import ScanFailed, ScanResult
 
 SLICE_S = 0.5
 """How often a moving robot's place is written down: what a crash can cost."""

@@ -11,7 +11,6 @@ from bridge.clock import Clock
 from bridge.mavlink.desk.progress import Sight
 from bridge.mavlink.desk.visits import Course
 from bridge.mavlink.gateway.local import LocalFrame, local_frame
-from bridge.mavlink.line.captures import Capture, capture_of
 from bridge.mavlink.line.modes import Modes
 from bridge.mavlink.line.peer import Origin, origin_of
 from bridge.mavlink.line.wire import Message, dialect
@@ -19,6 +18,7 @@ from bridge.run import Run
 from mission.events import Arrived, Pose
 from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic, heading_of
 from mission.mavlink.autopilots import autopilot_named
+from mission.mavlink.captures import Capture, Picture, capture_of
 from mission.mavlink.origin import is_elsewhere
 
 STILL_M_PER_S = 0.05
@@ -32,10 +32,7 @@ TOLD = (
     "ATTITUDE", "SYS_STATUS", "BATTERY_STATUS", "CAMERA_IMAGE_CAPTURED", "GPS_GLOBAL_ORIGIN", "SYSTEM_TIME",
 )  # fmt: skip
 """Messages that are looked at."""
-
-
-CaptureName = tuple[int, int]
-NONE_YET: CaptureName = (-1, -1)
+NONE_YET: Picture = (-1, -1)
 
 
 @dataclass(frozen=True)
@@ -166,7 +163,7 @@ class Lookout:
         return seen.message.total if 0 < seen.message.total < UNKNOWN_TOTAL else None
 
     def sight(
-        self, run: Run, course: Course, arrived: Arrived | None = None, *, after: CaptureName = NONE_YET
+        self, run: Run, course: Course, arrived: Arrived | None = None, *, after: Picture = NONE_YET
     ) -> Sight | None:
         """What is seen of the vehicle, if enough is known.
 
@@ -198,7 +195,7 @@ class Lookout:
             return course.end
         return course.place(current.seq)
 
-    def capture(self, run: Run, course: Course, after: CaptureName) -> Capture | None:
+    def capture(self, run: Run, course: Course, after: Picture) -> Capture | None:
         """What was told last of a scan at the stop that is worked on."""
         if run.at >= len(course.mission.stops):
             return None
@@ -243,7 +240,7 @@ class Lookout:
             self.battery = message.battery_remaining / 100
 
     def _take_capture(self, message: Message, course: Course | None, now_ns: int) -> None:
-        capture = capture_of(message, course)
+        capture = capture_of(message, None if course is None else course.sent)
         if all(capture.name != known.name for known in self._captures):
             self._captures.append(capture)
 

@@ -14,10 +14,10 @@ from functools import partial
 
 from bridge import run as runs
 from bridge.mavlink.desk.visits import Course, Visit
-from bridge.robots import ScanFailed, ScanResult
 from bridge.run import Change, Run, changed
 from mission.document import Stop
 from mission.events import Paused, Pose, Resumed, Settled, Started, Unconfirmed
+from mission.scans import ScanFailed, ScanResult
 
 HEADING_RAD = math.radians(5.0)
 """How far a heading may be missed by a mission whose scanner does not see all around."""

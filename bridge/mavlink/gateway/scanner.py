@@ -1,27 +1,24 @@
 """A scanner that a MAVLink vehicle triggers: ordered as a camera or by a script, believed only with its file.
 
-A scan is confirmed by CAMERA_IMAGE_CAPTURED with `capture_result` 1 and a `file_url` of the form
-`NAME.e57?size=N&points=N&sha256=HEX`. What comes with a number that was told before is an older scan's, told
-again; what lacks a piece is no confirmation.
+A scan is confirmed by CAMERA_IMAGE_CAPTURED (`mission.mavlink.captures`). What comes with a number that was
+told before is an older scan's, told again.
 """
 
 from __future__ import annotations
 
-import re
 from threading import Event
 from typing import Literal
-from urllib.parse import parse_qsl
 
 from bridge.clock import Clock
 from bridge.mavlink.gateway.autopilot import Autopilot
 from bridge.mavlink.line.wire import Box, Message, dialect
-from bridge.robots import ScanFailed, ScanResult
 from mission.document import Mission, Scan
 from mission.errors import OutcomeUnknown, RobotUnreachable
+from mission.mavlink.captures import Picture, picture_of, result_of
 from mission.mavlink.numbers import numbers_of
 from mission.mavlink.writing import SCAN_MESSAGE
+from mission.scans import ScanFailed, ScanResult
 
-Picture = tuple[int, int]
 Order = tuple[int, tuple[float, ...]]
 """A command and its params."""
 Trigger = Literal["camera", "script"]
@@ -36,8 +33,6 @@ COUNT_S = 1.0
 """How long the camera may take to say what it has taken."""
 BUSY_S = 1.0
 """Between two tries of a trigger, while an older scan is under way."""
-_NUMBER = re.compile(r"[1-9][0-9]{0,17}")
-_SHA256 = re.compile(r"[0-9a-fA-F]{64}")
 
 
 class MavlinkScanner:
@@ -162,38 +157,6 @@ class MavlinkScanner:
 
     def _now_s(self) -> float:
         return self._clock.now_ns() / 1e9
-
-
-def picture_of(captured: Message) -> Picture:
-    """What tells a picture from others; cameras that were started again count anew."""
-    return int(captured.image_index), int(captured.time_boot_ms)
-
-
-def result_of(captured: Message) -> ScanResult | ScanFailed:
-    """What a message of a picture says of the scan."""
-    if captured.capture_result != 1:
-        return ScanFailed(reason="the vehicle reports that the scan failed")
-    return read_file_url(captured.file_url)
-
-
-def read_file_url(url: str) -> ScanResult | ScanFailed:
-    """The file that `NAME.e57?size=N&points=N&sha256=HEX` tells of."""
-    name, _, query = url.partition("?")
-    told = dict(parse_qsl(query))
-    size, points, sha256 = (told.get(key, "") for key in ("size", "points", "sha256"))
-    wrong = [
-        what
-        for what, fits in (
-            ("a file name", bool(name) and name.endswith(".e57")),
-            ("size", _NUMBER.fullmatch(size)),
-            ("points", _NUMBER.fullmatch(points)),
-            ("sha256", _SHA256.fullmatch(sha256)),
-        )
-        if not fits
-    ]
-    if wrong:
-        return ScanFailed(reason=f"the vehicle told {url!r}, without {', '.join(wrong)}")
-    return ScanResult(file=name, size=int(size), sha256=sha256.lower(), points=int(points))
 
 
 def stop_of(label: str) -> str:

@@ -8,15 +8,13 @@ from contextlib import contextmanager
 from threading import Event
 from typing import Any
 
-import pytest
-
 from bridge.clock import WallClock
-from bridge.mavlink.gateway.scanner import MavlinkScanner, read_file_url, stop_of
+from bridge.mavlink.gateway.scanner import MavlinkScanner, stop_of
 from bridge.mavlink.line.peer import Ack
 from bridge.mavlink.line.wire import Box, Message, Who, dialect
-from bridge.robots import ScanFailed, ScanResult
 from mission.document import Scan
 from mission.errors import OutcomeUnknown
+from mission.scans import ScanFailed, ScanResult
 from tests.bridge.mavlink.gateway import site_mission
 
 SHA = hashlib.sha256(b"scan").hexdigest()
@@ -162,25 +160,6 @@ def test_an_interrupted_scan_is_broken_off() -> None:
         dialect.MAV_CMD_IMAGE_START_CAPTURE,
         dialect.MAV_CMD_IMAGE_STOP_CAPTURE,
     ]
-
-
-@pytest.mark.parametrize(
-    ("url", "missing"),
-    [
-        ("", "a file name, size, points, sha256"),
-        ("scan-1.e57", "size, points, sha256"),
-        (URL.replace("size=1600&", ""), "size"),
-        (URL.replace("points=100", "points=0"), "points"),
-        (URL.replace("points=100", "points=-3"), "points"),
-        (URL[:-1], "sha256"),
-        (URL.replace("scan-1.e57", ""), "a file name"),
-        (URL.replace("scan-1.e57", "scan-1.jpg"), "a file name"),
-    ],
-)
-def test_what_lacks_a_piece_is_no_confirmation(url: str, missing: str) -> None:
-    read = read_file_url(url)
-    assert isinstance(read, ScanFailed)
-    assert read.reason.endswith(f"without {missing}")
 
 
 def test_a_stop_is_found_in_its_label_whatever_its_id() -> None:
