@@ -1,0 +1,222 @@
+"""stopgo from Python: read a floor, plan it, check and export the mission, and send it to a robot.
+
+    import stopgo
+
+    plan = stopgo.plan("floor.dxf", range=8.0)
+    stopgo.write_mission(plan.mission, "mission.json")
+
+Lengths are metres, angles radians counter-clockwise from +x, times seconds. Every noun is frozen; arrays
+are read-only. Paths may be `str` or `Path`.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from contextlib import AbstractContextManager
+
+    from bridge.follow import Report
+    from bridge.station import Station
+    from mission.document import Mission
+    from mission.floor import FloorPlan
+    from mission.plan import Plan
+    from mission.sense import Problem
+    from mission.settings import Settings
+
+FOLDERS = ("mission", "planner", "bridge", "recordings")
+
+
+def settings(parameters: str | Path | None = None, **changes: Any) -> Settings:
+    """The parameters of a plan: defaults, then a plan.toml, then `changes` by name.
+
+    Raises
+    ------
+    InputError
+        Naming the file or parameter, its value and what would be right.
+    """
+    from mission.settings import read_settings
+
+    return read_settings(None if parameters is None else Path(parameters), changes)
+
+
+def read_floor(
+    path: str | Path, *, layers: Mapping[str, str] | None = None, d_dis: float = 0.05
+) -> FloorPlan:
+    """The floor drawn in a file, in metres.
+
+    `layers` says what layers of other names stand for, such as `{"A-WALL": "walls", "DIM": "ignore"}`;
+    curves are cut for units of `d_dis` metres.
+
+    Raises
+    ------
+    InputError
+        Naming the file, what is wrong with it, and the way out.
+    """
+    from planner.floors import read_floor as read
+
+    told = {name.upper(): role for name, role in (layers or {}).items()}
+    return read(Path(path), d_dis=d_dis, layers=told)
+
+
+def plan(
+    floor: FloorPlan | str | Path,
+    given: Settings | None = None,
+    *,
+    all_parts: bool = False,
+    observe: Callable[[Any], None] = lambda noun: None,
+    **changes: Any,
+) -> Plan:
+    """Where the scanner must stand on a floor, and by which route a robot visits those stops.
+
+    Parameters
+    ----------
+    floor
+        A floor, or the file it is drawn in.
+    given
+        All parameters; or name those that are not the default as `changes`, such as `range=8.0`.
+    all_parts
+        Also plan parts of the floor that are not connected with the first.
+    observe
+        Is handed every noun as soon as it is made, for watching.
+
+    Raises
+    ------
+    AnswerIsNo
+        No target, no candidate, nothing in sight, or the coverage asked for cannot be reached.
+    InputError
+        A file, parameter or place that does not fit.
+    """
+    from planner import plan as planned
+
+    if given is not None and changes:
+        raise TypeError(f"give settings, or parameters by name, not both: {', '.join(changes)}")
+    used = settings(**changes) if given is None else given
+    if isinstance(floor, str | Path):
+        floor = read_floor(floor, layers=used.layer_roles, d_dis=used.d_dis)
+    return planned(floor, used, observe=observe, all_parts=all_parts)
+
+
+def read_mission(path: str | Path) -> Mission:
+    """A mission.json, read strictly: an unknown key, a wrong type or a wrong digest is an InputError."""
+    from mission.files.mission_json import read
+
+    return read(Path(path))
+
+
+def write_mission(mission: Mission, path: str | Path) -> None:
+    """Write a mission.json whole or not at all."""
+    from mission.files.mission_json import write
+
+    write(mission, Path(path))
+
+
+def check(mission: Mission, floor: str | Path | None = None) -> tuple[Problem, ...]:
+    """What of a mission makes no sense; and with a floor's file, what does not fit that floor."""
+    from mission.sense import problems_of
+
+    problems = problems_of(mission)
+    if floor is None:
+        return problems
+    from planner.fit import misfits
+
+    return (*problems, *misfits(mission, Path(floor)))
+
+
+def export(mission: Mission, path: str | Path, *, to: str | None = None) -> None:
+    """Write a mission in a format that others open, by the file's suffix or by name; it is read back first.
+
+    Raises
+    ------
+    InputError
+        No such format, or it needs a georeference that the mission has not.
+    AnswerIsNo
+        The format cannot hold what the mission depends on.
+    """
+    from mission.files.atomic import write_atomic
+    from mission.files.exports import exported, format_named
+    from mission.files.exports.format import Supplements
+
+    write_atomic(Path(path), exported(mission, format_named(to, Path(path)), Supplements()))
+
+
+def connect(endpoint: str, *, robot: str, **options: Any) -> AbstractContextManager[Station]:
+    """A robot that has been reached at `endpoint`, such as `tcp/127.0.0.1:7447`, as a context manager.
+
+    Options are those of `bridge.station.connect`: site, commander, timeout_s, keys, insecure.
+
+    Raises
+    ------
+    RobotUnreachable
+        If the robot did not show itself in time; nothing was sent.
+    """
+    from bridge.station import connect as connected
+
+    return connected(endpoint, robot=robot, **options)
+
+
+def push(mission: Mission, station: Station) -> None:
+    """Send a mission to a robot and see it stored there; what an interrupted push has sent is kept.
+
+    Raises
+    ------
+    AnswerIsNo
+        The robot rejects it, with its reason.
+    OutcomeUnknown
+        No answer came: it may or may not be stored.
+    """
+    station.push(mission)
+
+
+def follow(station: Station) -> Iterator[Report]:
+    """States, poses and events of the robot's run as they come, until the run is over."""
+    return station.reports()
+
+
+def main() -> int:
+    """The `stopgo` command."""
+    if sys.version_info < (3, 11):
+        version = f"{sys.version_info[0]}.{sys.version_info[1]}"
+        print(f"stopgo: needs Python 3.11 or newer, this is {version} ({sys.executable})", file=sys.stderr)  # noqa: T201
+        return 2
+    shadow = _shadow()
+    if shadow:
+        print(f"stopgo: {shadow}", file=sys.stderr)  # noqa: T201
+        return 2
+    from mission.__main__ import main as run
+
+    return run()
+
+
+def _shadow() -> str:
+    """Which of our folders another package of the same name stands in front of, and where; else empty."""
+    from importlib.util import find_spec
+
+    home = Path(__file__).resolve().parent
+    for name in FOLDERS:
+        spec = find_spec(name)
+        found = None if spec is None or spec.origin is None else Path(spec.origin).resolve().parent
+        if found != home / name:
+            where = "is missing" if found is None else f"is taken from {found}"
+            return (
+                f"the package '{name}' {where}, not from {home / name}: another package has this name; "
+                "take it out of PYTHONPATH, or install stopgo in an environment of its own"
+            )
+    return ""
+
+
+__all__ = [
+    "check",
+    "connect",
+    "export",
+    "follow",
+    "plan",
+    "push",
+    "read_floor",
+    "read_mission",
+    "settings",
+    "write_mission",
+]

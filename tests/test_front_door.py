@@ -1,0 +1,77 @@
+"""`import stopgo`: typed, documented, quick to import, and aware of what stands in front of its folders."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stopgo
+from mission.errors import InputError
+from mission.plan import Plan
+
+ROOT = Path(__file__).parents[1]
+OFFICE = ROOT / "recordings" / "samples" / "office.dxf"
+
+
+@pytest.mark.parametrize("name", stopgo.__all__)
+def test_every_public_function_is_documented_and_typed(name: str) -> None:
+    function = getattr(stopgo, name)
+    assert inspect.getdoc(function)
+    signature = inspect.signature(function)
+    assert signature.return_annotation is not inspect.Signature.empty
+    for parameter in signature.parameters.values():
+        assert parameter.annotation is not inspect.Parameter.empty, parameter
+
+
+def test_the_guide_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "recordings").symlink_to(ROOT / "recordings", target_is_directory=True)
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    known: dict[str, object] = {}
+    for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        exec(block, known)
+    plan = known["plan"]
+    assert isinstance(plan, Plan)
+    assert repr(plan).count("\n") == 0
+    assert plan._repr_svg_().startswith("<?xml")
+    assert (tmp_path / "stops.csv").exists()
+    assert stopgo.read_mission("mission.json") == plan.mission
+
+
+def test_paths_may_be_text_and_settings_are_given_once() -> None:
+    floor = stopgo.read_floor(str(OFFICE))
+    assert np.isclose(floor.area, stopgo.read_floor(OFFICE).area)
+    with pytest.raises(TypeError, match="not both: range"):
+        stopgo.plan(floor, stopgo.settings(), range=8.0)
+    with pytest.raises(InputError, match="rnage"):
+        stopgo.plan(floor, rnage=8.0)
+
+
+def test_importing_it_loads_nothing_slow() -> None:
+    code = "import sys, stopgo; print(sorted({'numpy', 'shapely', 'zenoh', 'rerun', 'typer'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_package_of_the_same_name_in_front_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "mission").mkdir()
+    (tmp_path / "mission" / "__init__.py").write_text("")
+    code = "import sys, stopgo; sys.exit(stopgo.main())"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "--help"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert f"'mission' is taken from {tmp_path / 'mission'}" in done.stderr
