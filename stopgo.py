@@ -178,17 +178,20 @@ def follow(station: Station) -> Iterator[Report]:
 
 def main() -> int:
     """The `stopgo` command."""
-    if sys.version_info < (3, 11):
-        version = f"{sys.version_info[0]}.{sys.version_info[1]}"
-        print(f"stopgo: needs Python 3.11 or newer, this is {version} ({sys.executable})", file=sys.stderr)  # noqa: T201
-        return 2
-    shadow = _shadow()
-    if shadow:
-        print(f"stopgo: {shadow}", file=sys.stderr)  # noqa: T201
+    trouble = _too_old() or _shadow()
+    if trouble:
+        print(f"stopgo: {trouble}", file=sys.stderr)  # noqa: T201
         return 2
     from mission.__main__ import main as run
 
     return run()
+
+
+def _too_old() -> str:
+    """Whether this Python is one that stopgo does not run on; empty if it does."""
+    if sys.version_info >= (3, 11):  # noqa: UP036  a copied folder is not held to requires-python
+        return ""
+    return f"needs Python 3.11 or newer; this is {sys.version.split()[0]} ({sys.executable})"
 
 
 def _shadow() -> str:

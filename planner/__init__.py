@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from mission.floor import FloorPlan
-from mission.plan import PartPlan, Plan
-from mission.planning import Candidates, NavigableSpace
-from mission.settings import Settings
+if TYPE_CHECKING:
+    from mission.floor import FloorPlan
+    from mission.plan import PartPlan, Plan
+    from mission.planning import Candidates, NavigableSpace
+    from mission.settings import Settings
 
 Observe = Callable[[Any], None]
 
@@ -31,6 +32,7 @@ def plan(
     InputError
         A start, an end or a variant that does not fit the floor.
     """
+    from mission.plan import Plan
     from planner.candidates import candidates
     from planner.navigable import navigable
 
@@ -44,6 +46,7 @@ def plan(
 
 def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
     """Plan from candidates on; `planned` are all parts of the floor that the plan enters."""
+    from mission.plan import PartPlan
     from planner.appraisal import figures_of
     from planner.assemble import assemble
     from planner.refine import refined

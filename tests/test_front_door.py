@@ -55,7 +55,8 @@ def test_paths_may_be_text_and_settings_are_given_once() -> None:
 
 
 def test_importing_it_loads_nothing_slow() -> None:
-    code = "import sys, stopgo; print(sorted({'numpy', 'shapely', 'zenoh', 'rerun', 'typer'} & set(sys.modules)))"
+    slow = {"numpy", "shapely", "zenoh", "rerun", "typer"}
+    code = f"import sys, stopgo; print(sorted({slow} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
