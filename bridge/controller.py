@@ -6,7 +6,6 @@ to, `commands` what each order does. This module is where they meet the robot, t
 
 from __future__ import annotations
 
-import hashlib
 import math
 import sqlite3
 import threading
@@ -17,12 +16,13 @@ import msgspec
 
 from bridge import revision, route
 from bridge import run as runs
+from bridge.answers import answer_to, answered, remember_answer
 from bridge.battery import what_is_missing
 from bridge.clock import Clock
 from bridge.commands import Decision, Refused, Situation, decide, handed_over
 from bridge.journal import Journal
 from bridge.lease import Denied, claimed, lasting_ns
-from bridge.protocol import Answer, Command, Commit, Lease, Rejected, encode
+from bridge.protocol import Answer, Command, Commit, Lease, Rejected
 from bridge.revision import RevisionPolicy
 from bridge.robots import Base, Rest, Scanner
 from bridge.run import Change, Run
@@ -116,29 +116,27 @@ class Controller:
 
     def obey(self, command: Command) -> Answer:
         """Carry out an order once, however often it comes, and remember what was answered."""
-        order = hashlib.sha256(encode(command)).hexdigest()
         with self._lock:
-            before = self._journal.answer(command.cmd_id)
+            before = answered(self._journal, command, self._run)
             if before is not None:
-                return before[1] if before[0] == order else self._id_reused(command)
+                return before
             decision = decide(command, self._situation())
             answer = self._answer(command, decision)
             try:
-                run = self._store_decision(order, decision, answer)
+                run = self._store_decision(command, decision, answer)
             except sqlite3.OperationalError as error:
                 return self._answer(command, self._halt_unstored(error))
             if isinstance(decision, Decision):
                 self._adopt(run, ordered=True)
             return answer
 
-    def _store_decision(self, order: str, decision: Decision | Refused, answer: Answer) -> Run:
+    def _store_decision(self, command: Command, decision: Decision | Refused, answer: Answer) -> Run:
         run = self._run
         with self._journal.transaction():
             if isinstance(decision, Decision):
                 run = self._write(decision.change)
                 self._store_lease(decision.lease)
-            self._journal.store_answer(order, answer)
-            self._journal.forget_answers()
+            remember_answer(self._journal, command, answer)
         return run
 
     def _store_lease(self, lease: Lease | None) -> None:
@@ -164,15 +162,7 @@ class Controller:
     def _answer(self, command: Command, decision: Decision | Refused) -> Answer:
         refused = decision if isinstance(decision, Refused) else None
         run = decision.change.run if isinstance(decision, Decision) else self._run
-        return Answer(
-            cmd_id=command.cmd_id, verb=command.verb, outcome="refused" if refused else "ok",
-            reason=refused.reason if refused else None, message=refused.message if refused else "",
-            run_id=run.run_id, state=run.state,
-        )  # fmt: skip
-
-    def _id_reused(self, command: Command) -> Answer:
-        message = f"command id {command.cmd_id} was used for another order"
-        return self._answer(command, Refused("id_reused", message))
+        return answer_to(command, refused, run)
 
     def take(self, commit: Commit, mission: Mission) -> Rejected | None:
         """Store a whole mission and make it the one to be run, or to be followed from the next stop on."""

@@ -138,7 +138,7 @@ class Journal:
             "INSERT INTO answers VALUES (?, ?, ?)", answer.cmd_id, order_sha, msgspec.json.encode(answer)
         )
 
-    def forget_answers(self, *, keep: int = ANSWERS_KEPT) -> None:
+    def forget_answers(self, *, keep: int) -> None:
         """Drop all but the newest answers; orders that old have long expired and are refused anyway."""
         self._write("DELETE FROM answers WHERE rowid <= (SELECT MAX(rowid) FROM answers) - ?", keep)
 

@@ -6,7 +6,6 @@ whoever watches does not take for somebody else's what the vehicle does meanwhil
 
 from __future__ import annotations
 
-import hashlib
 import math
 import uuid
 from collections.abc import Callable
@@ -15,6 +14,7 @@ from dataclasses import dataclass, replace
 import msgspec
 
 from bridge import run as runs
+from bridge.answers import answer_to, answered, remember_answer
 from bridge.clock import Clock
 from bridge.commands import Decision, Refused, Situation, decide, handed_over
 from bridge.lease import FREE_VERBS
@@ -29,7 +29,7 @@ from bridge.mavlink.gateway.local import apart
 from bridge.mavlink.line.modes import AUTO, HOLD, why_unfit
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.transfer.download import download
-from bridge.protocol import Answer, Command, Lease, Reason, encode
+from bridge.protocol import Answer, Command, Lease
 from bridge.run import Change, Run
 from mission.document import Mission
 from mission.events import Pose
@@ -81,9 +81,9 @@ class Orders:
         OutcomeUnknown
             If the vehicle was told and does not show what it does; nothing is stored then.
         """
-        before = self._book.journal.answer(command.cmd_id)
+        before = answered(self._book.journal, command, self._book.run)
         if before is not None:
-            return before[1]
+            return before
         decision = self._in_the_way(command) or self._decided(command)
         if isinstance(decision, Refused):
             return self._refused(command, decision)
@@ -277,7 +277,7 @@ class Orders:
 
     def _stored(self, command: Command, outcome: Change | Refused, lease: Lease | None) -> Answer:
         """The answer, stored together with what the order has changed."""
-        order = hashlib.sha256(encode(command)).hexdigest()
+        refused = outcome if isinstance(outcome, Refused) else None
         journal = self._book.journal
         with journal.transaction():
             if isinstance(outcome, Change):
@@ -285,8 +285,8 @@ class Orders:
                 journal.forget_fact("owed")
             if lease is not None:
                 journal.store_fact("lease", lease)
-            answer = _answer(command, outcome, self._book.run)
-            journal.store_answer(order, answer)
+            answer = answer_to(command, refused, self._book.run)
+            remember_answer(journal, command, answer)
         return answer
 
 
@@ -324,15 +324,6 @@ VERBS: dict[str, Callable[[Orders, Command, Course, Decision], Change]] = {
     "abort": Orders._abort,
     "home": Orders._home,
 }
-
-
-def _answer(command: Command, outcome: Change | Refused, run: Run) -> Answer:
-    refused = outcome if isinstance(outcome, Refused) else None
-    reason: Reason | None = refused.reason if refused else None
-    return Answer(
-        cmd_id=command.cmd_id, verb=command.verb, outcome="refused" if refused else "ok", reason=reason,
-        message=refused.message if refused else "", run_id=run.run_id, state=run.state,
-    )  # fmt: skip
 
 
 def on_way(run: Run, course: Course, pose: Pose) -> Pose:

@@ -5,12 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
+from bridge.answers import answer_to, remember_answer
+from bridge.mavlink.desk.orders import Consent, Orders
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.peer import reached as found_peer
 from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.simulated.store import Store
+from bridge.protocol import Command
 from mission.document import Scan, SiteOrigin
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import Aborted, Pose, Resumed, Started
@@ -112,6 +116,16 @@ def test_a_mission_that_another_station_has_cleared_is_not_told_or_started(tmp_p
         with pytest.raises(AnswerIsNo, match=r"no_mission: .*cleared") as no:
             station.command("start")
     assert no.value.reason == "no_mission"
+
+
+def test_an_abort_under_a_used_id_is_refused_and_never_told_that_it_was_done(tmp_path: Path) -> None:
+    start = Command(cmd_id="once", verb="start", commander="test", issued_ns=0, valid_for_s=5.0)
+    abort = msgspec.structs.replace(start, verb="abort")
+    with Site(tmp_path).book() as book:
+        no_vehicle: Any = None
+        orders = Orders(book, no_vehicle, no_vehicle, no_vehicle, book.clock, Consent())
+        remember_answer(book.journal, start, answer_to(start, None, book.run))
+        assert (orders.obey(start).outcome, orders.obey(abort).reason) == ("ok", "id_reused")
 
 
 @pytest.mark.parametrize(
