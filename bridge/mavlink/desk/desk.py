@@ -49,9 +49,8 @@ from bridge.station import Station, whoami
 from mission import __version__
 from mission.errors import RobotUnreachable
 from mission.events import PoseReport, StateReport
+from mission.mavlink.telemetry import is_lost
 
-LOST_S = 3.0
-"""A vehicle that has been silent for so long is not answered for."""
 TICK_S = 0.2
 ASK_AGAIN_S = 2.0
 POSES_KEPT = 3000
@@ -201,7 +200,7 @@ class Desk:
 
     def _take_next(self, box: Box) -> None:
         message = box.get(TICK_S)
-        self.board.cut = self._peer.silent_s > LOST_S
+        self.board.cut = is_lost(self._peer.silent_s)  # then it is not answered for
         if message is None:
             return
         with self._hands.news:

@@ -20,13 +20,9 @@ from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic, heading_o
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.captures import Capture, Picture, capture_of
 from mission.mavlink.origin import is_elsewhere
+from mission.mavlink.telemetry import is_lost, stands_still
 
-STILL_M_PER_S = 0.05
-"""An estimator's speed of a robot that stands is not zero."""
 CAPTURES_KEPT = 100
-STALE_NS = 3 * 10**9
-CLOCK_NS = 3 * 10**9
-"""A vehicle that has not told its time for so long does not tell it at all."""
 TOLD = (
     "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT",
     "ATTITUDE", "SYS_STATUS", "BATTERY_STATUS", "CAMERA_IMAGE_CAPTURED", "GPS_GLOBAL_ORIGIN", "SYSTEM_TIME",
@@ -49,6 +45,7 @@ class Fix:
 
     pose: Pose
     speed: float
+    still: bool
     ns: int
 
 
@@ -100,14 +97,14 @@ class Lookout:
         """Whether clock and item were told since the mode changed: by a reboot it does, and at the end."""
         newest = self._clock_told()
         told = newest is not None and min(newest.ns, self.current_ns) > self._mode_began_ns
-        return told or self._clock.now_ns() > self._mode_began_ns + CLOCK_NS
+        return told or is_lost((self._clock.now_ns() - self._mode_began_ns) / 1e9)
 
     @property
     def pose(self) -> Pose | None:
         """Where it stands, unless it has not told so for a while."""
         fix = self.fix
-        stale = fix is None or fix.ns < self._clock.now_ns() - STALE_NS
-        return None if fix is None or stale else fix.pose
+        lost = fix is None or is_lost((self._clock.now_ns() - fix.ns) / 1e9)
+        return None if fix is None or lost else fix.pose
 
     def _clock_told(self) -> Seen | None:
         told = [self._newest[name] for name in CLOCKS if name in self._newest]
@@ -178,7 +175,7 @@ class Lookout:
         return Sight(
             mode=self.mode, armed=self.armed, place=place,
             pose=None if fix is None else fix.pose,
-            still=fix is not None and fix.speed < STILL_M_PER_S,
+            still=fix is not None and fix.still,
             scan=None if capture is None else capture.result,
             stood=arrived.pose if arrived is not None else stood,
         )  # fmt: skip
@@ -219,7 +216,7 @@ class Lookout:
         attitude, frame = self._newest.get("ATTITUDE"), self._local_frame(course)
         if attitude is not None and frame is not None:
             pose = frame.pose(message.x, message.y, attitude.message.yaw)
-            self.fix = Fix(pose, math.hypot(message.vx, message.vy), now_ns)
+            self._fix(pose, math.hypot(message.vx, message.vy), attitude.message.yawspeed, now_ns)
 
     def _take_global(self, message: Message, course: Course | None, now_ns: int) -> None:
         """Steps of 1e-7 degrees are centimetres: taken only of a vehicle that tells no local metres."""
@@ -233,7 +230,10 @@ class Lookout:
         x, y = from_geodetic(site, place, rule)
         heading = heading_of(site, math.degrees(attitude.message.yaw))
         speed = math.hypot(message.vx, message.vy) / 100
-        self.fix = Fix(Pose(x=x, y=y, heading=heading), speed, now_ns)
+        self._fix(Pose(x=x, y=y, heading=heading), speed, attitude.message.yawspeed, now_ns)
+
+    def _fix(self, pose: Pose, speed: float, yaw_rate: float, now_ns: int) -> None:
+        self.fix = Fix(pose, speed, stands_still(speed=speed, yaw_rate=yaw_rate), now_ns)
 
     def _take_battery(self, message: Message, course: Course | None, now_ns: int) -> None:
         if 0 <= message.battery_remaining <= 100:

@@ -18,20 +18,17 @@ from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import Box, Message, Who, dialect, wire
 from mission.document import Point
 from mission.errors import OutcomeUnknown, RobotUnreachable
+from mission.mavlink.telemetry import is_lost, stands_still
 
 ON_BOARD = Who(253, dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
 """Ourselves: neither QGroundControl (255) nor a station of ours (254)."""
 KEEP_S = 0.1
-LOST_S = 2.0
-"""Silence of the autopilot, or age of its pose, after which nobody knows what it does."""
 ORDER_S = 3.0
 """How long one order waits for its answer."""
 STOP_S = 2.5
 """How long `stop` waits to see itself obeyed; it goes on being ordered after that."""
 IN_FLIGHT_S = 0.3
 """A heartbeat that comes so soon after an order may have been sent before it."""
-STILL_M_S = 0.03
-STILL_RAD_S = 0.03
 ASK_ORIGIN_S = 4.0
 ORIGIN_S = 15.0
 """An origin that was not confirmed for so long is gone: the vehicle was started again and has none."""
@@ -62,6 +59,11 @@ class Heard(Box):
     def newest(self, name: str, within_s: float = math.inf) -> Message | None:
         """The newest of a type, unless it is older than that."""
         return self.since(name, time.monotonic() - within_s)
+
+    def fresh(self, name: str) -> Message | None:
+        """The newest of a type, unless it is so old that nothing is known any more."""
+        at, message = self._newest.get(name, (-math.inf, None))
+        return None if is_lost(time.monotonic() - at) else message
 
     def since(self, name: str, at_s: float) -> Message | None:
         """The newest of a type, if it came after a moment of the monotonic clock."""
@@ -155,11 +157,15 @@ class Autopilot:
 
     def speed(self) -> float:
         """Metres per second; 0 when it is not known any more."""
-        told = self._heard.newest("LOCAL_POSITION_NED", LOST_S)
+        told = self._heard.fresh("LOCAL_POSITION_NED")
         return 0.0 if told is None else math.hypot(told.vx, told.vy)
 
     def still(self) -> bool:
-        return self.speed() < STILL_M_S and abs(self._told("ATTITUDE").yawspeed) < STILL_RAD_S
+        """Whether it stands; not while it does not tell."""
+        moved, turned = (self._heard.fresh(name) for name in POSE)
+        if moved is None or turned is None:
+            return False
+        return stands_still(speed=math.hypot(moved.vx, moved.vy), yaw_rate=turned.yawspeed)
 
     def battery(self) -> float | None:
         """0 to 1, as it last told, however old; `None` if it never did."""
@@ -179,10 +185,10 @@ class Autopilot:
 
     def out_of_reach(self) -> str:
         """Why nobody knows where it is or what it does; empty if all is well."""
-        if self.peer.silent_s > LOST_S:
+        if is_lost(self.peer.silent_s):
             gone = f" ({self.peer.wire.gone})" if self.peer.wire.gone else ""
             return f"the autopilot has not been heard for {self.peer.silent_s:.0f} s{gone}"
-        lost = [name for name in POSE if self._heard.newest(name, LOST_S) is None]
+        lost = [name for name in POSE if self._heard.fresh(name) is None]
         return f"the autopilot tells no {lost[0]}: has it lost its position?" if lost else ""
 
     def in_other_hands(self) -> str:

@@ -115,6 +115,21 @@ def test_a_pose_is_of_the_item_only_if_it_was_told_after_it() -> None:
     assert after is not None and after.pose is not None and after.still
 
 
+@pytest.mark.parametrize(
+    ("north_m_s", "yaw_rate", "still"), [(0.02, 0.0, True), (0.04, 0.0, False), (0.0, 0.1, False)]
+)
+def test_a_vehicle_that_creeps_or_turns_is_not_seen_to_stand(
+    north_m_s: float, yaw_rate: float, still: bool
+) -> None:
+    telling = Telling()
+    telling.origin()
+    telling.current(3)
+    telling.tell(dialect.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, yaw_rate))
+    telling.tell(dialect.MAVLink_local_position_ned_message(2, 0, 1.0, 0, north_m_s, 0, 0))
+    sight = telling.lookout.sight(AT_S1, telling.course)
+    assert sight is not None and sight.still is still
+
+
 def test_a_scan_belongs_to_the_stop_where_it_was_made_and_counts_once() -> None:
     telling = Telling()
     telling.current(4)
