@@ -33,10 +33,10 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Greatest distance in metres from a stop to the grid's node that stands for it."""
     coverage: float = 0.9
     """c_min: least share of what is visible that the chosen stops must see, of the whole …"""
-    room_coverage: float = 0.7
+    room_coverage: float | None = None
     """… of what each room shows …"""
-    kind_coverage: float = 0.7
-    """… and of each kind of element."""
+    kind_coverage: float | None = None
+    """… and of each kind of element. None: LEAST_SHARE; by the paper's rule there are no such shares."""
     coverage_rule: Literal["length", "paper"] = "length"
     """Whether coverage counts metres of boundary; or units of the whole only, as the paper does."""
     d_sec: float = 0.7
@@ -114,11 +114,28 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return {name.strip().upper(): role.strip().lower() for name, _, role in told}
 
     @property
+    def least_of_room(self) -> float | None:
+        """Least share of what each room shows; None where none is asked for."""
+        return self._least(self.room_coverage)
+
+    @property
+    def least_of_kind(self) -> float | None:
+        """Least share of what is visible of each kind of element; None where none is asked for."""
+        return self._least(self.kind_coverage)
+
+    def _least(self, given: float | None) -> float | None:
+        if self.coverage_rule == "paper":
+            return None
+        return LEAST_SHARE if given is None else given
+
+    @property
     def radius(self) -> float:
         """The robot's radius in metres: half of door_access unless given."""
         return self.door_access / 2 if self.robot_radius is None else self.robot_radius
 
 
+LEAST_SHARE = 0.7
+"""Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""
 LAYER_ROLES = ("floor", "rooms", "doors", "passages", *KINDS, "ignore")
 """What a layer of a drawing can stand for."""
 
@@ -255,6 +272,7 @@ def check_settings(settings: Settings) -> None:
         if getattr(settings, key) < 0:
             raise InputError(f"{key} = {getattr(settings, key)}: must not be negative")
     _check_shares(settings)
+    _check_rule(settings)
     _check_choices(settings)
 
 
@@ -268,9 +286,6 @@ def _numbers(value: object) -> list[float]:
 def _check_shares(settings: Settings) -> None:
     if not 0 < settings.coverage <= 1:
         raise InputError(f"coverage = {settings.coverage}: must be above 0 and at most 1 (0.9 is 90 %)")
-    for key in ("room_coverage", "kind_coverage"):
-        if not 0 <= getattr(settings, key) <= 1:
-            raise InputError(f"{key} = {getattr(settings, key)}: must be between 0 and 1 (0.7 is 70 %)")
     if not 0 <= settings.battery_min < 1:
         raise InputError(f"battery_min = {settings.battery_min}: must be at least 0 and below 1")
     if settings.d_dis < 1e-3:
@@ -281,6 +296,21 @@ def _check_shares(settings: Settings) -> None:
         raise InputError(f"d_max = {settings.d_max}: seeds below 5 cm are not planned; use 0.05 or more")
     if settings.grid < 0.05:
         raise InputError(f"grid = {settings.grid}: spacing below 5 cm is not planned; use 0.05 or more")
+
+
+def _check_rule(settings: Settings) -> None:
+    """Refuse what a coverage rule or a field of view has no use for."""
+    for key in ("room_coverage", "kind_coverage"):
+        share = getattr(settings, key)
+        if share is not None and not 0 <= share <= 1:
+            raise InputError(f"{key} = {share}: must be between 0 and 1 (0.7 is 70 %)")
+        if share is not None and settings.coverage_rule == "paper":
+            raise InputError(
+                f"{key} = {share}: the paper's rule has no such share; use coverage_rule = length"
+            )
+    if settings.refine and (settings.coverage_rule == "paper" or settings.fov < 360):
+        other = "coverage_rule = paper" if settings.coverage_rule == "paper" else f"fov = {settings.fov:g}"
+        raise InputError(f"refine = true: is not done with {other}; leave one of them out")
 
 
 def _check_choices(settings: Settings) -> None:

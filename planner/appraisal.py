@@ -46,10 +46,8 @@ def shares_of(
     """What the stops see of the whole, of every room and of every kind, the least seen first."""
     space = selection.visibility.candidates.space
     settings, ledger = space.settings, _Ledger(selection)
-    paper = settings.coverage_rule == "paper"
     kinds = [
-        ledger.share(kind, ledger.of_kind(kind), required=None if paper else settings.kind_coverage)
-        for kind in ledger.kinds
+        ledger.share(kind, ledger.of_kind(kind), required=settings.least_of_kind) for kind in ledger.kinds
     ]
     whole = ledger.share("all", ledger.everything, required=settings.coverage)
     return whole, _rooms(ledger, selection, why or {}), worst_first(kinds)
@@ -68,7 +66,7 @@ def _rooms(ledger: _Ledger, selection: Selection, why: Mapping[str, str]) -> tup
     """Rooms with targets, then what faces none of them."""
     space = selection.visibility.candidates.space
     settings = space.settings
-    asked = None if settings.coverage_rule == "paper" else settings.room_coverage
+    asked = settings.least_of_room
     shares = [
         ledger.share(room.name, space.unit_room == k, required=asked, why=why.get(room.name, ""))
         for k, room in enumerate(space.rooms)

@@ -30,8 +30,9 @@ MOST = 25
 def refined(selection: Selection) -> Selection:
     """A selection with fewer stops, some of them beside the pattern; the same where none is saved."""
     settings = selection.visibility.candidates.space.settings
-    wanted = len(selection.chosen) <= MOST if settings.refine is None else settings.refine
-    if not wanted or settings.coverage_rule == "paper" or settings.fov < 360:
+    if settings.coverage_rule == "paper" or settings.fov < 360:
+        return selection
+    if not (len(selection.chosen) <= MOST if settings.refine is None else settings.refine):
         return selection
     beside = _beside(selection)
     if beside is None:

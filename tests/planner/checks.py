@@ -178,8 +178,8 @@ def check_shares(selection: Selection, visible: np.ndarray, covered: np.ndarray,
     if settings.coverage_rule == "paper":
         return
     kind = np.array([space.floor.elements[k].kind for k in targets.element])[targets.unit_segment]
-    members = [(space.unit_room == k, settings.room_coverage) for k in range(len(space.rooms))]
-    members += [(kind == name, settings.kind_coverage) for name in sorted(set(kind.tolist()))]
+    members = [(space.unit_room == k, settings.least_of_room) for k in range(len(space.rooms))]
+    members += [(kind == name, settings.least_of_kind) for name in sorted(set(kind.tolist()))]
     for member, share in members:
         assert weight[covered & member].sum() >= share * weight[visible & member].sum() - 1e-4
 

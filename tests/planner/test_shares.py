@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
 
+from mission.errors import InputError
 from mission.floor import Element, FloorPlan
 from mission.geometry import Polygon
 from mission.planning import NavigableSpace, Selection, weights_of
-from mission.settings import Settings
+from mission.settings import Settings, read_settings
 from planner.navigable import navigable
 from tests.planner.worlds import (
     box,
@@ -160,7 +162,7 @@ def fewest_beside(found: Selection, fixed: int) -> int:
     others = [row for row in range(visibility.rows) if row not in doorways]
     space, settings = visibility.candidates.space, visibility.candidates.space.settings
     members = [(np.ones(len(space.unit_room), dtype=bool), settings.coverage)]
-    members += [(space.unit_room == k, settings.room_coverage) for k in range(len(space.rooms))]
+    members += [(space.unit_room == k, settings.least_of_room) for k in range(len(space.rooms))]
     for more in range(4):
         for rows in combinations(others, more):
             chosen = replace(found, chosen=np.array([*doorways, *rows]))
@@ -181,5 +183,19 @@ def test_places_beside_the_pattern_may_save_a_stop_and_never_cost_one() -> None:
 
 
 def test_the_papers_rule_offers_nothing_beside_the_pattern() -> None:
-    _, nouns = planned(hall(7, 4), Settings(coverage_rule="paper", refine=True))
+    _, nouns = planned(hall(7, 4), Settings(coverage_rule="paper"))
     assert not len(nouns[Selection].visibility.candidates.extra_rows)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"coverage_rule": "paper", "room_coverage": 0.7}, "room_coverage = 0.7"),
+        ({"coverage_rule": "paper", "refine": True}, "refine = true"),
+        ({"fov": 120.0, "refine": True}, "fov = 120"),
+        ({"kind_coverage": 1.2}, "between 0 and 1"),
+    ],
+)
+def test_what_would_be_ignored_is_refused(given: dict[str, Any], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        read_settings(None, given)
