@@ -121,9 +121,9 @@ def check(mission: Mission, floor: str | Path | None = None) -> tuple[Problem, .
     problems = problems_of(mission)
     if floor is None:
         return problems
-    from planner.fit import misfits
+    from planner.verdict import verdict
 
-    return (*problems, *misfits(mission, Path(floor)))
+    return (*problems, *verdict(mission, Path(floor), None).problems)
 
 
 def export(mission: Mission, path: str | Path, *, to: str | None = None) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -49,45 +50,92 @@ def show(mission: MissionFile, as_json: AsJson = False) -> None:
     typer.echo(json_text(report(document, times)) if as_json else page(document, times))
 
 
-def check(mission: MissionFile, floor: Floor = None, as_json: AsJson = False) -> None:
+def check(
+    mission: MissionFile,
+    floor: Floor = None,
+    coverage: Annotated[
+        Path | None, typer.Option(help="With --floor: the coverage.json that was written with it.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
     """Check that a mission makes sense.
 
-    Schema, digest, numbers, legs that join up; and with --floor, that it was planned on that floor, and
-    that stops and legs keep every clearance there, measured anew by distance.
+    Schema, digest, numbers, legs that join up. With --floor also that it was planned on that floor, that
+    stops and legs keep every clearance there, measured anew, and that the stops see what the mission claims,
+    counted anew by holding every sight line against every wall; with --coverage, what that file claims.
 
-    Exit code 0: in order; 1: readable but senseless, of another floor, or unfit for it; 2: not readable.
+    Exit code 0: in order; 1: readable but senseless, of another floor, unfit for it, or claiming more than
+    its stops see; 2: not readable.
 
     Example: stopgo check out/mission.json --floor office.dxf
     """
     from mission.files.mission_json import read
     from mission.page import identity, json_text
-    from mission.sense import problems_of
 
     document = read(mission)
-    problems = (*problems_of(document), *(() if floor is None else _floor_problems(document, floor)))
+    found = _checked(document, floor, coverage)
+    for note in found.notes:
+        typer.echo(f"stopgo: {note}", err=True)
     if as_json:
-        typer.echo(json_text(_verdict(mission, document, problems)))
-    elif problems:
+        typer.echo(json_text(_verdict(mission, document, found)))
+    elif found.problems:
         from mission.table import printable_lines
 
-        typer.echo(printable_lines("\n".join(map(str, problems))))
+        typer.echo(printable_lines("\n".join(map(str, found.problems))))
     else:
         typer.echo(f"{mission}: in order; {identity(document)}, {len(document.stops)} stops")
-    if problems:
-        raise AnswerIsNo(f"{mission}: {len(problems)} problem{'s' * (len(problems) > 1)}")
+    if found.told is not None and not as_json:
+        typer.echo(f"coverage {found.told}")
+    if found.problems:
+        raise AnswerIsNo(f"{mission}: {len(found.problems)} problem{'s' * (len(found.problems) > 1)}")
 
 
-def _floor_problems(mission: Mission, floor: Path) -> tuple[Problem, ...]:
-    """Whether it was planned on this very floor, and what of it does not fit there."""
-    from planner.fit import misfits
+@dataclass(frozen=True)
+class _Checked:
+    """What is wrong with a mission, what its stops were counted to see, and what was not checked."""
 
+    problems: tuple[Problem, ...]
+    coverage: dict[str, Any] | None = None
+    told: str | None = None
+    notes: tuple[str, ...] = ()
+
+
+def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Checked:
+    from mission.files.coverage_json import read_coverage
+    from mission.sense import problems_of
+
+    problems = problems_of(mission)
+    if floor is None:
+        if coverage is not None:
+            raise InputError(f"--coverage {coverage}: is held against the floor; give it with --floor")
+        return _Checked(problems)
+    claims = None if coverage is None else read_coverage(coverage, mission)
     other = _other_floor(mission, floor)
     try:
-        return (*other, *misfits(mission, floor))
+        from planner.verdict import verdict
+
+        found = verdict(mission, floor, claims)
+    except ModuleNotFoundError as error:
+        if not _is_of_plan(error):
+            raise
+        unchecked = "neither clearances nor coverage were checked"
+        note = f'{error.name} is not installed, so {unchecked}; pip install "stopgo[plan]"'
+        return _Checked((*problems, *other), notes=(note,))
     except InputError:
         if other:  # not the floor, and no floor either
-            return other
+            return _Checked((*problems, *other))
         raise
+    counted = found.counted
+    return _Checked(
+        (*problems, *other, *found.problems),
+        coverage=None if counted is None else counted.as_json(),
+        told=None if counted is None else counted.in_words(),
+    )
+
+
+def _is_of_plan(error: ModuleNotFoundError) -> bool:
+    """Whether what is missing is a library of the extra, not a part of this program."""
+    return (error.name or "").partition(".")[0] not in ("", "mission", "planner")
 
 
 def _other_floor(mission: Mission, floor: Path) -> tuple[Problem, ...]:
@@ -106,15 +154,17 @@ def _other_floor(mission: Mission, floor: Path) -> tuple[Problem, ...]:
     return (Problem("$.origin.floor_digest", message),)
 
 
-def _verdict(path: Path, mission: Mission, problems: tuple[Problem, ...]) -> dict[str, Any]:
+def _verdict(path: Path, mission: Mission, found: _Checked) -> dict[str, Any]:
     return {
         "file": str(path),
-        "ok": not problems,
+        "ok": not found.problems,
         "id": mission.id,
         "revision": mission.revision,
         "digest": mission.digest,
         "stops": len(mission.stops),
-        "problems": [{"path": problem.path, "message": problem.message} for problem in problems],
+        "problems": [{"path": problem.path, "message": problem.message} for problem in found.problems],
+        "coverage": found.coverage,
+        "notes": found.notes,
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -82,6 +83,9 @@ def worst_first(shares: Sequence[Share]) -> tuple[Share, ...]:
     return tuple(sorted(shares, key=lambda s: (s.coverage is None, s.coverage or 0.0, s.name)))
 
 
-def percent(share: float | None) -> str:
+def percent(share: float | None, *, digits: int = 1) -> str:
     """A share as people read it, cut and not rounded up, so that 89.96 % is not told as 90.0 %."""
-    return "-" if share is None else f"{int(share * 1000 + 1e-9) / 10:.1f} %"
+    if share is None:
+        return "-"
+    steps = 10**digits
+    return f"{math.floor(100 * share * steps + 1e-9) / steps:.{digits}f} %"

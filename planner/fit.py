@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -18,13 +17,11 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from mission.document import Mission, Point, Stop
-from mission.errors import InputError
 from mission.floor import Element, FloorPlan
 from mission.geometry import FloatArray
 from mission.sense import Problem
-from mission.settings import Settings, read_settings
+from mission.settings import Settings
 from planner.assemble import CLEAR_SLACK
-from planner.floors import read_floor
 from planner.gaps import Walls
 from planner.ground import Ground
 from planner.plausible import over_ignored
@@ -33,22 +30,6 @@ from planner.targets import solid_of
 
 ALLOWED = SLACK + CLEAR_SLACK
 """What a clearance may fall short by, in metres: as in planning, and rounded as in missions."""
-
-
-def misfits(mission: Mission, path: Path) -> tuple[Problem, ...]:
-    """What of a mission does not fit the floor in a file, in the order of the document.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read as a floor.
-    """
-    try:
-        settings = read_settings(None, mission.origin.parameters)
-    except InputError as error:
-        return (Problem("$.origin.parameters", f"are not those of a plan: {error}"),)
-    floor = read_floor(path, d_dis=settings.d_dis, layers=settings.layer_roles)
-    return (*_other_machine(mission, settings), *misfits_on(floor, mission, settings))
 
 
 def misfits_on(floor: FloorPlan, mission: Mission, settings: Settings) -> Iterator[Problem]:
@@ -63,7 +44,7 @@ def misfits_on(floor: FloorPlan, mission: Mission, settings: Settings) -> Iterat
     yield from fit.over_ignored(mission)
 
 
-def _other_machine(mission: Mission, settings: Settings) -> Iterator[Problem]:
+def other_machine(mission: Mission, settings: Settings) -> Iterator[Problem]:
     """What the robot is sent of itself, where the plan was made with something else."""
     pairs = (
         ("$.robot.radius", mission.robot.radius, "robot_radius", settings.radius),

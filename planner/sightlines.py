@@ -14,8 +14,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
-from mission.geometry import BoolArray, IntArray
+from mission.geometry import BoolArray, FloatArray, IntArray
+from mission.planning import NavigableSpace
+from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
+from planner.targets import face_segments
 
 SPLIT = 27
 LOW = (1 << SPLIT) - 1
@@ -50,6 +54,33 @@ class Midpoints:
         return Midpoints(
             self.a[chosen], self.b[chosen], self.odd[chosen], self.pieces[chosen], self.face[chosen]
         )
+
+
+class SightLines:
+    """A floor's targets and occluders, prepared for telling what many places see; units by number."""
+
+    def __init__(self, space: NavigableSpace) -> None:
+        self._origin, targets = local_origin(space.floor), space.targets
+        a, b = to_grid(targets.a - self._origin), to_grid(targets.b - self._origin)
+        self._midpoints = Midpoints.of(a, b, targets.units, targets.occluding)
+        outlines = whole_steps_of(space.occluders, self._origin)
+        self._edges = np.rint(face_segments(outlines)).astype(np.int64)
+        self._reach = space.settings.range
+        self._points = shapely.STRtree(shapely.points(targets.unit_xy - self._origin))
+        self._lines = shapely.STRtree(shapely.linestrings(self._edges * GRID))
+
+    def seen_from(self, xy: FloatArray, among: BoolArray | None = None) -> IntArray:
+        """Units that a place (2,) in the drawing's coordinates sees within range, of `among` if given."""
+        place = to_grid(xy - self._origin)
+        units, edges = self._near(self._points, place), self._near(self._lines, place)
+        units = units if among is None else units[among[units]]
+        reach = round(self._reach / GRID)
+        return units[sees(place, self._midpoints.among(units), self._edges[edges], reach=reach)]
+
+    def _near(self, tree: shapely.STRtree, place: IntArray) -> IntArray:
+        """What may lie within range, and a little more, ascending."""
+        found = tree.query(shapely.Point(place * GRID), predicate="dwithin", distance=self._reach + 4 * GRID)
+        return np.sort(found)
 
 
 def sees(place: IntArray, midpoints: Midpoints, edges: IntArray, *, reach: int | None) -> BoolArray:

@@ -1,15 +1,17 @@
-"""Writes coverage.json: what of each building element the mission's stops see, and where along its faces."""
+"""coverage.json: what of each building element the mission's stops see, and where along its faces."""
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
 
 from mission.document import Mission
+from mission.errors import InputError
 from mission.figures import Figures, Share
 from mission.files.atomic import write_atomic
 from mission.floor import Element
@@ -17,8 +19,76 @@ from mission.geometry import FloatArray, IntArray
 from mission.planning import Route, Targets
 from mission.seen import runs_of, seen_units
 
-_DIGITS = 6
+DIGITS = 6
 """A micrometre, and a millionth of a segment."""
+
+
+class CoverageSegment(msgspec.Struct, frozen=True):
+    """A straight piece of boundary in metres, and what of it is seen as fractions from a to b."""
+
+    a: tuple[float, float]
+    b: tuple[float, float]
+    seen: tuple[tuple[float, float], ...]
+
+
+class CoverageCounts(msgspec.Struct, frozen=True):
+    """Units in all, those that can be seen, those that the stops see, and the share of the latter two."""
+
+    units: int
+    visible: int
+    seen: int
+    coverage: float | None
+
+
+class CoverageElement(CoverageCounts, frozen=True):
+    id: str
+    segments: tuple[CoverageSegment, ...]
+
+
+class CoverageOf(msgspec.Struct, frozen=True):
+    id: str
+    digest: str
+
+
+class Coverage(msgspec.Struct, frozen=True):
+    """A coverage.json as it is read."""
+
+    schema: Literal["stopgo/coverage"]
+    version: Literal[1]
+    mission: CoverageOf
+    total: CoverageCounts
+    elements: tuple[CoverageElement, ...]
+
+
+def read_coverage(path: Path, mission: Mission) -> Coverage:
+    """The coverage.json of `mission`.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, or tells the coverage of another mission.
+    """
+    try:
+        coverage = msgspec.json.decode(path.read_bytes().removeprefix(BOM_UTF8), type=Coverage)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give a coverage.json") from None
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: not a coverage.json of this version ({error}); plan again") from None
+    _check_mission(coverage.mission, mission, path)
+    return coverage
+
+
+def _check_mission(of: CoverageOf, mission: Mission, path: Path) -> None:
+    if of.id != mission.id:
+        raise InputError(
+            f"{path}: is the coverage of mission {of.id}, not of {mission.id}; "
+            "give the file that was written with the mission"
+        )
+    if of.digest != mission.digest:
+        raise InputError(
+            f"{path}: is the coverage of another revision (digest {of.digest[:12]}…, the mission has "
+            f"{mission.digest[:12]}…); give the file that was written with the mission"
+        )
 
 
 def coverage_json(route: Route, mission: Mission, figures: Figures | None = None) -> bytes:
@@ -93,7 +163,7 @@ class _Counts:
         summary = {
             **{"units": units, "visible": visible, "seen": seen},
             **{"length_m": length, "visible_m": visible_m, "seen_m": seen_m},
-            "coverage": None if share is None else round(share, _DIGITS),
+            "coverage": None if share is None else round(share, DIGITS),
         }
         return {"elements": len(rows), **summary} if with_elements else summary
 
@@ -102,7 +172,7 @@ def _room(share: Share) -> dict[str, Any]:
     """A room's row, in the plan's unit."""
     numbers = (share.total, share.visible, share.seen)
     total, visible, seen = (round(number, 4) for number in numbers)
-    coverage = None if share.coverage is None else round(share.coverage, _DIGITS)
+    coverage = None if share.coverage is None else round(share.coverage, DIGITS)
     row = {"room": share.name, "total": total, "visible": visible, "seen": seen, "coverage": coverage}
     return {**row, "required": share.required, "why": share.why}
 
@@ -116,7 +186,7 @@ def _segments_by_element(route: Route) -> dict[int, list[dict[str, Any]]]:
     seen = _seen_by_segment(targets, route)
     segments: dict[int, list[dict[str, Any]]] = {}
     for index, element in enumerate(targets.element.tolist()):
-        a, b = (np.round(end[index], _DIGITS).tolist() for end in (targets.a, targets.b))
+        a, b = (np.round(end[index], DIGITS).tolist() for end in (targets.a, targets.b))
         segments.setdefault(element, []).append({"a": a, "b": b, "seen": seen.get(index, [])})
     return segments
 
@@ -125,7 +195,7 @@ def _seen_by_segment(targets: Targets, route: Route) -> dict[int, list[list[floa
     runs = runs_of(targets, seen_units(route.selection))
     seen: dict[int, list[list[float]]] = {}
     for segment, t0, t1 in zip(runs.segment.tolist(), runs.t0.tolist(), runs.t1.tolist(), strict=True):
-        seen.setdefault(segment, []).append([round(t0, _DIGITS), round(t1, _DIGITS)])
+        seen.setdefault(segment, []).append([round(t0, DIGITS), round(t1, DIGITS)])
     return seen
 
 

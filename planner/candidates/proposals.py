@@ -10,6 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from mission.geometry import BoolArray, FloatArray, IntArray
 from mission.planning import KEPT
+from mission.specs import DECIMALS
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,6 +18,7 @@ class Proposals:
     """Positions (n, 2) in the drawing's metres, each with its room and what is known of it."""
 
     xy: FloatArray
+    """As a mission holds them, so that what is decided of a position is true of the stop there."""
     room: IntArray
     reason: IntArray
     doorway: BoolArray
@@ -37,7 +39,7 @@ class Proposals:
         rooms = np.asarray(room, dtype=np.int64)
         n = len(rooms)
         return cls(
-            xy=np.asarray(xy, dtype=np.float64).reshape(-1, 2),
+            xy=np.round(np.asarray(xy, dtype=np.float64).reshape(-1, 2), DECIMALS),
             room=rooms,
             reason=np.full(n, KEPT) if reason is None else np.asarray(reason, dtype=np.int64),
             doorway=np.full(n, doorway),
@@ -58,7 +60,7 @@ def joined(proposals: Sequence[Proposals]) -> Proposals:
 
 def in_order(proposals: Proposals, rooms: Sequence[BaseGeometry]) -> Proposals:
     """The proposals from left to right, so that ties are broken alike however the rooms are ordered."""
-    x, y = np.round(proposals.xy, 6).T
+    x, y = proposals.xy.T
     middles = np.round([[room.centroid.x, room.centroid.y] for room in rooms], 6)
     rank = np.argsort(np.lexsort(middles.T[::-1]), kind="stable")
     order = np.lexsort((rank[proposals.room], proposals.doorway, y, x))

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from mission.geometry import FloatArray, IntArray, bounds, frozen
-from mission.planning import Candidates, Visibility
+from mission.planning import Candidates, NavigableSpace, Visibility
 from planner.mesh import Mesh, mesh_of
 from planner.shapes import local_origin, to_grid, whole_steps_of
 from planner.sight import scene_of, sight
@@ -52,19 +52,17 @@ def viewpoints_of(candidates: Candidates) -> tuple[FloatArray, IntArray]:
     places = xy[twice].copy()
     for doorway in candidates.doorway_rows:
         first = int(np.searchsorted(twice, doorway))
-        aside = BESIDE * _across_opening(candidates, xy[doorway])
-        places[first] += aside
-        places[first + 1] -= aside
+        places[first : first + 2] = sides_of_door(candidates.space, xy[doorway])
     return places, twice
 
 
-def _across_opening(candidates: Candidates, point: FloatArray) -> FloatArray:
-    """Unit vector at right angles to the opening that a doorway's point lies on."""
-    lines = [shapely.LineString(item.opening.line) for item in candidates.space.openings]
+def sides_of_door(space: NavigableSpace, point: FloatArray) -> FloatArray:
+    """The two places (2, 2) that a scanner in a doorway looks from, both sides of the door's line."""
+    lines = [shapely.LineString(item.opening.line) for item in space.openings]
     nearest = lines[int(np.argmin(shapely.distance(lines, shapely.Point(point))))]
     a, b = shapely.get_coordinates(nearest)[[0, -1]]
-    along = b - a
-    return np.array([-along[1], along[0]]) / np.hypot(*along)
+    across = np.array([a[1] - b[1], b[0] - a[0]]) / np.hypot(*(b - a))
+    return np.array([point + BESIDE * across, point - BESIDE * across])
 
 
 def open_space(candidates: Candidates) -> Mesh:

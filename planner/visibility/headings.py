@@ -13,16 +13,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from mission.geometry import FloatArray, IntArray, frozen
+from mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from mission.planning import Candidates, Visibility
+from mission.specs import rounded
 from planner.candidates.grid import main_axes
 from planner.shapes import local_origin, to_shape
 from planner.visibility.runs import visibility_of
 
 FEWEST = 8
 """Headings of each position, at least; more where the field of view is below 90°."""
-SLACK = 1e-9
-"""Radians by which a field of view is wider: what lies on its limits belongs to it."""
+SLACK = 1e-6
+"""Radians by which a field of view is wider: what lies on its limits belongs to it, rounded as they are."""
 
 
 def with_headings(seen: Visibility) -> Visibility:
@@ -43,14 +44,15 @@ def with_headings(seen: Visibility) -> Visibility:
 
 
 def headings_of(candidates: Candidates, *, fov: float) -> FloatArray:
-    """Headings all round, at most fov / 2 apart, beginning at the floor's main axis.
+    """Headings all round as missions hold them, at most fov / 2 apart, beginning at the floor's main axis.
 
     Their number is a multiple of four, so that a floor turned by 90° or mirrored has the same ones.
     """
     floor = candidates.space.floor
     axis = main_axes(to_shape(floor.outline, local_origin(floor)))[0]
     number = 4 * math.ceil(max(FEWEST, 2 * math.tau / fov - 1e-9) / 4)
-    return frozen(math.atan2(axis[1], axis[0]) + np.arange(number) * (math.tau / number))
+    first = math.atan2(axis[1], axis[0])
+    return frozen([rounded(math.remainder(first + k * math.tau / number, math.tau)) for k in range(number)])
 
 
 def _views(
@@ -59,12 +61,18 @@ def _views(
     """Headings of one position and the units seen along each; with `once` the best one only."""
     candidates, units = seen.candidates, seen.seen_by(row)
     way = seen.targets.unit_xy[units] - candidates.xy[candidates.kept[row]]
-    bearing = np.arctan2(way[:, 1], way[:, 0])
-    aside = np.abs((bearing - headings[:, None] + math.pi) % math.tau - math.pi)
-    inside = aside <= fov / 2 + SLACK
+    inside = in_view(way, headings[:, None], fov=fov)
     wanted = [int(inside.sum(axis=1).argmax())] if once else range(len(headings))
     for k in wanted:
-        yield math.remainder(headings[k], math.tau), units[inside[k]]
+        yield float(headings[k]), units[inside[k]]
+
+
+def in_view(way: FloatArray, heading: FloatArray | float, *, fov: float) -> BoolArray:
+    """Whether what lies at `way` (n, 2) from a scanner is within heading ± fov / 2 (radians)."""
+    bearing = np.arctan2(way[:, 1], way[:, 0])
+    aside = np.abs((bearing - heading + math.pi) % math.tau - math.pi)
+    inside: BoolArray = aside <= fov / 2 + SLACK
+    return inside
 
 
 def _turned(candidates: Candidates, headings: list[list[float]]) -> Candidates:

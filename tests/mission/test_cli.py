@@ -12,7 +12,7 @@ import msgspec
 import pytest
 
 from mission.__main__ import main
-from mission.document import Mission
+from mission.document import Mission, Sees
 from mission.files.mission_json import write
 from mission.table import duration, table
 from tests.mission.worlds import square_tour
@@ -76,9 +76,16 @@ def test_show_of_nonsense_says_what_is_wrong(broken: str, capsys: pytest.Capture
 
 
 def test_check_of_a_sound_mission_on_its_floor(
-    path: str, floor: Path, capsys: pytest.CaptureFixture[str]
+    mission: Mission, floor: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["check", path, "--floor", str(floor)]) == 0
+    """On the bare slab there is nothing to be seen, so nothing may be claimed."""
+    path = tmp_path / "mission.json"
+    write(mission, path)
+    assert main(["check", str(path), "--floor", str(floor)]) == 1
+    assert "$.stops: see nothing: room: no target on the floor" in capsys.readouterr().out
+    bare = [msgspec.structs.replace(stop, sees=Sees(units=0, new_units=0)) for stop in mission.stops]
+    write(msgspec.structs.replace(mission, stops=tuple(bare)), path)
+    assert main(["check", str(path), "--floor", str(floor)]) == 0
     assert "in order; id 0123456789abcdef0123456789abcdef revision 1, 2 stops" in capsys.readouterr().out
 
 

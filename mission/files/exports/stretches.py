@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from codecs import BOM_UTF8
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
-import msgspec
 import numpy as np
 
 from mission.document import Mission
 from mission.errors import InputError
+from mission.files.coverage_json import CoverageSegment, read_coverage
 from mission.geometry import FloatArray, frozen
 from mission.sense import FAR
 
@@ -27,28 +25,6 @@ class Stretches:
     unseen: FloatArray
 
 
-class _Segment(msgspec.Struct):
-    a: tuple[float, float]
-    b: tuple[float, float]
-    seen: tuple[Fraction, ...]
-
-
-class _Element(msgspec.Struct):
-    segments: tuple[_Segment, ...]
-
-
-class _Of(msgspec.Struct):
-    id: str
-    digest: str
-
-
-class _Coverage(msgspec.Struct):
-    schema: Literal["stopgo/coverage"]
-    version: Literal[1]
-    mission: _Of
-    elements: tuple[_Element, ...]
-
-
 def read_stretches(path: Path, mission: Mission) -> Stretches:
     """The stretches in the coverage.json of `mission`.
 
@@ -57,13 +33,7 @@ def read_stretches(path: Path, mission: Mission) -> Stretches:
     InputError
         When the file cannot be read, or tells the coverage of another mission.
     """
-    try:
-        coverage = msgspec.json.decode(path.read_bytes().removeprefix(BOM_UTF8), type=_Coverage)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give a coverage.json") from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: not a coverage.json of this version ({error}); plan again") from None
-    _check_mission(coverage.mission, mission, path)
+    coverage = read_coverage(path, mission)
     segments = [segment for element in coverage.elements for segment in element.segments]
     _check_segments(segments, path)
     seen = [piece for segment in segments for piece in _pieces(segment, segment.seen)]
@@ -71,20 +41,7 @@ def read_stretches(path: Path, mission: Mission) -> Stretches:
     return Stretches(*(frozen(pieces).reshape(-1, 2, 2) for pieces in (seen, unseen)))
 
 
-def _check_mission(of: _Of, mission: Mission, path: Path) -> None:
-    if of.id != mission.id:
-        raise InputError(
-            f"{path}: is the coverage of mission {of.id}, not of {mission.id}; "
-            "give the file that was written with the mission"
-        )
-    if of.digest != mission.digest:
-        raise InputError(
-            f"{path}: is the coverage of another revision (digest {of.digest[:12]}…, the mission has "
-            f"{mission.digest[:12]}…); give the file that was written with the mission"
-        )
-
-
-def _check_segments(segments: Sequence[_Segment], path: Path) -> None:
+def _check_segments(segments: Sequence[CoverageSegment], path: Path) -> None:
     for segment in segments:
         near = all(abs(value) <= FAR for value in (*segment.a, *segment.b))
         if not near or not all(0 <= first <= last <= 1 for first, last in segment.seen):
@@ -105,7 +62,9 @@ def _between(seen: tuple[Fraction, ...]) -> Iterator[Fraction]:
         yield begin, 1.0
 
 
-def _pieces(segment: _Segment, fractions: Iterator[Fraction] | tuple[Fraction, ...]) -> Iterator[FloatArray]:
+def _pieces(
+    segment: CoverageSegment, fractions: Iterator[Fraction] | tuple[Fraction, ...]
+) -> Iterator[FloatArray]:
     a, b = np.array(segment.a), np.array(segment.b)
     for first, last in fractions:
         yield np.stack([a + first * (b - a), a + last * (b - a)])

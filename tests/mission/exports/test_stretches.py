@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -23,6 +24,13 @@ def written(tmp_path: Path) -> tuple[Path, Mission]:
     return tmp_path / "coverage.json", room_mission()
 
 
+COUNTS = {"units": 10, "visible": 10, "seen": 7, "coverage": 0.7}
+
+
+def element(segment: dict[str, Any]) -> dict[str, Any]:
+    return {"id": "w", **COUNTS, "segments": [segment]}
+
+
 def lengths(stretches: np.ndarray) -> float:
     return float(np.hypot(*(stretches[:, 1] - stretches[:, 0]).T).sum())
 
@@ -39,7 +47,7 @@ def test_what_lies_between_two_seen_pieces_is_not_seen(tmp_path: Path) -> None:
     mission = square_tour()
     segment = {"a": [0, 0], "b": [10, 0], "seen": [[0.1, 0.3], [0.5, 1.0]]}
     coverage = {
-        **{"schema": "stopgo/coverage", "version": 1, "elements": [{"segments": [segment]}]},
+        **{"schema": "stopgo/coverage", "version": 1, "elements": [element(segment)], "total": COUNTS},
         "mission": {"id": mission.id, "digest": mission.digest},
     }
     (tmp_path / "c.json").write_text(json.dumps(coverage))
@@ -75,7 +83,8 @@ def test_segments_that_make_no_sense_are_refused(seen: list, end: float, tmp_pat
             "version": 1,
             "mission": {"id": mission.id, "digest": mission.digest},
         },
-        "elements": [{"segments": [{"a": [0, 0], "b": [end, 0], "seen": seen}]}],
+        "elements": [element({"a": [0, 0], "b": [end, 0], "seen": seen})],
+        "total": COUNTS,
     }
     (tmp_path / "c.json").write_text(json.dumps(coverage))
     with pytest.raises(InputError, match=r"c\.json: a segment from"):

@@ -1,0 +1,166 @@
+"""Mission + navigable space -> what it claims its stops see and they do not: counted anew, line by line.
+
+The stops look from where the mission has them, and every sight line is held against every wall: nothing
+of what made the plan's own figures is used but the floor's faces and their units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mission.document import Mission, Stop
+from mission.errors import AnswerIsNo, InputError
+from mission.figures import percent
+from mission.files.coverage_json import DIGITS, Coverage
+from mission.geometry import BoolArray, IntArray
+from mission.planning import Candidates, NavigableSpace, weights_of
+from mission.sense import Problem
+from planner.candidates import STRATEGIES, candidates
+from planner.reach import reach_of
+from planner.shapes import local_origin
+from planner.sightlines import SightLines
+from planner.visibility.exact import sides_of_door, viewpoints_of
+from planner.visibility.headings import in_view, with_headings
+from planner.visibility.runs import visibility_of
+
+ROUNDED = 10.0**-DIGITS
+"""Shares in coverage.json are of lengths that are rounded themselves."""
+NOISE = 1e-12
+"""Shares that differ by less are the same: quotients of whole numbers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recount:
+    """What the stops see, and what can be seen at all from where stops may be."""
+
+    space: NavigableSpace
+    by_stop: tuple[IntArray, ...]
+    """Units each stop sees, ascending."""
+    visible: BoolArray | None
+    """Whether each unit can be seen by a candidate; None where that is not known."""
+    why_not: str = ""
+    """Why it is not known."""
+
+    @cached_property
+    def seen(self) -> BoolArray:
+        """Whether any stop sees each unit."""
+        seen = np.zeros(self.space.targets.total, dtype=bool)
+        for units in self.by_stop:
+            seen[units] = True
+        return seen
+
+    @property
+    def share(self) -> float | None:
+        """Share of what can be seen that the stops see, by the plan's rule."""
+        if self.visible is None or not self.visible.any():
+            return None
+        weight = weights_of(self.space.targets, self.space.settings)
+        return float(weight[self.seen & self.visible].sum() / weight[self.visible].sum())
+
+    def in_words(self) -> str:
+        """One line."""
+        seen = int(self.seen.sum())
+        if self.visible is None:
+            return f"{seen} units, counted line by line; of how many is not known: {self.why_not}"
+        share = "nothing" if self.share is None else percent(self.share, digits=3)
+        seen = int((self.seen & self.visible).sum())
+        return f"{share} ({seen} of {self.visible.sum()} units), counted line by line"
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints; null where it is not known."""
+        visible = None if self.visible is None else int(self.visible.sum())
+        seen = self.seen if self.visible is None else self.seen & self.visible
+        return {"seen": int(seen.sum()), "visible": visible, "share": self.share}
+
+
+def recount(mission: Mission, space: NavigableSpace) -> Recount:
+    """Count what the mission's stops see of the floor, and what can be seen of it at all."""
+    lines = SightLines(space)
+    by_stop = tuple(_seen_from(stop, space, lines) for stop in mission.stops)
+    try:
+        visible = _visible(_candidates(mission, space), lines)
+    except (AnswerIsNo, InputError) as error:
+        return Recount(space, by_stop, None, str(error))
+    return Recount(space, by_stop, visible)
+
+
+def _seen_from(stop: Stop, space: NavigableSpace, lines: SightLines) -> IntArray:
+    """Units that a stop sees along its heading."""
+    xy = np.array([stop.x, stop.y])
+    closed_door = stop.doorway and space.settings.doors == "closed" and bool(space.openings)
+    places = sides_of_door(space, xy) if closed_door else xy[None]
+    units = np.unique(np.concatenate([lines.seen_from(place) for place in places]))
+    if space.settings.fov >= 360:
+        return units
+    way = space.targets.unit_xy[units] - xy
+    return units[in_view(way, stop.heading, fov=math.radians(space.settings.fov))]
+
+
+def _candidates(mission: Mission, space: NavigableSpace) -> Candidates:
+    """All places where a stop might have been, in the part of the floor that the mission is of."""
+    if space.settings.candidates not in STRATEGIES:
+        raise InputError(f"candidates = {space.settings.candidates} are another program's")
+    places = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)
+    parts = reach_of(space).part_at(places - local_origin(space.floor))
+    counts = Counter(parts[parts >= 0].tolist())
+    if not counts:
+        raise InputError("no stop is where the robot gets to")
+    return candidates(space, part=counts.most_common(1)[0][0])
+
+
+def _visible(found: Candidates, lines: SightLines) -> BoolArray:
+    """Whether each unit is seen by any candidate; places added beside chosen ones are none."""
+    places, row = viewpoints_of(found)
+    if found.space.settings.fov < 360 and (len(found.must_rows) or len(found.doorway_rows)):
+        units = [[lines.seen_from(place) for place in places[row == k]] for k in range(len(found.kept))]
+        alone = (np.unique(np.concatenate(several)) for several in units)
+        return with_headings(visibility_of(found, alone, method="line by line")).visible
+    visible = np.zeros(found.space.targets.total, dtype=bool)
+    for place in places:
+        visible[lines.seen_from(place, ~visible)] = True
+    return visible
+
+
+def overclaims(mission: Mission, counted: Recount, coverage: Coverage | None) -> Iterator[Problem]:
+    """Every figure of the mission, and of its coverage.json, above what was counted."""
+    for index, (stop, units) in enumerate(zip(mission.stops, counted.by_stop, strict=True)):
+        if len(units) < stop.sees.units:
+            yield _less(f"$.stops[{index}].sees.units", stop.sees.units, len(units), f"{stop.id} sees")
+    claimed, seen = sum(stop.sees.new_units for stop in mission.stops), int(counted.seen.sum())
+    if seen < claimed:
+        yield _less("$.stops[*].sees.new_units", claimed, seen, "all stops see")
+    least, share = counted.space.settings.coverage, counted.share
+    if claimed and share is not None and share < least - NOISE:
+        yield Problem("$.origin.parameters.coverage", f"is {least:g}, but the stops see {counted.in_words()}")
+    if coverage is not None:
+        yield from _coverage_overclaims(coverage, counted)
+
+
+def _less(path: str, claimed: int, counted: int, who: str) -> Problem:
+    return Problem(path, f"is {claimed}, but {who} {counted}, counted line by line")
+
+
+def _coverage_overclaims(coverage: Coverage, counted: Recount) -> Iterator[Problem]:
+    """What coverage.json says of the whole and of each element, above what was counted."""
+    targets, elements = counted.space.targets, counted.space.floor.elements
+    wanted = [k for k, element in enumerate(elements) if element.target]
+    if [elements[k].id for k in wanted] != [element.id for element in coverage.elements]:
+        yield Problem("coverage $.elements", "are not those of the floor; plan again")
+        return
+    if (seen := int(counted.seen.sum())) < coverage.total.seen:
+        yield _less("coverage $.total.seen", coverage.total.seen, seen, "all stops see")
+    share, claimed = counted.share, coverage.total.coverage
+    if share is not None and claimed is not None and share < claimed - ROUNDED:
+        yield Problem("coverage $.total.coverage", f"is {claimed:g}, but the stops see {counted.in_words()}")
+    of = np.bincount(targets.element[targets.unit_segment[counted.seen]], minlength=len(elements))
+    for index, element in enumerate(coverage.elements):
+        if of[wanted[index]] < element.seen:
+            path, who = f"coverage $.elements[{index}].seen", f"of {element.id} all stops see"
+            yield _less(path, element.seen, int(of[wanted[index]]), who)

@@ -1,0 +1,46 @@
+"""Mission + floor's file -> what is wrong with it there: what does not fit, and what it does not see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from mission.document import Mission
+from mission.errors import AnswerIsNo, InputError
+from mission.files.coverage_json import Coverage
+from mission.sense import Problem
+from mission.settings import read_settings
+from planner.claims import Recount, overclaims, recount
+from planner.fit import misfits_on, other_machine
+from planner.floors import read_floor
+from planner.navigable import navigable
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What is wrong with a mission on a floor, and what its stops were counted to see there."""
+
+    problems: tuple[Problem, ...]
+    counted: Recount | None = None
+
+
+def verdict(mission: Mission, path: Path, coverage: Coverage | None) -> Verdict:
+    """Hold a mission, and its coverage.json if given, against the floor in a file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read as a floor.
+    """
+    try:
+        settings = read_settings(None, mission.origin.parameters)
+    except InputError as error:
+        return Verdict((Problem("$.origin.parameters", f"are not those of a plan: {error}"),))
+    floor = read_floor(path, d_dis=settings.d_dis, layers=settings.layer_roles)
+    misfits = (*other_machine(mission, settings), *misfits_on(floor, mission, settings))
+    try:
+        counted = recount(mission, navigable(floor, settings))
+    except AnswerIsNo as error:
+        claims = any(stop.sees.units for stop in mission.stops)
+        return Verdict((*misfits, Problem("$.stops", f"see nothing: {error}")) if claims else misfits)
+    return Verdict((*misfits, *overclaims(mission, counted, coverage)), counted)

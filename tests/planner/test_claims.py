@@ -1,0 +1,213 @@
+"""What a mission claims its stops see, counted anew: a plan's claims hold, and what is more is told."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from mission.__main__ import main
+from mission.document import Mission
+from mission.figures import percent
+from mission.files.coverage_json import Coverage, coverage_json
+from mission.files.mission_json import read, write
+from mission.floor import FloorPlan
+from mission.planning import NavigableSpace, Route, Selection
+from mission.settings import Settings
+from planner.claims import Recount, overclaims, recount
+from planner.sight import sight
+from tests.journeys.test_base import without_extras
+from tests.planner.test_command import drawn
+from tests.planner.worlds import (
+    LAYERED,
+    PAPER,
+    SHARED,
+    column,
+    hall,
+    moved,
+    planned,
+    shifted,
+    turned,
+    two_rooms,
+)
+
+change = msgspec.structs.replace
+HALL = hall(9, 6, column("a", 3, 3), column("b", 6, 3))
+WORLDS: dict[str, tuple[FloorPlan, Settings]] = {
+    "a hall": (HALL, Settings(coverage=0.95)),
+    "a short range": (HALL, Settings(range=2.0)),
+    "closed doors": (two_rooms(0.9), Settings(doors="closed", door_scan=True)),
+    "a field of view": (HALL, Settings(fov=120.0)),
+    "a field of view in a doorway": (two_rooms(0.9), Settings(doors="closed", door_scan=True, fov=100.0)),
+    "triangulation": (HALL, Settings(candidates="triangulation")),
+}
+
+
+def counted(mission: Mission, nouns: dict[type, Any]) -> tuple[Recount, list[str]]:
+    """The recount on the floor it was planned on, and what it tells."""
+    found = recount(mission, nouns[NavigableSpace])
+    coverage = msgspec.json.decode(coverage_json(nouns[Route], mission), type=Coverage)
+    return found, [str(problem) for problem in overclaims(mission, found, coverage)]
+
+
+@pytest.mark.parametrize("move", [shifted(0, 0), turned(17), shifted(5e5, 5.4e6)])
+@pytest.mark.parametrize("name", WORLDS)
+def test_what_a_plan_claims_is_so(name: str, move: Any) -> None:
+    floor, settings = WORLDS[name]
+    mission, nouns = planned(moved(floor, move), settings)
+    found, problems = counted(mission, nouns)
+    assert problems == []
+    assert [len(units) for units in found.by_stop] == [stop.sees.units for stop in mission.stops]
+    assert np.array_equal(found.visible, nouns[Selection].visibility.visible)
+    assert found.share == nouns[Selection].coverage
+
+
+@pytest.mark.parametrize("name", [*PAPER, *LAYERED[:2]])
+def test_what_a_plan_of_a_real_floor_claims_is_so(name: str) -> None:
+    from planner.floors import read_floor
+
+    if not (SHARED / name).exists():
+        pytest.skip(f"{SHARED / name} is not there")
+    mission, nouns = planned(read_floor(SHARED / name, d_dis=0.05), Settings())
+    found, problems = counted(mission, nouns)
+    assert problems == []
+    assert found.share == nouns[Selection].coverage
+
+
+def test_sight_that_reaches_too_far_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    def far(*given: Any, reach: float, **others: Any) -> Any:
+        return sight(*given, reach=1.2 * reach, **others)
+
+    monkeypatch.setattr(sys.modules["planner.visibility.exact"], "sight", far)
+    mission, nouns = planned(HALL, Settings(range=2.0))
+    found, problems = counted(mission, nouns)
+    assert found.share is not None and found.share < 0.9
+    assert {problem.partition(":")[0] for problem in problems} >= {
+        "$.stops[0].sees.units",
+        "$.stops[*].sees.new_units",
+        "$.origin.parameters.coverage",
+        "coverage $.total.seen",
+        "coverage $.total.coverage",
+        "coverage $.elements[0].seen",
+    }
+
+
+def test_both_figures_are_told() -> None:
+    mission, nouns = planned(HALL)
+    first = mission.stops[0]
+    more = change(first.sees, units=first.sees.units + 1, new_units=first.sees.new_units + 1)
+    _, problems = counted(change(mission, stops=(change(first, sees=more), *mission.stops[1:])), nouns)
+    total = sum(stop.sees.new_units for stop in mission.stops)
+    units = first.sees.units
+    assert problems == [
+        f"$.stops[0].sees.units: is {units + 1}, but {first.id} sees {units}, counted line by line",
+        f"$.stops[*].sees.new_units: is {total + 1}, but all stops see {total}, counted line by line",
+    ]
+
+
+def test_less_than_the_coverage_asked_for_is_told_with_its_share() -> None:
+    mission, nouns = planned(HALL, Settings(coverage=0.5, room_coverage=0, kind_coverage=0, range=3))
+    space = nouns[NavigableSpace]
+    asked = replace(space, settings=change(space.settings, coverage=1.0))
+    found = recount(mission, asked)
+    (problem,) = overclaims(mission, found, None)
+    assert str(problem) == f"$.origin.parameters.coverage: is 1, but the stops see {found.in_words()}"
+    assert found.in_words().startswith(percent(nouns[Selection].coverage, digits=3))
+
+
+def test_a_mission_that_claims_nothing_claims_no_coverage() -> None:
+    mission, nouns = planned(HALL)
+    bare = tuple(change(stop, sees=change(stop.sees, units=0, new_units=0)) for stop in mission.stops[:1])
+    found = recount(change(mission, stops=bare), nouns[NavigableSpace])
+    assert list(overclaims(change(mission, stops=bare), found, None)) == []
+    assert found.share is not None and found.share < 0.9
+
+
+def test_candidates_of_another_program_are_not_loaded() -> None:
+    """A mission may come from anywhere: checking it must run nothing that it names."""
+    mission, nouns = planned(HALL)
+    space = nouns[NavigableSpace]
+    settings = change(space.settings, candidates="tests.planner.no_such_module:generate")
+    found = recount(mission, replace(space, settings=settings))
+    assert found.visible is None
+    assert found.as_json()["share"] is None
+    assert "of how many is not known: candidates = tests.planner.no_such_module:generate" in found.in_words()
+    assert list(overclaims(mission, found, None)) == []
+
+
+# ---- the command ----
+
+
+@pytest.fixture
+def made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
+    """A planned mission; its floor and its coverage lie beside it."""
+    assert main(["plan", str(drawn(tmp_path / "floor.dxf")), "-o", str(tmp_path)]) == 0
+    capsys.readouterr()
+    return tmp_path / "mission.json"
+
+
+def check(mission: Path, *options: str) -> int:
+    return main(["check", str(mission), "--floor", str(mission.with_name("floor.dxf")), *options])
+
+
+def test_check_tells_the_coverage_it_counted(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    coverage = json.loads(made.with_name("coverage.json").read_text())["total"]
+    assert check(made, "--coverage", str(made.with_name("coverage.json"))) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    share = 100 * coverage["seen"] / coverage["visible"]
+    assert last == (
+        f"coverage {share:.3f} % ({coverage['seen']} of {coverage['visible']} units), counted line by line"
+    )
+    assert check(made, "--json") == 0
+    told = json.loads(capsys.readouterr().out)["coverage"]
+    assert (told["seen"], told["visible"]) == (coverage["seen"], coverage["visible"])
+
+
+def test_check_finds_a_coverage_that_is_not_so(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = made.with_name("coverage.json")
+    coverage = json.loads(path.read_text())
+    coverage["total"]["seen"] += 1
+    path.write_text(json.dumps(coverage))
+    assert check(made, "--coverage", str(path)) == 1
+    seen = coverage["total"]["seen"]
+    expected = f"coverage $.total.seen: is {seen}, but all stops see {seen - 1}, counted line by line"
+    assert expected in capsys.readouterr().out
+
+
+def test_check_finds_that_two_stops_at_one_place_see_less(
+    made: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mission = read(made)
+    first, *_, last = mission.stops
+    here = (first.x, first.y)
+    write(change(mission, stops=(first, change(last, x=first.x, y=first.y, approach=(here,)))), made)
+    assert check(made, "--json") == 1
+    problems = json.loads(capsys.readouterr().out)["problems"]
+    assert {"$.stops[*].sees.new_units", "$.origin.parameters.coverage"} <= {
+        item["path"] for item in problems
+    }
+
+
+def test_coverage_is_checked_on_a_floor_only(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(made), "--coverage", "coverage.json"]) == 2
+    assert "give it with --floor" in capsys.readouterr().err
+
+
+def test_without_the_extra_the_digest_is_checked_and_the_rest_is_told(made: Path) -> None:
+    front_door = "from mission.__main__ import main\nsys.exit(main(sys.argv[1:]))"
+    floor = made.with_name("floor.dxf")
+    done = without_extras(front_door, "check", str(made), "--floor", str(floor))
+    assert done.returncode == 0
+    assert "in order" in done.stdout
+    assert "neither clearances nor coverage were checked" in done.stderr
+    assert done.stderr.count("\n") == 1
+    floor.write_bytes(floor.read_bytes() + b"\n")
+    done = without_extras(front_door, "check", str(made), "--floor", str(floor))
+    assert done.returncode == 1
+    assert "$.origin.floor_digest" in done.stdout
