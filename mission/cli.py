@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,6 +115,8 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
     try:
         from planner.verdict import verdict
 
+        if sys.stderr.isatty():
+            typer.echo(f"holding the mission against {floor} …", err=True)
         found = verdict(mission, floor, claims)
     except ModuleNotFoundError as error:
         if not _is_of_plan(error):

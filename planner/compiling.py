@@ -24,12 +24,12 @@ def compiled(kernel: Callable[..., Any], *helpers: Callable[..., Any]) -> Callab
     for helper in helpers:
         register_jitable(helper)
     try:
-        return _compiled_anew_if_not_kept(njit(kernel, cache=True), njit(kernel))
+        return anew_if_not_kept(njit(kernel, cache=True), njit(kernel))
     except RuntimeError:  # a read-only install and a user without a home: there is no place to keep it
         return njit(kernel)
 
 
-def _compiled_anew_if_not_kept(kept: Callable[..., Any], anew: Callable[..., Any]) -> Callable[..., Any]:
+def anew_if_not_kept(kept: Callable[..., Any], anew: Callable[..., Any]) -> Callable[..., Any]:
     """The kernel that is kept on disk; where that is full, or what is kept is damaged, one compiled anew."""
 
     def call(*arguments: Any) -> Any:

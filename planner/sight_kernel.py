@@ -10,7 +10,8 @@ wedge's limits, which are always vertices, belong to it.
 No number exceeds 64 bits, where machine code and Python would part. What is given lies within these
 bounds, which `planner.sight` sees to:
 
-- coordinates within ±2**29, so differences within 2**30 and turns within 2**61;
+- coordinates within ±2**29, so differences within 2**30 and turns within 2**61; what a viewpoint looks
+  between lies within 2**30 of it;
 - at most 2**26 units on a segment, so `pieces`, two per unit, within 2**27;
 - a range of at most 2**31, which is beyond any two points.
 
