@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +24,9 @@ from bridge.ways import (
     Timeout,
     VehicleId,
     Way,
+    alone,
     by_way,
+    given_in,
     reached,
 )
 from mission.errors import InputError
@@ -73,6 +74,7 @@ def add_commands(app: typer.Typer) -> None:
 
 
 def robot(
+    context: typer.Context,
     *,
     name: Annotated[str | None, typer.Option("--name", help="Name of this robot.")] = None,
     state: Annotated[
@@ -149,33 +151,31 @@ def robot(
     from bridge.robot import RobotOptions, run_robot
     from bridge.simulator import Faults, read_fault
 
-    driven = {"--arm": arm, "--trigger": trigger != "camera", "--vehicle": vehicle}
+    given, driven = given_in(context), ("--arm", "--trigger", "--vehicle")
     if mavlink_vehicle is not None:
-        alone("--mavlink-vehicle", {
-            "--listen": listen != DEFAULT_ENDPOINT, "--connect": connect, "--site": site, "--map": map_,
-            "--keys": keys, "--revision": revision != "next-stop", "--endurance": endurance != 6.0,
-            "--controller": controller != "sim", **driven,
-        })  # fmt: skip
+        alone(
+            given, "--mavlink-vehicle", "--listen", "--connect", "--site", "--map", "--keys", "--revision",
+            "--endurance", "--controller", *driven,
+        )  # fmt: skip
         return be_vehicle(
             name, url=mavlink_vehicle, profile=profile or "strict", state=state, speed_up=speed_up,
             signing_key=signing_key, insecure=insecure, origin=origin,
             at=None if at is None else read_pose("--at", at), faults=tuple(fault or ()),
         )  # fmt: skip
-    alone("a robot on zenoh", {"--profile": profile, "--origin": origin})
+    alone(given, "a robot on zenoh", "--profile", "--origin")
+    if connect is not None:
+        alone(given, "--connect", "--listen")
     if name is None or state is None:
         raise InputError("robot: give it a --name and a folder for its --state")
     faults, to_map = Faults(tuple(read_fault(text) for text in fault or ())), read_map(map_)
     url = autopilot_url(controller)
     if url is None:
-        alone("a simulated robot", {"--signing-key": signing_key, **driven})
+        alone(given, "a simulated robot", "--signing-key", *driven)
         body: Incarnate = SimulatedBody(
             state, None if at is None else read_pose("--at", at), to_map, 3600 * endurance, faults
         )
     else:
-        alone("an autopilot", {
-            "--at": at, "--map": map_, "--fault": fault, "--speed-up": speed_up != 1.0,
-            "--endurance": endurance != 6.0,
-        })  # fmt: skip
+        alone(given, "an autopilot", "--at", "--map", "--fault", "--speed-up", "--endurance")
         body = AutopilotBody(url, arm, read_trigger(trigger), signing_key, vehicle, insecure)
     options = RobotOptions(
         name=name, listen=listen, connect=connect, state=state, body=body, site=site, speed_up=speed_up,
@@ -191,13 +191,6 @@ def be_vehicle(name: str | None, **options: Any) -> None:
 
     called = f"{name or 'vehicle'} ({options['profile']})"
     run_vehicle(VehicleOptions(**options), ready=lambda url: say(f"ready {called} at {url}"))
-
-
-def alone(what: str, given: Mapping[str, object], command: str = "robot") -> None:
-    """Refuse options that have no meaning with `what`."""
-    for option, value in given.items():
-        if value:
-            raise InputError(f"{command}: {option} has no meaning with {what}; leave it out")
 
 
 def read_revisions(text: str) -> RevisionPolicy:
@@ -255,14 +248,14 @@ def push(
     from mission.files.mission_json import read
 
     if way.mavlink is None:
-        alone("--robot", {
-            "--autopilot": autopilot, "--trigger": trigger, "--scan-wait": scan_wait, "--settle": settle,
-            "--set-origin": set_origin, "--any-origin": any_origin, "--while-running": while_running,
-        }, command="push")  # fmt: skip
+        alone(
+            way.given, "--robot", "--autopilot", "--trigger", "--scan-wait", "--settle", "--set-origin",
+            "--any-origin", "--while-running",
+        )  # fmt: skip
         return push_over_zenoh(read(mission), pushing(way, patience), take_over=take_over, json_=json_)
     from bridge.mavlink.commands import Leave, Line, Writing, push_mission
 
-    alone("--mavlink", {"--take-over": take_over, "--as": way.who}, command="push")
+    alone(way.given, "--mavlink", "--take-over", "--as")
     vehicle = way.mavlink
     line = Line(
         vehicle.url, vehicle.vehicle, vehicle.signing_key, way.insecure, autopilot, patience or way.timeout_s

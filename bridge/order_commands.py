@@ -10,6 +10,7 @@ import typer
 from bridge.console import print_json, refusals_in, tell
 from bridge.ways import (
     DEFAULT_ENDPOINT,
+    VEHICLES,
     Connect,
     Insecure,
     KeyFolder,
@@ -20,7 +21,9 @@ from bridge.ways import (
     Timeout,
     VehicleId,
     Way,
+    alone,
     by_way,
+    given_in,
     in_time,
     way_of,
 )
@@ -108,6 +111,7 @@ def order_of(verb: Verb) -> Callable[..., None]:
 
 
 def status(
+    context: typer.Context,
     *,
     robot: Annotated[
         str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot; all if not given.")
@@ -131,12 +135,14 @@ def status(
     """
     from bridge.station import fleet
 
+    given = given_in(context)
     if robot is None and mavlink is None:
+        alone(given, "all robots of a site", *VEHICLES)
         reports = fleet(connect, site=site, timeout_s=timeout, insecure=insecure, keys=keys)
         as_json: dict[str, Any] = {"robots": [status_json(report) for report in reports]}
     else:
         way = way_of(
-            robot=robot, connect=connect, site=site, mavlink=mavlink, vehicle=vehicle,
+            given, robot=robot, connect=connect, site=site, mavlink=mavlink, vehicle=vehicle,
             signing_key=signing_key, state=state, timeout=timeout, insecure=insecure, keys=keys,
         )  # fmt: skip
         with in_time(way.to_look()) as station:

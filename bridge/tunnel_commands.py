@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bridge.console import say
-from bridge.ways import DEFAULT_ENDPOINT, Connect, Insecure, KeyFolder, RobotName, Site
+from bridge.ways import DEFAULT_ENDPOINT, Connect, Insecure, KeyFolder, RobotName, Site, alone, given_in
 
 if TYPE_CHECKING:
     from bridge.mavlink.line.transport import Transport
@@ -37,6 +37,7 @@ def tunnel_commands() -> typer.Typer:
 
 
 def tunnel_robot(
+    context: typer.Context,
     *,
     name: Annotated[str, typer.Option("--name", help="Name of this robot.")],
     mavlink: Annotated[str, typer.Option("--mavlink", metavar="URL", help="Where the vehicle is.")],
@@ -67,6 +68,8 @@ def tunnel_robot(
     from bridge.robot import robots_keys
     from bridge.zenoh_link import Guard, joining, listening
 
+    if connect is not None:
+        alone(given_in(context), "--connect", "--listen")
     _leave_on_sigterm()
     own, held = Keys(name, site), None if keys is None else robots_keys(keys, name)
     judge, refusals = Harmless(), Refusals()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -57,6 +57,10 @@ StateFolder = Annotated[
     typer.Option("--state", metavar="DIR", help="What is remembered of the vehicle; one folder for each."),
 ]
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+VEHICLES = ("--vehicle", "--signing-key", "--state")
+"""Options of the way to a vehicle."""
+Given = frozenset[str]
+"""The options on a command line, such as "--site"."""
 LEAST_S = 0.5
 """Left for a question or an order, however long it took to find the robot."""
 
@@ -93,11 +97,12 @@ class Way:
     patience_s: float = 20.0
     """For each piece of a mission that is pushed."""
     mavlink: Mavlink | None = field(default=None)
+    given: Given = frozenset()
 
     def to_drive(self, *, arm: bool = False, disarm: bool = False, any_origin: bool = False) -> Way:
         """The same way, for an order and what it may do to a vehicle, or overlook."""
         if self.mavlink is None:
-            _foreign("--robot", {"--arm": arm, "--disarm": disarm, "--any-origin": any_origin})
+            alone(self.given, "--robot", "--arm", "--disarm", "--any-origin")
             return self
         given = replace(self.mavlink, arm=arm, disarm=disarm, any_origin=any_origin)
         return replace(self, mavlink=given)
@@ -110,6 +115,7 @@ class Way:
 
 
 def way_of(
+    given: Given,
     *,
     robot: AnyRobot = None,
     connect: Connect = DEFAULT_ENDPOINT,
@@ -123,25 +129,33 @@ def way_of(
     insecure: Insecure = False,
     keys: KeyFolder = None,
 ) -> Way:
-    """The way that the options mean; its parameters are the options of every command that goes one."""
+    """The way that the options mean; those after `given` are the options of every command that goes one."""
     if mavlink is None:
-        _foreign("--robot", {"--vehicle": vehicle, "--signing-key": signing_key, "--state": state})
+        alone(given, "--robot", *VEHICLES)
         if robot is None:
             raise InputError("say which robot: --robot NAME, or --mavlink URL for a vehicle")
-        return Way(robot, connect, site, who, timeout, insecure, keys)
-    zenoh = {"--robot": robot, "--site": site, "--keys": keys, "--connect": connect != DEFAULT_ENDPOINT}
-    _foreign("--mavlink", zenoh)
+        return Way(robot, connect, site, who, timeout, insecure, keys, given=given)
+    alone(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
     return Way(
         "", connect, None, who, timeout, insecure, None,
-        mavlink=Mavlink(mavlink, vehicle=vehicle, signing_key=signing_key, state=state),
+        mavlink=Mavlink(mavlink, vehicle=vehicle, signing_key=signing_key, state=state), given=given,
     )  # fmt: skip
 
 
-def _foreign(way: str, given: Mapping[str, object]) -> None:
-    """Refuse options that mean nothing on this way."""
-    for option, value in given.items():
-        if value:
-            raise InputError(f"{option} means nothing with {way}; leave it out")
+def given_in(context: typer.Context) -> Given:
+    """The options on the command line, whatever their values."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    typed = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
+    return frozenset(
+        option for parameter in context.command.params if parameter.name in typed for option in parameter.opts
+    )
+
+
+def alone(given: Given, what: str, *options: str) -> None:
+    """Refuse options that were given and have no meaning with `what`."""
+    for option in options:
+        if option in given:
+            raise InputError(f"{option} has no meaning with {what}; leave it out")
 
 
 Command = Callable[..., Any]
@@ -153,7 +167,7 @@ def by_way(*, without: tuple[str, ...] = ()) -> Callable[[Command], Command]:
 
 
 def _by_way(without: tuple[str, ...], command: Command) -> Command:
-    options, (_, *own) = (
+    (_, *options), (_, *own) = (
         [
             one
             for one in inspect.signature(which, eval_str=True).parameters.values()
@@ -162,11 +176,12 @@ def _by_way(without: tuple[str, ...], command: Command) -> Command:
         for which in (way_of, command)
     )
 
-    def called(**given: Any) -> Any:
-        chosen = {option.name: given.pop(option.name) for option in options}
-        return command(way_of(**chosen), **given)
+    def called(context: typer.Context, **values: Any) -> Any:
+        chosen = {option.name: values.pop(option.name) for option in options}
+        return command(way_of(given_in(context), **chosen), **values)
 
-    everything = [*options, *own]
+    context = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context)
+    everything = [context, *options, *own]
     called.__name__, called.__doc__ = command.__name__, command.__doc__
     called.__signature__ = inspect.Signature(everything)  # type: ignore[attr-defined]
     called.__annotations__ = {parameter.name: parameter.annotation for parameter in everything}

@@ -201,7 +201,7 @@ def test_a_key_is_needed_where_the_vehicle_has_one(run: Run, mission: Mission, t
         (("push", "MISSION", "--mavlink", "udpout:10.0.0.7:14550"), "leaves this machine unsigned"),
         (
             ("push", "MISSION", "--robot", "r1", "--mavlink", "udpout:127.0.0.1:9"),
-            "--robot means nothing with",
+            "--robot has no meaning with",
         ),
         (("push", "MISSION", "--robot", "r1", "--set-origin"), "--set-origin has no meaning with --robot"),
         (

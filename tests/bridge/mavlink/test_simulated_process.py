@@ -142,6 +142,31 @@ def test_a_vehicle_that_cannot_keep_its_state_ends_and_says_so(tmp_path: Path) -
         (["--mavlink-vehicle", "udpin:203.0.113.9:14550", "--insecure"], "cannot listen there"),
         (["--profile", "px4", "--name", "r1", "--state", "s"], "--profile has no meaning"),
         (["--state", "s"], "--name"),
+        # Given is given, whatever the value: the default too.
+        *(
+            (["--mavlink-vehicle", "udpin:127.0.0.1:14550", *option], f"{option[0]} has no meaning")
+            for option in (
+                ["--endurance", "5"],
+                ["--endurance", "6"],
+                ["--listen", "tcp/127.0.0.1:7447"],
+                ["--controller", "sim"],
+                ["--trigger", "camera"],
+            )
+        ),
+        (["--name", "r1", "--state", "s", "--trigger", "camera"], "--trigger has no meaning"),
+        (
+            [
+                "--name",
+                "r1",
+                "--state",
+                "s",
+                "--connect",
+                "tcp/127.0.0.1:1",
+                "--listen",
+                "tcp/127.0.0.1:7447",
+            ],
+            "--listen has no meaning with --connect",
+        ),
     ],
 )
 def test_options_that_cannot_be_are_refused_in_one_line(

@@ -101,7 +101,7 @@ def test_ctrl_c_in_watch_leaves_the_vehicle_alone(vehicle: Vehicle) -> None:
 def test_options_of_the_other_way_are_refused(vehicle: Vehicle) -> None:
     for verb, *options in (("start", "--robot", "r1"), ("watch", "--site", "hall"), ("pause", "--keys", "k")):
         told = vehicle.run(verb, *options)
-        assert told.returncode == 2 and "means nothing with --mavlink" in told.stderr
+        assert told.returncode == 2 and "has no meaning with --mavlink" in told.stderr
 
 
 def test_an_unsigned_way_out_of_this_machine_is_refused(tmp_path: Path) -> None:
