@@ -26,7 +26,7 @@ from bridge.protocol import Answer, Command, Commit, Lease, Rejected
 from bridge.revision import RevisionPolicy
 from bridge.robots import Base, Rest, Scanner
 from bridge.run import Change, Run
-from mission.document import Mission, Stop
+from mission.document import Mission
 from mission.events import Pose, StateReport
 
 SETTLE_SAMPLE_S = 0.1
@@ -305,7 +305,7 @@ class Controller:
         at_stop = run.leg > run.at
         path = ((stop.x, stop.y),) if at_stop else route.forward(mission.stops[run.leg].approach, pose)
         outcome = "arrived"
-        if not (at_stop and distance(pose, stop) <= stop.tolerance_m):
+        if not (at_stop and runs.deviation(pose, stop) <= stop.tolerance_m):
             heading = stop.heading if run.leg >= run.at else None
             outcome = self._base.goto(path, heading=heading, limits=mission.robot, interrupt=self._interrupt)
         here = self._base.pose()
@@ -313,7 +313,7 @@ class Controller:
             reason = self._blocked(f"the way to {stop.id}", here)
             self._advance(run, lambda now: runs.held(now, reason))
         elif outcome == "arrived":
-            self._advance(run, lambda now: runs.reached(now, mission, here, distance(here, stop)))
+            self._advance(run, lambda now: runs.reached(now, mission, here, runs.deviation(here, stop)))
 
     def _settle(self, run: Run, mission: Mission) -> None:
         stop = mission.stops[run.at]
@@ -325,7 +325,7 @@ class Controller:
             self._advance(run, lambda now: runs.failed(now, mission, reason))
             return
         here = self._base.pose()
-        self._advance(run, lambda now: runs.settled(now, mission, here, distance(here, stop)))
+        self._advance(run, lambda now: runs.settled(now, mission, here, runs.deviation(here, stop)))
 
     def _stands_still(self, settle_s: float) -> bool | None:
         """Whether the robot came to a stand for `settle_s`; `None` if interrupted."""
@@ -471,10 +471,6 @@ def same_work(then: Run, now: Run) -> bool:
         return runs.changed(now, next_revision=then.next_revision) == then
     scanning = then.stop_state == now.stop_state == "SCANNING"
     return scanning and (then.run_id, then.at, then.attempt) == (now.run_id, now.at, now.attempt)
-
-
-def distance(pose: Pose, stop: Stop) -> float:
-    return math.hypot(pose.x - stop.x, pose.y - stop.y)
 
 
 def moved(before: Pose, after: Pose, rest: Rest) -> bool:

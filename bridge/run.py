@@ -6,6 +6,7 @@ the events that tell of it. The controller stores both before anything else happ
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -127,6 +128,11 @@ def reached(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Chang
         )
     arrived = partial(Arrived, stop=stop.id, pose=pose, deviation_m=deviation_m)
     return Change(changed(run, leg=run.at + 1, stop_state="SETTLING"), (arrived,))
+
+
+def deviation(pose: Pose, stop: Stop) -> float:
+    """Metres from the stop."""
+    return math.hypot(pose.x - stop.x, pose.y - stop.y)
 
 
 def settled(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Change:

@@ -38,6 +38,11 @@ Rule = Callable[[SiteOrigin, float, float], Geodetic]
 """The place so many metres east and north of the origin."""
 
 
+def from_steps(lat: int, lon: int) -> Geodetic:
+    """The place that is told in steps."""
+    return Geodetic(lat=lat / STEPS_PER_DEGREE, lon=lon / STEPS_PER_DEGREE)
+
+
 def to_geodetic(origin: SiteOrigin, point: Point, rule: str = "wgs84") -> Geodetic:
     """The place of a point of the site's frame (metres), by one of `RULES`."""
     east, north = _turned(point, math.radians(origin.heading_deg))

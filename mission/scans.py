@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import msgspec
 
+from mission.document import ScannerSpec
+
+HEADING_RAD = math.radians(5.0)
+"""How far a stop's heading may be missed by a scanner that does not see all round."""
 _SHA256 = re.compile(r"[0-9a-fA-F]{64}")
 
 
@@ -32,3 +37,14 @@ def missing_in(scan: ScanResult) -> tuple[str, ...]:
         "sha256": bool(_SHA256.fullmatch(scan.sha256)),
     }
     return tuple(name for name, told in pieces.items() if not told)
+
+
+def needs_heading(scanner: ScannerSpec) -> bool:
+    """Whether it matters how a robot is turned while it scans."""
+    return scanner.fov_deg < 360
+
+
+def turned_away(scanner: ScannerSpec, wanted: float, heading: float) -> float:
+    """Radians by which a heading is missed for a scan; 0 if that does not matter to the scanner."""
+    missing = abs(math.remainder(heading - wanted, math.tau))
+    return missing if needs_heading(scanner) and missing > HEADING_RAD else 0.0

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from mission.document import SiteOrigin
+from mission.document import Point, SiteOrigin
 from mission.errors import InputError
-from mission.geodesy import STEPS_PER_DEGREE
+from mission.geodesy import STEPS_PER_DEGREE, from_geodetic, from_steps
 from mission.mavlink.items import Command, Frame, Item, ItemList, Placed
 from mission.mavlink.keeping import ardupilot_keeps, as_sent, px4_keeps
 
@@ -104,6 +104,11 @@ def autopilot_named(name: str) -> Autopilot:
     if name not in AUTOPILOTS:
         raise InputError(f"autopilot {name!r} is not known; it is one of {', '.join(AUTOPILOTS)}")
     return AUTOPILOTS[name]
+
+
+def point_at(sent: ItemList, lat: int, lon: int) -> Point:
+    """The point of the site that the vehicle of a list means by a place in steps of 1e-7 degrees."""
+    return from_geodetic(sent.origin, from_steps(lat, lon), autopilot_named(sent.autopilot).rule)
 
 
 def home_item(origin: SiteOrigin) -> Item:

@@ -15,8 +15,8 @@ from urllib.parse import parse_qsl
 
 from mission.document import Stop
 from mission.events import Pose
-from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic, heading_of
-from mission.mavlink.autopilots import autopilot_named
+from mission.geodesy import heading_of
+from mission.mavlink.autopilots import point_at
 from mission.mavlink.items import ItemList
 from mission.scans import ScanFailed, ScanResult, missing_in
 
@@ -98,8 +98,7 @@ def _count(text: str) -> int:
 def _pose(message: Captured, sent: ItemList | None) -> Pose | None:
     if sent is None or (message.lat, message.lon) == (0, 0):
         return None
-    place = Geodetic(lat=message.lat / STEPS_PER_DEGREE, lon=message.lon / STEPS_PER_DEGREE)
-    x, y = from_geodetic(sent.origin, place, autopilot_named(sent.autopilot).rule)
+    x, y = point_at(sent, message.lat, message.lon)
     w, i, j, k = message.q
     yaw = math.atan2(2 * (w * k + i * j), 1 - 2 * (j * j + k * k))
     return Pose(x=x, y=y, heading=heading_of(sent.origin, math.degrees(yaw)))

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from mission.document import Mission
 from mission.mavlink.manner import Manner
+from mission.scans import needs_heading
 
 
 def notes_of(mission: Mission, manner: Manner) -> tuple[str, ...]:
@@ -26,7 +27,7 @@ def _failures(mission: Mission) -> Iterator[str]:
 def _arrival(mission: Mission, manner: Manner) -> Iterator[str]:
     name, reached = manner.vehicle.name, manner.vehicle.reached
     yield f"{name} counts a stop as reached {reached}: the station checks tolerance_m before a scan"
-    if mission.scanner.fov_deg < 360:
+    if needs_heading(mission.scanner):
         yield "headings are sent: the station checks them before a scan"
     if manner.trigger == "none":
         yield "no item starts a scan: the station does"

@@ -11,6 +11,7 @@ from mission.mavlink.autopilots import Autopilot
 from mission.mavlink.items import Command, Placed
 from mission.mavlink.keeping import as_sent
 from mission.mavlink.manner import Manner
+from mission.scans import needs_heading
 from mission.sense import problems_of
 
 LONGEST_SCRIPT_S = 255
@@ -99,7 +100,7 @@ def _check_origin(mission: Mission, origin: SiteOrigin) -> None:
 
 def _check_heading(mission: Mission, vehicle: Autopilot) -> None:
     """A scanner that does not look all round needs the heading it was planned with."""
-    if mission.scanner.fov_deg < 360 and not vehicle.turns:
+    if needs_heading(mission.scanner) and not vehicle.turns:
         stop, fov = mission.stops[0], mission.scanner.fov_deg
         heading = math.degrees(stop.heading)
         why = "turns no rover to it" if vehicle.keeps_arrival else "drops it"

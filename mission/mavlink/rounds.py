@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from mission.document import Point, SiteOrigin
 from mission.errors import InputError
-from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic, heading_of
+from mission.geodesy import from_geodetic, from_steps, heading_of
 from mission.mavlink.autopilots import Autopilot, autopilot_named
 from mission.mavlink.back import number_carried
 from mission.mavlink.items import Command, Item, Placed
@@ -119,7 +119,7 @@ def _distinct_numbers(placed: Sequence[Placed]) -> dict[int, int]:
 
 
 def _point(item: Item, number: int, origin: SiteOrigin, vehicle: Autopilot) -> Point:
-    place = Geodetic(lat=item.x / STEPS_PER_DEGREE, lon=item.y / STEPS_PER_DEGREE)
+    place = from_steps(item.x, item.y)
     point = from_geodetic(origin, place, vehicle.rule)
     if not math.hypot(*point) <= FAR_M:
         raise InputError(

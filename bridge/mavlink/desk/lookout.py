@@ -16,8 +16,8 @@ from bridge.mavlink.line.peer import Origin, origin_of
 from bridge.mavlink.line.wire import Message, dialect
 from bridge.run import Run
 from mission.events import Arrived, Pose
-from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic, heading_of
-from mission.mavlink.autopilots import autopilot_named
+from mission.geodesy import heading_of
+from mission.mavlink.autopilots import autopilot_named, point_at
 from mission.mavlink.captures import Capture, Picture, capture_of
 from mission.mavlink.origin import is_elsewhere
 from mission.mavlink.telemetry import is_lost, stands_still
@@ -225,10 +225,8 @@ class Lookout:
             return
         if "LOCAL_POSITION_NED" in self._newest and self._local_frame(course) is not None:
             return
-        site, rule = course.sent.origin, autopilot_named(course.sent.autopilot).rule
-        place = Geodetic(lat=message.lat / STEPS_PER_DEGREE, lon=message.lon / STEPS_PER_DEGREE)
-        x, y = from_geodetic(site, place, rule)
-        heading = heading_of(site, math.degrees(attitude.message.yaw))
+        x, y = point_at(course.sent, message.lat, message.lon)
+        heading = heading_of(course.sent.origin, math.degrees(attitude.message.yaw))
         speed = math.hypot(message.vx, message.vy) / 100
         self._fix(Pose(x=x, y=y, heading=heading), speed, attitude.message.yawspeed, now_ns)
 

@@ -10,8 +10,7 @@ from bridge.mavlink.desk.visits import Course
 from bridge.run import Run
 from mission.document import Point
 from mission.events import Pose
-from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
-from mission.mavlink.autopilots import autopilot_named
+from mission.mavlink.autopilots import point_at
 
 PASSED = frozenset({"corner", "stop", "return"})
 """Roles of waypoints."""
@@ -91,5 +90,4 @@ def way(run: Run, course: Course) -> tuple[Piece, ...]:
 def point_of(course: Course, place: int) -> Point:
     """Where a waypoint of the list is, metres in the site's frame."""
     item = course.sent.placed[place].item
-    where = Geodetic(lat=item.x / STEPS_PER_DEGREE, lon=item.y / STEPS_PER_DEGREE)
-    return from_geodetic(course.sent.origin, where, autopilot_named(course.sent.autopilot).rule)
+    return point_at(course.sent, item.x, item.y)

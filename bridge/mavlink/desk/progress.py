@@ -14,13 +14,11 @@ from functools import partial
 
 from bridge import run as runs
 from bridge.mavlink.desk.visits import Course, Visit
-from bridge.run import Change, Run, changed
+from bridge.run import Change, Run, changed, deviation
 from mission.document import Stop
 from mission.events import Paused, Pose, Resumed, Settled, Started, Unconfirmed
-from mission.scans import ScanFailed, ScanResult
+from mission.scans import ScanFailed, ScanResult, turned_away
 
-HEADING_RAD = math.radians(5.0)
-"""How far a heading may be missed by a mission whose scanner does not see all around."""
 SOMEBODY = "the vehicle's operator"
 """Who gives orders that were not given here."""
 
@@ -221,11 +219,6 @@ def held_by_vehicle(run: Run, items: int | None) -> Run:
     return Run() if run.state == "READY" and items == 0 else run
 
 
-def deviation(pose: Pose, stop: Stop) -> float:
-    """Metres from the stop."""
-    return math.hypot(pose.x - stop.x, pose.y - stop.y)
-
-
 def misplaced(pose: Pose, run: Run, course: Course) -> str:
     """How the robot stands elsewhere than at its stop, or turned away; empty if it stands there."""
     stop, away = course.mission.stops[run.at], deviation(pose, course.mission.stops[run.at])
@@ -233,7 +226,7 @@ def misplaced(pose: Pose, run: Run, course: Course) -> str:
         return (
             f"{away:.3f} m from the stop, tolerance is {stop.tolerance_m:g} m; the vehicle calls it reached"
         )
-    turned = abs(math.remainder(pose.heading - stop.heading, math.tau))
-    if course.mission.scanner.fov_deg < 360 and turned > HEADING_RAD:
+    turned = turned_away(course.mission.scanner, stop.heading, pose.heading)
+    if turned:
         return f"turned {math.degrees(turned):.1f}° from the heading that its scanner needs"
     return ""

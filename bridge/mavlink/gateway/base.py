@@ -18,6 +18,7 @@ from bridge.mavlink.line.peer import Origin
 from bridge.robots import Outcome, Rest
 from mission.document import Mission, Point, RobotSpec, SiteOrigin
 from mission.events import Pose
+from mission.scans import needs_heading, turned_away
 
 TICK_S = 0.1
 AGAIN_S = 1.0
@@ -30,8 +31,6 @@ TURN_S = 20.0
 TURNED_RAD = math.radians(1.0)
 ESTIMATED = Rest(metres=0.005, radians=0.005)
 """An estimator of a vehicle that stands wanders by some millimetres."""
-HEADING_RAD = math.radians(5.0)
-"""How far a heading may be missed by a mission whose scanner does not see all around."""
 
 
 class Ended(Exception):
@@ -88,7 +87,7 @@ class MavlinkBase:
         driving = self.autopilot.driving
         if site is None:
             return "the mission has no georeference; plan it with --origin LAT,LON,ALT,HEADING"
-        if mission.scanner.fov_deg < 360.0 and not driving.turns:
+        if needs_heading(mission.scanner) and not driving.turns:
             return (
                 f"the scanner sees {mission.scanner.fov_deg:g}°, so its stops need their headings,"
                 f" and {self.autopilot.peer.autopilot} turns to none by order"
@@ -215,10 +214,11 @@ class MavlinkBase:
 
     def _check_heading(self, heading: float) -> None:
         """A heading that was missed matters only to a scanner that does not see all around."""
-        off, mission = self._off(heading), self._mission
-        if mission is not None and mission.scanner.fov_deg < 360.0 and off > HEADING_RAD:
-            wanted, missing = math.degrees(heading), math.degrees(off)
-            _must(f"the vehicle does not turn to {wanted:.0f}°: {missing:.0f}° are missing")
+        mission = self._mission
+        missing = 0.0 if mission is None else turned_away(mission.scanner, heading, self.pose().heading)
+        if missing:
+            wanted = math.degrees(heading)
+            _must(f"the vehicle does not turn to {wanted:.0f}°: {math.degrees(missing):.0f}° are missing")
 
     def _off(self, heading: float) -> float:
         return abs(math.remainder(self.pose().heading - heading, math.tau))

@@ -8,7 +8,7 @@ from bridge.mavlink.simulated.store import Store
 from bridge.motion import Brake, Motion, along
 from mission.document import Point, RobotSpec, SiteOrigin
 from mission.events import Pose
-from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic, to_geodetic
+from mission.geodesy import STEPS_PER_DEGREE, from_geodetic, from_steps, to_geodetic
 
 LIMITS = RobotSpec(radius=0.35, speed=0.5, turn_rate=1.0, acceleration=0.5)
 FAR_M = 100_000.0
@@ -87,8 +87,7 @@ class Rover:
         """Metres east and north of the origin; None without one, or too far away."""
         if self.origin is None or abs(lat - self.origin.lat * STEPS_PER_DEGREE) > STEPS_PER_M * FAR_M:
             return None
-        where = Geodetic(lat=lat / STEPS_PER_DEGREE, lon=lon / STEPS_PER_DEGREE)
-        x, y = from_geodetic(self.origin, where, self._rule)
+        x, y = from_geodetic(self.origin, from_steps(lat, lon), self._rule)
         return (x, y) if math.hypot(x, y) <= FAR_M else None
 
 
