@@ -21,7 +21,7 @@ from bridge.inbox import Inbox
 from bridge.journal import Journal
 from bridge.keys import Untrusted, verified_holder
 from bridge.link import Link, Request
-from bridge.pages import events_page, poses_page
+from bridge.pages import POSES_KEPT, events_page, poses_page
 from bridge.protocol import (
     CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
@@ -48,8 +48,6 @@ STATE_EVERY_S = 1.0
 POSE_EVERY_S = 0.05
 LEAST_POSE_PAUSE_S = 0.02
 """However fast the simulated clock runs, poses go out at most fifty times a second."""
-POSES_KEPT = 3000
-"""For stations that come late or were cut off."""
 
 
 Order = TypeVar("Order", Command, Commit)

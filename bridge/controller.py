@@ -396,20 +396,9 @@ class Controller:
 
     def _put(self, change: Change) -> None:
         now_ns = self._clock.now_ns()
-        run = change.run
         with self._journal.transaction():
-            self._journal.store_fact("run", run)
-            for telling in change.events:
-                event = telling(
-                    number=0,
-                    robot=self.robot,
-                    boot_id=self.boot_id,
-                    run_id=run.run_id or "",
-                    mission_id=run.mission_id or "",
-                    revision=run.revision or 0,
-                    robot_ns=now_ns,
-                    mission_time_s=(now_ns - run.started_ns) / 1e9,
-                )
+            self._journal.store_fact("run", change.run)
+            for event in runs.told_of(change, robot=self.robot, boot_id=self.boot_id, now_ns=now_ns):
                 self._journal.append(event)
 
     def _adopt(self, run: Run, *, ordered: bool = False) -> None:

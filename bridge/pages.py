@@ -21,6 +21,9 @@ from bridge.protocol import (
 )
 from mission.events import PoseReport
 
+POSES_KEPT = 3000
+"""For stations that come late or were cut off."""
+
 
 def events_page(journal: Journal, request: Request) -> Message:
     """Events since a number, of one run if the request names it."""

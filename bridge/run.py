@@ -7,7 +7,7 @@ the events that tell of it. The controller stores both before anything else happ
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -81,6 +81,17 @@ class Change:
 
     run: Run
     events: tuple[Telling, ...] = ()
+
+
+def told_of(change: Change, *, robot: str, boot_id: str, now_ns: int) -> Iterator[AnyEvent]:
+    """The events of a change, as of the run that it leads to; the journal numbers them."""
+    run = change.run
+    for telling in change.events:
+        yield telling(
+            number=0, robot=robot, boot_id=boot_id, run_id=run.run_id or "",
+            mission_id=run.mission_id or "", revision=run.revision or 0, robot_ns=now_ns,
+            mission_time_s=(now_ns - run.started_ns) / 1e9,
+        )  # fmt: skip
 
 
 changed = msgspec.structs.replace

@@ -27,6 +27,7 @@ SLICE_S = 0.5
 SHAKE_M = 0.005
 ENDURANCE_S = 6 * 3600.0
 POINTS_PER_S = 360_000
+"""What a simulated scanner takes, here and on a simulated vehicle."""
 BYTES_PER_POINT = 16
 
 

@@ -30,7 +30,7 @@ from bridge.mavlink.line.modes import modes_of
 from bridge.mavlink.line.peer import Peer, found
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import GROUND_STATION, Box, Who, dialect, wire
-from bridge.pages import address_of, events_page, mission_part, poses_page
+from bridge.pages import POSES_KEPT, address_of, events_page, mission_part, poses_page
 from bridge.protocol import (
     CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
@@ -53,7 +53,6 @@ from mission.mavlink.telemetry import is_lost
 
 TICK_S = 0.2
 ASK_AGAIN_S = 2.0
-POSES_KEPT = 3000
 COMPONENTS = range(25, 100)
 """Free for users (MAV_COMP_ID_USER1 to 75): by them a vehicle tells processes of one station apart."""
 POSES = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")

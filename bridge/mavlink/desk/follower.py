@@ -11,7 +11,7 @@ from functools import partial
 from bridge import run as runs
 from bridge.mavlink.desk import progress
 from bridge.mavlink.desk.hands import Denied, Hands
-from bridge.mavlink.desk.logbook import BACK_NS, Logbook, Ordered, Owed
+from bridge.mavlink.desk.logbook import Logbook, Ordered, Owed
 from bridge.mavlink.desk.lookout import CLOCKS, Lookout
 from bridge.mavlink.desk.progress import SOMEBODY, Sight, steps, tried_again
 from bridge.mavlink.desk.visits import Course
@@ -23,6 +23,7 @@ from bridge.run import Change, Run
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.events import Arrived
 from mission.mavlink.autopilots import differences
+from mission.mavlink.telemetry import began_again
 
 SETTLED_NS = 1_500_000_000
 """A heartbeat this soon after a change may have been sent before it."""
@@ -142,7 +143,7 @@ class Follower:
         """A vehicle that was started anew stands, and has forgotten its mode, origin and item."""
         began_ns, before_ms = self._lookout.began_ns, self._book.boot_ms
         self._book.boot_ms = self._lookout.boot_ms
-        went_back = self._book.boot_ms * 10**6 + BACK_NS < before_ms * 10**6
+        went_back = began_again(before_ms, self._book.boot_ms)
         if self._looks_only or began_ns is None or not self._book.booted(began_ns, went_back=went_back):
             return
         self._hands.ask_for_telemetry()

@@ -27,15 +27,12 @@ from bridge.mavlink.line.url import Url
 from bridge.protocol import CHUNK_BYTES, Manifest
 from bridge.run import Change, Run
 from mission.document import Mission
-from mission.events import Aborted, AnyEvent
+from mission.events import Aborted
 from mission.mavlink.items import ItemList
+from mission.mavlink.telemetry import BACK_MS
 
 REBOOT_NS = 5 * 10**9
 """A vehicle whose clock began so much later than it was known to was started anew."""
-
-
-BACK_NS = 10**9
-"""By so much its clock goes back only when it is started anew."""
 
 
 class Sent(msgspec.Struct, frozen=True, kw_only=True):
@@ -134,7 +131,7 @@ class Logbook:
 
         A clock that was seen to go back is believed sooner.
         """
-        boot, slack_ns = self.journal.fact("boot", Boot), BACK_NS if went_back else REBOOT_NS
+        boot, slack_ns = self.journal.fact("boot", Boot), BACK_MS * 10**6 if went_back else REBOOT_NS
         if boot is not None and boot.began_ns <= began_ns <= boot.began_ns + slack_ns:
             return False
         with self.journal.transaction():
@@ -168,12 +165,7 @@ class Logbook:
             self.use(-1, self.boot_ms)
         if run.state != before.state:
             self.journal.store_fact("changed", Moment(now_ns))
-        for telling in change.events:
-            event: AnyEvent = telling(
-                number=0, robot=self.robot, boot_id=self.boot_id, run_id=run.run_id or "",
-                mission_id=run.mission_id or "", revision=run.revision or 0, robot_ns=now_ns,
-                mission_time_s=(now_ns - run.started_ns) / 1e9,
-            )  # fmt: skip
+        for event in runs.told_of(change, robot=self.robot, boot_id=self.boot_id, now_ns=now_ns):
             self.journal.append(event)
 
     @property

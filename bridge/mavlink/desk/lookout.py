@@ -20,7 +20,7 @@ from mission.geodesy import heading_of
 from mission.mavlink.autopilots import autopilot_named, point_at
 from mission.mavlink.captures import Capture, Picture, capture_of
 from mission.mavlink.origin import is_elsewhere
-from mission.mavlink.telemetry import is_lost, stands_still
+from mission.mavlink.telemetry import charge_of, is_lost, stands_still
 
 CAPTURES_KEPT = 100
 TOLD = (
@@ -234,8 +234,8 @@ class Lookout:
         self.fix = Fix(pose, speed, stands_still(speed=speed, yaw_rate=yaw_rate), now_ns)
 
     def _take_battery(self, message: Message, course: Course | None, now_ns: int) -> None:
-        if 0 <= message.battery_remaining <= 100:
-            self.battery = message.battery_remaining / 100
+        charge = charge_of(message.battery_remaining)
+        self.battery = self.battery if charge is None else charge
 
     def _take_capture(self, message: Message, course: Course | None, now_ns: int) -> None:
         capture = capture_of(message, None if course is None else course.sent)

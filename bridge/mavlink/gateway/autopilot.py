@@ -18,7 +18,7 @@ from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import Box, Message, Who, dialect, wire
 from mission.document import Point
 from mission.errors import OutcomeUnknown, RobotUnreachable
-from mission.mavlink.telemetry import is_lost, stands_still
+from mission.mavlink.telemetry import charge_of, is_lost, stands_still
 
 ON_BOARD = Who(253, dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
 """Ourselves: neither QGroundControl (255) nor a station of ours (254)."""
@@ -171,8 +171,9 @@ class Autopilot:
         """0 to 1, as it last told, however old; `None` if it never did."""
         for name in ("BATTERY_STATUS", "SYS_STATUS"):
             told = self._heard.newest(name)
-            if told is not None and 0 <= told.battery_remaining <= 100:
-                return float(told.battery_remaining) / 100
+            charge = None if told is None else charge_of(told.battery_remaining)
+            if charge is not None:
+                return charge
         return None
 
     def origin(self) -> Origin | None:

@@ -19,6 +19,7 @@ from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import SIGNATURE, Box, Message, Who, Wire, dialect, sender, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from mission.geodesy import STEPS_PER_DEGREE, Geodetic
+from mission.mavlink.telemetry import began_again
 
 PATIENCE_S = 5.0
 """Silence after which a vehicle is given up."""
@@ -29,8 +30,6 @@ OTHERS_S = 1.3
 KNOCK_S = 0.3
 """So often a vehicle that is not heard is asked for a heartbeat."""
 CLOCKS = (dialect.MAVLINK_MSG_ID_SYSTEM_TIME, dialect.MAVLINK_MSG_ID_ATTITUDE)
-BACK_MS = 1_000
-"""A clock that goes back by more was started again; by less, two messages changed places."""
 UNSET_ANSWERS = 8
 """So often a vehicle takes the question and sends nothing before that means there is nothing to send."""
 AUTOPILOTS = {dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot", dialect.MAV_AUTOPILOT_PX4: "px4"}
@@ -122,9 +121,9 @@ class Newest(Box):
             self._count_boots(now_ms)
 
     def _count_boots(self, now_ms: int) -> None:
-        began_again = now_ms + BACK_MS < self._boot_ms
-        self.boots += began_again
-        self._boot_ms = now_ms if began_again else max(now_ms, self._boot_ms)
+        anew = began_again(self._boot_ms, now_ms)
+        self.boots += anew
+        self._boot_ms = now_ms if anew else max(now_ms, self._boot_ms)
 
 
 class Peer:

@@ -11,14 +11,13 @@ import math
 from dataclasses import dataclass
 
 from bridge.mavlink.simulated.faults import Mishaps
+from bridge.simulator import BYTES_PER_POINT, POINTS_PER_S
 from mission.events import Pose
 
 DEFAULT_S = 3.0
 LONGEST_S = 3600.0
 MOVED_M, TURNED_RAD = 0.01, 0.02
 """A scanner that moves more than this while it scans has failed."""
-POINTS_PER_S = 360_000
-BYTES_PER_POINT = 16
 
 
 @dataclass(frozen=True)
