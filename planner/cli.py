@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from mission.settings import Settings
     from planner.report import PlanReport
     from recordings.field import FieldRecording
+    from recordings.plan import PlanRecording
 
 EXAMPLE = "Example: stopgo plan floor.dxf -o plan --range 8 --start 2.5,3.0,90"
 
@@ -159,10 +160,10 @@ def _print(reports: list[PlanReport], *, as_json: bool) -> None:
 
 def plan_files(floor: Path, out: Path, settings: Settings, *, all_parts: bool = False) -> list[PlanReport]:
     """Plan a floor's file into a folder; one report per part, the main part first."""
+    from mission.files.atomic import must_be_writable
     from planner import plan
     from planner.floors import read_floor
     from planner.outputs import names
-    from recordings.canvas import must_be_writable
 
     watch = Stopwatch()
     read = read_floor(floor, d_dis=settings.d_dis, layers=settings.layer_roles)
@@ -221,18 +222,22 @@ def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch) -> 
     from mission.schedule import schedule
     from planner.outputs import names
     from planner.report import PlanReport
-    from recordings.canvas import must_be_writable
-    from recordings.plan import PlanRecording
 
     files = names(folder, number)
-    for path in files.values():
-        must_be_writable(path)
     mission = _revised(part.mission, files["mission"])
-    recording = PlanRecording(mission.id)
-    for noun in (*part.nouns(), mission, schedule(mission)):
-        recording.observe(noun)
-    with replacing(*(files[key] for key in WRITTEN)) as (recorded, coverage, picture, document):
-        recording.write(recorded)
+    recording = _recording(mission.id)
+    if recording is None:
+        del files["recording"]
+    with replacing(*(files[key] for key in WRITTEN if key in files)) as (
+        *recorded,
+        coverage,
+        picture,
+        document,
+    ):
+        if recording is not None:
+            for noun in (*part.nouns(), mission, schedule(mission)):
+                recording.observe(noun)
+            recording.write(recorded[0])
         watch.lap("recording")
         coverage.write_bytes(coverage_json(part.route, mission, part.figures))
         today = datetime.date.today().isoformat()
@@ -240,6 +245,18 @@ def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch) -> 
         document.write_bytes(encode(mission))
     watch.lap("files")
     return PlanReport(part=replace(part, mission=mission), files=files, times_s=watch.times())
+
+
+def _recording(recording_id: str) -> PlanRecording | None:
+    """Takes the nouns of a plan; None, with a line that says so, where recordings are not installed."""
+    try:
+        from recordings.plan import PlanRecording
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "rerun":
+            raise
+        typer.echo('no plan.rrd: rerun is not installed; pip install "stopgo[record]" brings it', err=True)
+        return None
+    return PlanRecording(recording_id)
 
 
 WRITTEN = ("recording", "coverage", "picture", "mission")

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,6 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from mission.document import Mission
-from mission.errors import InputError
 from mission.geometry import FloatArray
 from recordings import entities, palette
 from recordings.layout import Bounds, blueprint
@@ -120,36 +117,6 @@ class Sheet:
     def local_extent(self) -> Bounds:
         x, y = self.origin
         return (self.extent[0] - x, self.extent[1] - y, self.extent[2] - x, self.extent[3] - y)
-
-
-def must_be_writable(path: Path) -> None:
-    """Refuse a place where no file can be made, before anything is done for it.
-
-    Raises
-    ------
-    InputError
-        Naming the path and what is wrong with it.
-    """
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; give the name of a file in it")
-    if path.exists() and not path.is_file():
-        raise InputError(f"{path}: is no file but a device or the like; give another name")
-    if path.parent.exists() and not path.parent.is_dir():
-        raise InputError(f"{path}: {path.parent} is a file, not a folder; give another place")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}; make it first")
-    _try(path)
-
-
-def _try(path: Path) -> None:
-    """Make a file beside `path` and take it away: what is allowed does not tell what is possible."""
-    try:
-        with NamedTemporaryFile(dir=path.parent, prefix=f"{path.stem}.partial-", suffix=".rrd"):
-            pass
-    except OSError as error:
-        raise InputError(
-            f"{path}: no such file can be made in {path.parent} ({error.strerror}); give another place"
-        ) from None
 
 
 @contextmanager

@@ -11,7 +11,8 @@ from typing import Any
 from mission.document import Mission
 from mission.errors import InputError
 from mission.events import AnyEvent, PoseReport, StateReport
-from recordings.canvas import Canvas, Sheet, mission_origin, must_be_writable, open_canvas
+from mission.files.atomic import must_be_writable
+from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
 from recordings.compact import compact
 from recordings.pieces import Pieces
 from recordings.runs.drawing import RunDrawing

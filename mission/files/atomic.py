@@ -7,6 +7,7 @@ import os
 import secrets
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 from mission.errors import InputError
 
@@ -64,6 +65,36 @@ def replacing(*paths: Path | str) -> Iterator[list[Path]]:
         for temporary in temporaries:
             with contextlib.suppress(OSError):  # gone after the rename, and nothing to do if it cannot go
                 temporary.unlink(missing_ok=True)
+
+
+def must_be_writable(path: Path) -> None:
+    """Refuse a place where no file can be made, before anything is done for it.
+
+    Raises
+    ------
+    InputError
+        Naming the path and what is wrong with it.
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; give the name of a file in it")
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is no file but a device or the like; give another name")
+    if path.parent.exists() and not path.parent.is_dir():
+        raise InputError(f"{path}: {path.parent} is a file, not a folder; give another place")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}; make it first")
+    _try_beside(path)
+
+
+def _try_beside(path: Path) -> None:
+    """Make a file beside `path` and take it away: what is allowed does not tell what is possible."""
+    try:
+        with NamedTemporaryFile(dir=path.parent, prefix=f"{path.stem}.partial-", suffix=path.suffix):
+            pass
+    except OSError as error:
+        raise InputError(
+            f"{path}: no such file can be made in {path.parent} ({error.strerror}); give another place"
+        ) from None
 
 
 def _target(path: Path | str) -> Path:
