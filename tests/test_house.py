@@ -6,6 +6,7 @@ import ast
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -31,25 +32,21 @@ def modules() -> dict[str, Path]:
 MODULES = modules()
 
 
-def imported(name: str, *, at_top_only: bool = False) -> Iterator[str]:
-    """Dotted names of our modules that a module imports."""
+@cache
+def imported(name: str) -> tuple[str, ...]:
+    """Dotted names of our modules that a module imports, wherever in it."""
+    return tuple(_imported(name))
+
+
+def _imported(name: str) -> Iterator[str]:
     tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
-    for node in _at_top(tree) if at_top_only else ast.walk(tree):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name.split(".")[0] in FOLDERS)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{name}: a relative import; write the whole name"
             if (node.module or "").split(".")[0] in FOLDERS:
                 yield from _from(node)
-
-
-def _at_top(tree: ast.Module) -> Iterator[ast.stmt]:
-    """Statements that run at import, `if TYPE_CHECKING` blocks excepted."""
-    for node in tree.body:
-        if isinstance(node, ast.Try):
-            yield from node.body
-        else:
-            yield node
 
 
 def _from(node: ast.ImportFrom) -> Iterator[str]:
@@ -76,12 +73,72 @@ def test_nobody_imports_what_composes() -> None:
             assert not [item for item in imported(name) if composes(item) and item != name], name
 
 
-def test_there_are_no_import_cycles() -> None:
-    graph = {name: set(imported(name, at_top_only=True)) - {name} for name in MODULES}
-    while leaves := [name for name, needs in graph.items() if not needs & set(graph)]:
-        for name in leaves:
-            del graph[name]
-    assert not graph, f"these import each other in a circle: {sorted(graph)}"
+Graph = dict[str, set[str]]
+"""Who imports whom."""
+
+
+def circles(graph: Graph) -> list[str]:
+    """A shortest circle through each name that is in one, as in "a -> b -> a"."""
+    ways = (_way_round(graph, name) for name in sorted(graph))
+    return sorted({_from_first(way) for way in ways if way})
+
+
+def _way_round(graph: Graph, name: str) -> list[str]:
+    """The shortest way from a name back to itself; empty if there is none."""
+    came_from: dict[str, str] = {}
+    here = [name]
+    while here and name not in came_from:
+        beyond = [(there, one) for one in here for there in sorted(graph.get(one, ()))]
+        fresh = {there: one for there, one in reversed(beyond) if there not in came_from}
+        came_from |= fresh
+        here = sorted(fresh)
+    if name not in came_from:
+        return []
+    way = [came_from[name]]
+    while way[-1] != name:
+        way.append(came_from[way[-1]])
+    return way[::-1]
+
+
+def _from_first(way: list[str]) -> str:
+    first = way.index(min(way))
+    return " -> ".join([*way[first:], *way[:first], way[first]])
+
+
+def siblings(parent: str) -> Graph:
+    """How the folders and modules right below a folder import each other, whatever lies in them."""
+    graph: Graph = {}
+    depth = parent.count(".") + 2
+    for name in MODULES:
+        if name.startswith(f"{parent}."):
+            own = _cut(name, depth)
+            needs = {_cut(item, depth) for item in imported(name) if item.startswith(f"{parent}.")}
+            graph.setdefault(own, set()).update(needs - {own})
+    return graph
+
+
+def _cut(name: str, depth: int) -> str:
+    return ".".join(name.split(".")[:depth])
+
+
+PACKAGES = [name for name, path in MODULES.items() if path.name == "__init__.py"]
+
+
+def test_a_circle_is_named() -> None:
+    graph = {"a": {"b", "x"}, "b": {"c"}, "c": {"a", "b"}, "x": {"a"}, "y": {"a"}}
+    assert circles(graph) == ["a -> x -> a", "b -> c -> b"]
+    assert circles({"a": {"b"}, "b": {"c"}, "c": set()}) == []
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    """Imports that are lazy or for types alone count."""
+    assert not circles({name: set(imported(name)) - {name} for name in MODULES})
+
+
+@pytest.mark.parametrize("parent", PACKAGES)
+def test_no_siblings_import_each_other_in_a_circle(parent: str) -> None:
+    """Neither folders nor modules, at any depth; imports that are lazy or for types alone count."""
+    assert not circles(siblings(parent))
 
 
 @pytest.mark.parametrize("statement", ["import mission, bridge", "import planner, recordings"])

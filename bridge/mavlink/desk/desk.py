@@ -24,9 +24,9 @@ from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.hands import Hands
 from bridge.mavlink.desk.logbook import Logbook, logbook
 from bridge.mavlink.desk.lookout import TOLD, Lookout
+from bridge.mavlink.desk.modes import modes_of
 from bridge.mavlink.desk.orders import Consent, Orders
 from bridge.mavlink.desk.progress import held_by_vehicle
-from bridge.mavlink.line.modes import modes_of
 from bridge.mavlink.line.peer import Peer, found
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import GROUND_STATION, Box, Who, dialect, wire

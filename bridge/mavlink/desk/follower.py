@@ -13,9 +13,9 @@ from bridge.mavlink.desk import progress
 from bridge.mavlink.desk.hands import Denied, Hands
 from bridge.mavlink.desk.logbook import Logbook, Ordered, Owed
 from bridge.mavlink.desk.lookout import CLOCKS, Lookout
+from bridge.mavlink.desk.modes import AUTO
 from bridge.mavlink.desk.progress import SOMEBODY, Sight, steps, tried_again
 from bridge.mavlink.desk.visits import Course
-from bridge.mavlink.line.modes import AUTO
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.transfer.download import download

@@ -9,7 +9,7 @@ from contextlib import suppress
 from bridge.clock import Clock
 from bridge.commands import Refused
 from bridge.mavlink.desk.lookout import Lookout
-from bridge.mavlink.line.modes import AUTO, HOLD, Modes
+from bridge.mavlink.desk.modes import AUTO, HOLD, Modes
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.wire import dialect
 from mission.errors import OutcomeUnknown

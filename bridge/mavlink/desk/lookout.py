@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bridge.clock import Clock
+from bridge.mavlink.desk.modes import Modes
 from bridge.mavlink.desk.progress import Sight
 from bridge.mavlink.desk.visits import Course
 from bridge.mavlink.gateway.local import LocalFrame, local_frame
-from bridge.mavlink.line.modes import Modes
 from bridge.mavlink.line.peer import Origin, origin_of
 from bridge.mavlink.line.wire import Message, dialect
 from bridge.run import Run

@@ -22,11 +22,11 @@ from bridge.mavlink.desk import progress
 from bridge.mavlink.desk.hands import Denied, Hands
 from bridge.mavlink.desk.logbook import Logbook, Ordered
 from bridge.mavlink.desk.lookout import Lookout
+from bridge.mavlink.desk.modes import AUTO, HOLD, why_unfit
 from bridge.mavlink.desk.onward import ON_WAY_M, onward, way
 from bridge.mavlink.desk.progress import Sight
 from bridge.mavlink.desk.visits import Course
 from bridge.mavlink.gateway.local import apart
-from bridge.mavlink.line.modes import AUTO, HOLD, why_unfit
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.transfer.download import download
 from bridge.protocol import Answer, Command, Lease

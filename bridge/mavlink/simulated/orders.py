@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -13,12 +12,10 @@ from bridge.mavlink.line.wire import Message, Who
 from bridge.mavlink.simulated import telemetry
 from bridge.mavlink.simulated.profile import CUSTOM, ModeName
 from bridge.mavlink.simulated.rover import FAR_M
+from bridge.mavlink.simulated.vehicle import Handlers, Vehicle
 from mission.document import SiteOrigin
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.items import Command
-
-if TYPE_CHECKING:
-    from bridge.mavlink.simulated.vehicle import Vehicle
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 REJECTED, UNSUPPORTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED, dialect.MAV_RESULT_UNSUPPORTED
@@ -49,7 +46,7 @@ class Order:
         return int(value) if math.isfinite(value) and abs(value) < 2**31 else default
 
 
-def handlers(vehicle: Vehicle) -> dict[str, Callable[[Who, Message], None]]:
+def handlers(vehicle: Vehicle) -> Handlers:
     """What to do with each message that is an order."""
     return {
         "COMMAND_LONG": lambda who, message: _answer(vehicle, who, _long(message)),

@@ -13,6 +13,7 @@ from bridge.clock import WallClock
 from bridge.mavlink.line.transport import open_transport
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import Who, Wire, read_line
+from bridge.mavlink.simulated.complete import complete_vehicle
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.line import on_line
 from bridge.mavlink.simulated.orders import NORTHMOST
@@ -78,7 +79,9 @@ def vehicle_on(
     signs = setting.faults.any("unsigned") is None
     line = on_line(open_transport(url), setting.faults)
     with closing(Wire(line, me=VEHICLE, signing_key=signing_key, signs=signs)) as wire:
-        vehicle = Vehicle(setting, clock=WallClock(speed_up=speed_up), wall=WallClock(), say=wire.send)
+        vehicle = complete_vehicle(
+            setting, clock=WallClock(speed_up=speed_up), wall=WallClock(), say=wire.send
+        )
         stop, stopped = threading.Event(), Stopped()
         thread = threading.Thread(target=_live, args=(vehicle, wire, stop, stopped), daemon=True)
         thread.start()

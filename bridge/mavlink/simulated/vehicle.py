@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.clock import Clock
-from bridge.mavlink.line.wire import Message, sender
-from bridge.mavlink.simulated import orders, parameters, telemetry
+from bridge.mavlink.line.wire import Message, Who, sender
+from bridge.mavlink.simulated import parameters
 from bridge.mavlink.simulated.camera import Camera
 from bridge.mavlink.simulated.course import Course, Tells
 from bridge.mavlink.simulated.faults import NO_FAULTS, Mishaps, VehicleFaults
@@ -19,6 +19,7 @@ from bridge.mavlink.simulated.parameters import Parameters
 from bridge.mavlink.simulated.profile import ModeName, Profile
 from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.store import MISSION, Store
+from bridge.mavlink.simulated.streams import Streams
 from bridge.mavlink.simulated.transfers import Transfers
 from mission.document import SiteOrigin
 from mission.events import Pose
@@ -27,7 +28,15 @@ from mission.mavlink.items import Command, Frame, Item
 
 BOOT_NS = KEEP_NS = 1_000_000_000
 FOREVER_NS = 2**63
+BATTERY_NS = 6 * 3600 * 10**9
+"""A full battery lasts six hours."""
 NOWHERE = Item(Command.NAV_WAYPOINT, Frame.GLOBAL)
+
+
+Maker = Callable[["Vehicle"], Message | None]
+"""The message as it is now; None if there is nothing to tell."""
+Handlers = dict[str, Callable[[Who, Message], None]]
+"""What to do with each message that is heard."""
 
 
 @dataclass(frozen=True)
@@ -54,13 +63,19 @@ class Vehicle:
         The stations': timeouts of the mission protocol and telemetry.
     say
         Sends a message.
+    makers
+        All that it can tell of itself, by the message's number.
+    orders
+        What it does with each message that is an order.
     """
 
     def __init__(
-        self, setting: Setting, *, clock: Clock, wall: Clock, say: Callable[[Message], None]
-    ) -> None:
+        self, setting: Setting, *, clock: Clock, wall: Clock, say: Callable[[Message], None],
+        makers: Mapping[int, Maker], orders: Callable[[Vehicle], Handlers],
+    ) -> None:  # fmt: skip
         self.profile = setting.profile
         self._setting, self._clock, self._wall, self._say_out = setting, clock, wall, say
+        self._makers = makers
         self._mishaps = Mishaps(setting.faults)
         self._booted_ns = clock.now_ns()
         # Frames overtake each other in the wall's time: a faster one would seem to go back by a reboot.
@@ -86,7 +101,7 @@ class Vehicle:
             reboot=self.reboot, text=self.text,
         )  # fmt: skip
         self.course = Course(self.profile, self.store, self.rover, self.camera, self._mishaps, tells)
-        self.streams = telemetry.Streams(wall)
+        self.streams = Streams(wall, makers)
         self.transfers = Transfers(
             self.profile, self.store, wall, say=self.say, text=self.text, home=self._home,
             stored=self._stored, running=lambda: self.course.state == "active", event=self._item_came,
@@ -95,7 +110,7 @@ class Vehicle:
         self._handlers = {
             **self.transfers.handlers,
             **parameters.answer(self.parameters, self.say),
-            **orders.handlers(self),
+            **orders(self),
         }
 
     # What it hears, and the time
@@ -139,7 +154,7 @@ class Vehicle:
 
     def tell(self, number: int) -> bool:
         """Send the message with that number as it is now; false if there is nothing to tell."""
-        made = telemetry.MAKERS[number](self)
+        made = self._makers[number](self)
         if made is not None:
             self.say(made)
         return made is not None
@@ -160,7 +175,7 @@ class Vehicle:
     @property
     def battery(self) -> float:
         """0 to 1."""
-        used = (self.now_ns - self._booted_ns) / telemetry.BATTERY_NS
+        used = (self.now_ns - self._booted_ns) / BATTERY_NS
         return max(0.0, 1.0 - used)
 
     # What it can be told to do
@@ -213,7 +228,7 @@ class Vehicle:
         """Send a message that was asked for, if there is something to tell; an older scan's by its number."""
         if number == dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED and index > 0 and index in self.camera.told:
             self.say(self.camera.told[index])
-        elif number in telemetry.MAKERS:
+        elif number in self._makers:
             self.tell(number)
 
     def break_off(self) -> None:
@@ -231,7 +246,7 @@ class Vehicle:
         self.course.reset()
         self.camera.reset()
         self.transfers.reset()
-        self.streams = telemetry.Streams(self._wall)
+        self.streams = Streams(self._wall, self._makers)
         self._booted_ns = self.now_ns
         self._told_from_ns = self._wall.now_ns()
         self._quiet_until_ns = self._wall.now_ns() + BOOT_NS

@@ -10,9 +10,10 @@ from typing import Any
 
 from bridge.clock import SimulatedClock
 from bridge.mavlink.line.wire import Message, Who, dialect
+from bridge.mavlink.simulated.complete import complete_vehicle
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.profile import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting, Vehicle
+from bridge.mavlink.simulated.vehicle import Setting
 from mission.document import SiteOrigin
 from mission.events import Pose
 from mission.mavlink.items import Command, Frame, Item
@@ -55,7 +56,7 @@ class Bench:
         self.all: list[Message] = []
         made = tuple(read_vehicle_fault(text) for text in faults)
         setting = Setting(PROFILES[profile], state, origin, at, VehicleFaults(made))
-        self.vehicle = Vehicle(setting, clock=self.clock, wall=self.wall, say=self._hear)
+        self.vehicle = complete_vehicle(setting, clock=self.clock, wall=self.wall, say=self._hear)
         self.first = 1 if self.vehicle.profile.autopilot.home_first else 0
         self._wires = {who: dialect.MAVLink(None, *vars(who).values()) for who in (STATION, OTHER)}
         self._own = dialect.MAVLink(None, 1, 1)

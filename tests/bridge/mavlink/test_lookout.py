@@ -8,9 +8,9 @@ import pytest
 
 from bridge.clock import SimulatedClock
 from bridge.mavlink.desk.lookout import Lookout
+from bridge.mavlink.desk.modes import AUTOS, Modes
 from bridge.mavlink.desk.visits import Course, course_of
 from bridge.mavlink.gateway.driving import DRIVING
-from bridge.mavlink.line.modes import AUTOS, Modes
 from bridge.mavlink.line.wire import dialect
 from bridge.run import Run
 from mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic

@@ -15,9 +15,9 @@ from bridge.journal import memory_journal
 from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.logbook import Logbook, remember
 from bridge.mavlink.desk.lookout import Lookout
+from bridge.mavlink.desk.modes import AUTOS, Modes
 from bridge.mavlink.desk.progress import started
 from bridge.mavlink.gateway.driving import DRIVING
-from bridge.mavlink.line.modes import AUTOS, Modes
 from bridge.mavlink.line.wire import dialect
 from mission.document import Mission, SiteOrigin
 from mission.events import AnyEvent, Arrived, Failed

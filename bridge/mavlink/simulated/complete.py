@@ -1,0 +1,18 @@
+"""A vehicle complete with all that it tells and obeys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from bridge.clock import Clock
+from bridge.mavlink.line.wire import Message
+from bridge.mavlink.simulated.orders import handlers
+from bridge.mavlink.simulated.telemetry import MAKERS
+from bridge.mavlink.simulated.vehicle import Setting, Vehicle
+
+
+def complete_vehicle(
+    setting: Setting, *, clock: Clock, wall: Clock, say: Callable[[Message], None]
+) -> Vehicle:
+    """The vehicle that `Vehicle` describes, with every message and order that there is."""
+    return Vehicle(setting, clock=clock, wall=wall, say=say, makers=MAKERS, orders=handlers)

@@ -1,0 +1,63 @@
+"""How often the vehicle sends each message, and which is due."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from bridge.clock import Clock
+
+LOWEST_INTERVAL_US, HIGHEST_INTERVAL_US = 10_000, 2**31 - 1
+DEFAULT_US: dict[int, int] = {
+    dialect.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
+    dialect.MAVLINK_MSG_ID_SYS_STATUS: 1_000_000,
+    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: 1_000_000,
+    dialect.MAVLINK_MSG_ID_ATTITUDE: 250_000,
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 250_000,
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 250_000,
+    dialect.MAVLINK_MSG_ID_MISSION_CURRENT: 1_000_000,
+    dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: 1_000_000,
+    dialect.MAVLINK_MSG_ID_VFR_HUD: 1_000_000,
+    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 2_000_000,
+    dialect.MAVLINK_MSG_ID_HOME_POSITION: 2_000_000,
+    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1_000_000,
+}
+"""How often each is sent unless a station asks otherwise; the others only when something happens."""
+
+
+class Streams:
+    """Which message is due when, on the wall's clock: stations look at their own, however time is sped up."""
+
+    def __init__(self, clock: Clock, known: Collection[int]) -> None:
+        self._clock = clock
+        self._known = known
+        """Numbers of the messages that can be sent."""
+        self._every_us = dict(DEFAULT_US)
+        self._due_ns = dict.fromkeys(DEFAULT_US, clock.now_ns())
+
+    def interval_us(self, number: int) -> int:
+        """0: not known; -1: not sent."""
+        return self._every_us.get(number, -1) if number in self._known else 0
+
+    def set(self, number: int, interval_us: float) -> bool:
+        """0: as by default; negative: no more; false if the message is not known."""
+        if number not in self._known or not math.isfinite(interval_us):
+            return False
+        wanted = DEFAULT_US.get(number, -1) if interval_us == 0 else round(interval_us)
+        if wanted < 0:
+            self._every_us.pop(number, None)
+            self._due_ns.pop(number, None)
+        else:
+            self._every_us[number] = min(max(LOWEST_INTERVAL_US, wanted), HIGHEST_INTERVAL_US)
+            self._due_ns[number] = self._clock.now_ns()
+        return True
+
+    def due(self) -> list[int]:
+        """The messages that are due, each next time an interval from now."""
+        now = self._clock.now_ns()
+        found = [number for number, due in self._due_ns.items() if due <= now]
+        for number in found:
+            self._due_ns[number] = now + self._every_us[number] * 1000
+        return found
