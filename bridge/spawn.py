@@ -47,8 +47,9 @@ def start_robot(
     RobotUnreachable
         With the last line the robot said, if it ended or did not get ready.
     """
-    own = ("--name", name, "--state", str(state), "--listen", listen, "--speed-up", f"{speed_up:g}")
-    return start("robot", *own, *extra, called=f"robot {name}")
+    own = ("--name", name, "--state", str(state), "--listen", listen)
+    faster = () if speed_up == 1.0 else ("--speed-up", f"{speed_up:g}")
+    return start("robot", *own, *faster, *extra, called=f"robot {name}")
 
 
 def start(*arguments: str, called: str) -> subprocess.Popen[str]:
