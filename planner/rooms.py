@@ -11,7 +11,7 @@ from mission.planning import RoomSpace
 from mission.settings import Settings
 from planner.ground import Ground
 from planner.openings import part_near
-from planner.shapes import boundary_lines, polygon_parts, to_polygons, to_shape, widened
+from planner.shapes import boundary_lines, polygon_parts, to_polygons, to_shape
 
 LEAST_UNNAMED = 0.5
 """Floor outside every room smaller than this (m²) is a threshold or a niche, not a room."""
@@ -66,7 +66,8 @@ def _unnamed(
         names = ["floor"] if len(parts) == 1 else [f"floor {k + 1}" for k in range(len(parts))]
         return list(zip(names, parts, strict=True))
     inside = shapely.union_all(rooms)
-    outside = ground.outline.difference(inside).difference(widened(boundary_lines(inside), THIN, quad_segs=4))
+    thresholds = shapely.union_all(shapely.buffer(boundary_lines(inside), THIN, cap_style="square"))
+    outside = ground.outline.difference(inside).difference(thresholds)
     parts = [p for p in polygon_parts(outside) if p.intersection(drive_area).area > LEAST_UNNAMED]
     ordered = sorted(parts, key=lambda part: part.bounds)
     return [(f"unnamed {k + 1}", part) for k, part in enumerate(ordered)]

@@ -6,7 +6,7 @@ floor that is moved is planned the same. On the grid, orientation tests are exac
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -35,16 +35,28 @@ FARTHEST_STEPS = 2**29
 @lru_cache(maxsize=8)
 def local_origin(floor: FloorPlan) -> FloatArray:
     """The lower left corner of everything on the floor (2,); refuses floors too large to be exact."""
-    parts = [ring for polygon in floor.outline for ring in polygon.rings]
-    parts += [ring for item in floor.elements for solid in item.solids for ring in solid.rings]
-    parts += [line for item in floor.elements for line in item.lines]
-    low_x, low_y, high_x, high_y = bounds(parts)
+    drawn = {"its outline": [ring for polygon in floor.outline for ring in polygon.rings]}
+    drawn |= {room.id: [ring for polygon in room.polygons for ring in polygon.rings] for room in floor.rooms}
+    drawn |= {item.id: [item.line] for item in floor.openings}
+    drawn |= {e.id: [*(ring for solid in e.solids for ring in solid.rings), *e.lines] for e in floor.elements}
+    low_x, low_y, high_x, high_y = bounds(part for parts in drawn.values() for part in parts)
     extent = max(high_x - low_x, high_y - low_y)
     if extent > LARGEST:
         raise InputError(
-            f"{floor.name}: {extent:.0f} m across, more than {LARGEST:.0f} m; check the drawing's units"
+            f"{floor.name}: {extent:.0f} m across with {_farthest(drawn)}, more than {LARGEST:.0f} m; "
+            "check it, and the drawing's units"
         )
     return frozen([low_x, low_y])
+
+
+def _farthest(drawn: Mapping[str, Sequence[FloatArray]]) -> str:
+    """The name of what reaches farthest from the first point of all."""
+    first = next(part[0] for parts in drawn.values() for part in parts if len(part))
+    away = {
+        name: max((float(np.hypot(*(part - first).T).max()) for part in parts if len(part)), default=0.0)
+        for name, parts in drawn.items()
+    }
+    return max(away, key=lambda name: away[name])
 
 
 def to_shape(polygons: Iterable[Polygon], origin: FloatArray) -> BaseGeometry:

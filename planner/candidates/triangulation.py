@@ -18,7 +18,7 @@ from mission.geometry import FloatArray, IntArray
 from mission.planning import KEPT, SLIVER, TOO_SMALL, NavigableSpace
 from planner.candidates.grid import main_axes
 from planner.candidates.place import Place
-from planner.shapes import one_shape, polygon_parts, segments_of
+from planner.shapes import GRID, one_shape, polygon_parts, segments_of
 
 LEAST_ANGLE = float(np.arcsin(1 / 6))
 """alpha_min in radians: sin alpha_min = l_min / (6 l_min) (paper, Eq. 2), 9.594° whatever l_min is."""
@@ -61,7 +61,7 @@ class Drawn:
             middles = [one_shape(column, place.origin).centroid for column in columns]
             return cls(shapely.linestrings(np.empty((0, 2, 2))), shapely.get_coordinates(middles))
         parts = polygon_parts(place.obstacles)
-        cornered = shapely.multipolygons([part for part in parts if not is_round(part)])
+        cornered = shapely.MultiPolygon([part for part in parts if not is_round(part)])
         centres = shapely.get_coordinates([part.centroid for part in parts if is_round(part)])
         return cls(shapely.linestrings(segments_of(cornered)), centres)
 
@@ -105,7 +105,8 @@ def seeds_of(shape: BaseGeometry, drawn: Drawn, *, d_max: float) -> FloatArray:
     """Seeds (n, 2) of a room: segments longer than `d_max` metres are split evenly."""
     around = shapely.buffer(shape, AT_ROOM, join_style="mitre")
     near = drawn.edges[shapely.intersects(drawn.edges, around)]
-    lines = [*shapely.linestrings(segments_of(shape)), *shapely.intersection(near, around)]
+    drawn_lines = [*shapely.linestrings(segments_of(shape)), *shapely.intersection(near, around)]
+    lines = [line for line in drawn_lines if line.length > GRID or line.geom_type == "Point"]
     centres = drawn.centres[shapely.intersects(shapely.points(drawn.centres), shape)]
     return np.concatenate([shapely.get_coordinates(shapely.segmentize(lines, d_max)), centres])
 

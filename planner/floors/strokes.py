@@ -21,6 +21,8 @@ from planner.floors.shapes import Shape
 
 SAGITTA = 0.001
 """Greatest distance in metres between a curve and its chords."""
+SMALLEST = 1e-12
+"""A coordinate nearer to 0 than this, in any unit, is 0: so small a number cannot be divided by."""
 _COARSE = Fineness(chord=LARGEST, sagitta=LARGEST)
 
 
@@ -145,7 +147,7 @@ def _placed(shape: Shape, fineness: Fineness) -> list[tuple[FloatArray, Curve]]:
     for points, _ in placed:
         if not (np.isfinite(points).all() and (np.abs(points) <= LARGEST).all()):
             raise ValueError("a coordinate is not a number or beyond any building")
-    return placed
+    return [(np.where(np.abs(points) < SMALLEST, 0.0, points), curve) for points, curve in placed]
 
 
 def _flat(points: FloatArray, matrix: Matrix44 | None) -> FloatArray:

@@ -242,10 +242,17 @@ def test_a_real_floor_is_planned_by_the_command(run: Callable[..., Run], name: s
 
 # ---- odd drawings ----
 
+NAN = float("nan")
+
 ODD: dict[str, Draw] = {
     "a room that crosses itself": lambda d: d.ring("ROOMS", (1, 1), (3, 3), (3, 1), (1, 3)),
     "a room with a spike": lambda d: d.ring("ROOMS", (5, 1), (6, 1), (6, 3), (6, 2), (5, 2)),
     "a floor that crosses itself": lambda d: d.ring("FLOOR", (20, 0), (22, 2), (22, 0), (20, 2)),
+    "a floor drawn twice": lambda d: d.box("FLOOR", 0, 0, 8, 4),
+    "a hole that touches the floor's outline": lambda d: d.ring("FLOOR", (0, 1), (0.4, 0.9), (0.4, 1.1)),
+    "a hole across the floor's outline": lambda d: d.box("FLOOR", 7, 1, 9, 1.5),
+    "a floor that touches another in a corner": lambda d: d.box("FLOOR", 8, 4, 9, 5),
+    "a wall with a coordinate that is no number": lambda d: d.ring("WALLS", (1, 1), (2, 1), (2, NAN)),
     "a wall that crosses itself": lambda d: d.ring("WALLS", (2, 1), (3, 2), (3, 1), (2, 2)),
     "a door of no length": lambda d: d.line("DOORS", (2, 2), (2, 2)),
     "a wall of no length": lambda d: d.line("WALLS", (2, 2), (2, 2)),
@@ -263,7 +270,7 @@ def test_an_odd_drawing_is_planned(run: Callable[..., Run], name: str, tmp_path:
     assert (code, error) == (0, "")
     told = json.loads(out)
     assert told["selection"]["stops"] >= 1
-    if "door" not in name and "two points" not in name:
+    if not any(word in name for word in ("door", "two points", "hole")):
         assert told["floor"]["findings"], "an odd drawing is told of"
 
 
@@ -313,6 +320,27 @@ def test_a_file_cut_off_before_its_entities_end_is_2(
 def test_a_folder_as_the_floor_is_2(run: Callable[..., Run], tmp_path: Path) -> None:
     (tmp_path / "floor.dxf").mkdir()
     assert "directory" in refused(run, 2, tmp_path / "out", tmp_path / "floor.dxf")
+
+
+@pytest.mark.parametrize("layer", ["FLOOR", "ROOMS", "WALLS"])
+def test_a_shape_a_million_kilometres_away_is_2(run: Callable[..., Run], layer: str, tmp_path: Path) -> None:
+    far = drawn(tmp_path / "far.dxf", lambda d: d.box(layer, 1e9, 0, 1e9 + 5, 5))
+    code, out, error = run("plan", far, "-o", tmp_path / "out")
+    assert (code, out) == (2, "")
+    name = {"FLOOR": "its outline", "ROOMS": "room-003", "WALLS": "walls-007"}[layer]
+    assert f" m across with {name}, more than 5000 m" in error.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    "points", [[(0, 0), (8, 0)], [(0, 0), (8, 0), (4, 0)], [(0, 0)], [(0, 0), (NAN, 1), (1, 1)]]
+)
+def test_a_floor_without_area_is_2(
+    run: Callable[..., Run], points: list[tuple[float, float]], tmp_path: Path
+) -> None:
+    drawing = Drawing()
+    drawing.ring("FLOOR", *points)
+    drawing.document.saveas(tmp_path / "flat.dxf")
+    assert "no closed outline on layer FLOOR" in refused(run, 2, tmp_path / "out", tmp_path / "flat.dxf")
 
 
 def test_a_drawing_without_a_floor_is_2(run: Callable[..., Run], tmp_path: Path) -> None:

@@ -260,6 +260,11 @@ def test_an_impossible_coordinate_drops_its_entity_with_its_place(read: Read, va
     assert any("LINE #" in finding.message and "on WALLS" in finding.message for finding in plan.findings)
 
 
+def test_a_coordinate_too_small_to_divide_by_is_zero(read: Read) -> None:
+    plan = read(lambda m: m.add_line((5e-324, -1e-13), (4, 5), dxfattribs={"layer": "WALLS"}))
+    assert only(plan).lines[0].tolist() == [[0, 0], [4, 5]]
+
+
 def test_a_solid_body_is_told_to_be_exploded(read: Read) -> None:
     def draw(model: Modelspace) -> None:
         for _ in range(2):
