@@ -42,7 +42,7 @@ def main() -> None:
 
 def robot(folder: Path, endpoint: str, number: int):
     name = f"r{number:02}"
-    return start_robot(name, folder / name, listen="tcp/127.0.0.1:1", extra=("--connect", endpoint))
+    return start_robot(name, folder / name, listen=None, extra=("--connect", endpoint))
 
 
 def listen(endpoint: str, seconds: float) -> None:

@@ -38,18 +38,19 @@ def robot_process(
 
 
 def start_robot(
-    name: str, state: Path, *, listen: str, speed_up: float = 1.0, extra: Sequence[str] = ()
+    name: str, state: Path, *, listen: str | None, speed_up: float = 1.0, extra: Sequence[str] = ()
 ) -> subprocess.Popen[str]:
-    """The process of a robot that is ready.
+    """The process of a robot that is ready; one that connects to a router (`extra`) listens nowhere.
 
     Raises
     ------
     RobotUnreachable
         With the last line the robot said, if it ended or did not get ready.
     """
-    own = ("--name", name, "--state", str(state), "--listen", listen)
-    faster = () if speed_up == 1.0 else ("--speed-up", f"{speed_up:g}")
-    return start("robot", *own, *faster, *extra, called=f"robot {name}")
+    own = ["--name", name, "--state", str(state)]
+    own += [] if listen is None else ["--listen", listen]
+    own += [] if speed_up == 1.0 else ["--speed-up", f"{speed_up:g}"]
+    return start("robot", *own, *extra, called=f"robot {name}")
 
 
 def start(*arguments: str, called: str) -> subprocess.Popen[str]:

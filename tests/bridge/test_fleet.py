@@ -33,8 +33,7 @@ def router(endpoint: str, *keys: str) -> Iterator[subprocess.Popen[str]]:
 @contextmanager
 def robots(endpoint: str, state: Path, *names: str) -> Iterator[None]:
     extra = ("--connect", endpoint, "--site", "north/hall")
-    unused = f"tcp/127.0.0.1:{free_port()}"
-    processes = [start_robot(name, state / name, listen=unused, speed_up=100, extra=extra) for name in names]
+    processes = [start_robot(name, state / name, listen=None, speed_up=100, extra=extra) for name in names]
     try:
         yield
     finally:

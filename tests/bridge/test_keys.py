@@ -283,7 +283,7 @@ def test_behind_a_router_signatures_tell_who_orders(site: Path, tmp_path: Path) 
     issue(site / "site", "robot", "router", now=NOW)
     extra = ("--connect", endpoint, "--keys", str(site / "site" / "r1"))
     with router(endpoint, str(site / "site" / "router")):
-        robot = start_robot("r1", tmp_path, listen="tls/127.0.0.1:1", speed_up=100, extra=extra)
+        robot = start_robot("r1", tmp_path, listen=None, speed_up=100, extra=extra)
         try:
             with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
                 station.push(corridor())
