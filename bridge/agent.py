@@ -26,13 +26,12 @@ from bridge.protocol import (
     CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
     VERSION,
-    Command,
     Commit,
     Info,
     Keys,
     Malformed,
-    Message,
     Rejected,
+    Reply,
     decode,
     encode,
 )
@@ -40,6 +39,7 @@ from bridge.robots import Base, Scanner
 from mission import __version__
 from mission.document import Transform
 from mission.events import PoseReport
+from mission.run.orders import Order
 
 if TYPE_CHECKING:
     from cryptography import x509
@@ -50,7 +50,7 @@ LEAST_POSE_PAUSE_S = 0.02
 """However fast the simulated clock runs, poses go out at most fifty times a second."""
 
 
-Order = TypeVar("Order", Command, Commit)
+Signed = TypeVar("Signed", Order, Commit)
 Trust = Callable[[Request, str], None]
 """Raises `Untrusted` unless the request was signed by the commander whose name it bears."""
 
@@ -175,11 +175,11 @@ class Agent:
             return self._ordered(request, Commit, self._commit)
         return encode(self._inbox.receive(request))
 
-    def _commit(self, request: Request, commit: Commit) -> Message:
+    def _commit(self, request: Request, commit: Commit) -> Reply:
         return self._inbox.receive(request)
 
     def _ordered(
-        self, request: Request, kind: type[Order], carry_out: Callable[[Request, Order], Message]
+        self, request: Request, kind: type[Signed], carry_out: Callable[[Request, Signed], Reply]
     ) -> bytes:
         """Carry out what only a commander may order, if it is from the one it says it is from."""
         try:
@@ -211,12 +211,12 @@ class Agent:
 
     def _command(self, request: Request) -> bytes:
         self._contact()
-        return self._ordered(request, Command, self._obey)
+        return self._ordered(request, Order, self._obey)
 
-    def _obey(self, request: Request, command: Command) -> Message:
-        if not request.key.endswith(f"/cmd/{command.verb}"):
-            return Malformed(message=f"command {command.verb} on {request.key}")
-        return self._controller.obey(command)
+    def _obey(self, request: Request, order: Order) -> Reply:
+        if not request.key.endswith(f"/cmd/{order.verb}"):
+            return Malformed(message=f"command {order.verb} on {request.key}")
+        return self._controller.obey(order)
 
     def _log(self, request: Request) -> bytes:
         self._contact()

@@ -33,10 +33,10 @@ from mission.errors import InputError
 
 if TYPE_CHECKING:
     from bridge.mavlink.gateway.scanner import Trigger
-    from bridge.revision import RevisionPolicy
     from bridge.watch import Recording
     from mission.document import Mission, Transform
     from mission.events import Pose
+    from mission.run.revision import RevisionPolicy
 
 PushTimeout = Annotated[
     float | None,
@@ -195,7 +195,7 @@ def be_vehicle(name: str | None, **options: Any) -> None:
 
 def read_revisions(text: str) -> RevisionPolicy:
     """What a robot does with a revision that is pushed during a run."""
-    from bridge.revision import POLICIES
+    from mission.run.revision import POLICIES
 
     if text not in POLICIES:
         raise InputError(f"--revision {text}: one of {', '.join(POLICIES)}")

@@ -14,20 +14,21 @@ from collections.abc import Callable
 
 import msgspec
 
-from bridge import revision, route
-from bridge import run as runs
 from bridge.answers import answer_to, answered, remember_answer
-from bridge.battery import what_is_missing
 from bridge.clock import Clock
-from bridge.commands import Decision, Refused, Situation, decide, handed_over
 from bridge.journal import Journal
-from bridge.lease import Denied, claimed, lasting_ns
-from bridge.protocol import Answer, Command, Commit, Lease, Rejected
-from bridge.revision import RevisionPolicy
+from bridge.protocol import Commit, Rejected
 from bridge.robots import Base, Rest, Scanner
-from bridge.run import Change, Run
 from mission.document import Mission
 from mission.events import Pose, StateReport
+from mission.run import revision, way
+from mission.run import states as runs
+from mission.run.battery import what_is_missing
+from mission.run.decision import Decision, Situation, decide, handed_over
+from mission.run.lease import Lease, claimed, lasting_ns
+from mission.run.orders import Answer, Order, Refused
+from mission.run.revision import RevisionPolicy
+from mission.run.states import Change, Run
 
 SETTLE_SAMPLE_S = 0.1
 SETTLE_LIMIT_S = 30.0
@@ -114,29 +115,29 @@ class Controller:
 
     # Orders and missions, from the link's threads
 
-    def obey(self, command: Command) -> Answer:
+    def obey(self, order: Order) -> Answer:
         """Carry out an order once, however often it comes, and remember what was answered."""
         with self._lock:
-            before = answered(self._journal, command, self._run)
+            before = answered(self._journal, order, self._run)
             if before is not None:
                 return before
-            decision = decide(command, self._situation())
-            answer = self._answer(command, decision)
+            decision = decide(order, self._situation())
+            answer = self._answer(order, decision)
             try:
-                run = self._store_decision(command, decision, answer)
+                run = self._store_decision(order, decision, answer)
             except sqlite3.OperationalError as error:
-                return self._answer(command, self._halt_unstored(error))
+                return self._answer(order, self._halt_unstored(error))
             if isinstance(decision, Decision):
                 self._adopt(run, ordered=True)
             return answer
 
-    def _store_decision(self, command: Command, decision: Decision | Refused, answer: Answer) -> Run:
+    def _store_decision(self, order: Order, decision: Decision | Refused, answer: Answer) -> Run:
         run = self._run
         with self._journal.transaction():
             if isinstance(decision, Decision):
                 run = self._write(decision.change)
                 self._store_lease(decision.lease)
-            remember_answer(self._journal, command, answer)
+            remember_answer(self._journal, order, answer)
         return run
 
     def _store_lease(self, lease: Lease | None) -> None:
@@ -159,10 +160,10 @@ class Controller:
             not_ready=self._base.not_ready(),
         )
 
-    def _answer(self, command: Command, decision: Decision | Refused) -> Answer:
+    def _answer(self, order: Order, decision: Decision | Refused) -> Answer:
         refused = decision if isinstance(decision, Refused) else None
         run = decision.change.run if isinstance(decision, Decision) else self._run
-        return answer_to(command, refused, run)
+        return answer_to(order, refused, run)
 
     def take(self, commit: Commit, mission: Mission) -> Rejected | None:
         """Store a whole mission and make it the one to be run, or to be followed from the next stop on."""
@@ -172,7 +173,7 @@ class Controller:
                 before, commit.commander,
                 fence=commit.fence, take_over=commit.take_over, now_ns=self._command_clock.now_ns(),
             )  # fmt: skip
-            if isinstance(lease, Denied):
+            if isinstance(lease, Refused):
                 return Rejected(reason=lease.reason, messages=(lease.message,))
             known = self._follows(mission)
             refused = self._out_of_time(commit, known) or (None if known else self._unfit(mission))
@@ -303,7 +304,7 @@ class Controller:
         """Drive what is left of the leg, or the correction to the stop."""
         stop, pose = mission.stops[run.at], self._base.pose()
         at_stop = run.leg > run.at
-        path = ((stop.x, stop.y),) if at_stop else route.forward(mission.stops[run.leg].approach, pose)
+        path = ((stop.x, stop.y),) if at_stop else way.forward(mission.stops[run.leg].approach, pose)
         outcome = "arrived"
         if not (at_stop and runs.deviation(pose, stop) <= stop.tolerance_m):
             heading = stop.heading if run.leg >= run.at else None
@@ -352,10 +353,10 @@ class Controller:
         self._advance(run, lambda now: runs.verified(now, mission, here))
 
     def _drive_home(self, run: Run, mission: Mission) -> None:
-        legs, pose = route.legs_of(mission), self._base.pose()
+        legs, pose = way.legs_of(mission), self._base.pose()
         returning = run.leg == len(mission.stops)
         leg = legs[run.leg]
-        path = route.forward(leg, pose) if returning else route.backward(leg, pose)
+        path = way.forward(leg, pose) if returning else way.backward(leg, pose)
         outcome = self._base.goto(path, heading=None, limits=mission.robot, interrupt=self._interrupt)
         if outcome == "blocked":
             here = self._base.pose()

@@ -21,14 +21,14 @@ from bridge.protocol import (
     Commit,
     Malformed,
     Manifest,
-    Message,
     Ready,
-    Reason,
     Rejected,
+    Reply,
     count_of,
     decode,
 )
 from mission.document import Mission, digest_of
+from mission.run.orders import Reason
 from mission.sense import problems_of
 
 MOST_REASONS = 20
@@ -43,7 +43,7 @@ class Inbox:
         self._controller = controller
         self._profiles = profiles
 
-    def receive(self, request: Request) -> Message:
+    def receive(self, request: Request) -> Reply:
         """Answer one question on `…/mission/<id>/<step>`."""
         mission_id, step = address_of(request.key)
         try:
@@ -53,7 +53,7 @@ class Inbox:
         except sqlite3.OperationalError as error:
             return _no("storage", f"the journal cannot be written: {error}")
 
-    def _step(self, mission_id: str, step: list[str], request: Request) -> Message:
+    def _step(self, mission_id: str, step: list[str], request: Request) -> Reply:
         match step:
             case ["begin"]:
                 return self._begin(mission_id, decode(request.payload, Manifest))
@@ -66,7 +66,7 @@ class Inbox:
                 return mission_part(self._journal, mission_id, count_of(number), revision)
         return Malformed(message=f"no such step: {'/'.join(step)}")
 
-    def _begin(self, mission_id: str, manifest: Manifest) -> Message:
+    def _begin(self, mission_id: str, manifest: Manifest) -> Reply:
         refusal = self._unwelcome(mission_id, manifest)
         if refusal:
             return refusal
@@ -103,7 +103,7 @@ class Inbox:
         stored = self._journal.mission(manifest.mission_id, manifest.revision)
         return stored is not None and stored[0].digest == manifest.digest
 
-    def _chunk(self, mission_id: str, number: int, request: Request) -> Message:
+    def _chunk(self, mission_id: str, number: int, request: Request) -> Reply:
         manifest = self._journal.transfer(mission_id)
         if manifest is None or request.parameters.get("of") != manifest.sha256:
             return _no("incomplete", "no such transfer is under way; begin it again")
@@ -116,7 +116,7 @@ class Inbox:
         self._journal.store_chunk(manifest.sha256, number, request.payload)
         return ChunkHeld(index=number, sha256=hashlib.sha256(request.payload).hexdigest())
 
-    def _commit(self, mission_id: str, commit: Commit) -> Message:
+    def _commit(self, mission_id: str, commit: Commit) -> Reply:
         manifest = commit.manifest
         refusal = self._unwelcome(mission_id, manifest)
         if refusal:

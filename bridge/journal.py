@@ -16,9 +16,10 @@ from typing import IO, TypeVar
 
 import msgspec
 
-from bridge.protocol import Answer, Manifest
+from bridge.protocol import Manifest
 from mission.errors import InputError
 from mission.events import AnyEvent
+from mission.run.orders import Answer
 
 TABLES = """
 CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL);

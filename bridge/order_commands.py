@@ -29,8 +29,8 @@ from bridge.ways import (
 )
 
 if TYPE_CHECKING:
-    from bridge.protocol import Answer, Verb
     from mission.events import StateReport
+    from mission.run.orders import Answer, Verb
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 TakeOver = Annotated[bool, typer.Option("--take-over", help="Command it though somebody else does.")]

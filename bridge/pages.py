@@ -13,10 +13,10 @@ from bridge.protocol import (
     POSE_PAGE,
     LogPage,
     Malformed,
-    Message,
     MissionPart,
     PosePage,
     Rejected,
+    Reply,
     count_of,
 )
 from mission.events import PoseReport
@@ -25,7 +25,7 @@ POSES_KEPT = 3000
 """For stations that come late or were cut off."""
 
 
-def events_page(journal: Journal, request: Request) -> Message:
+def events_page(journal: Journal, request: Request) -> Reply:
     """Events since a number, of one run if the request names it."""
     try:
         since = count_of(request.parameters.get("since", "0"))
@@ -35,7 +35,7 @@ def events_page(journal: Journal, request: Request) -> Message:
     return LogPage(events=journal.events(since=since, run_id=run_id, limit=LOG_PAGE), newest=journal.newest)
 
 
-def poses_page(poses: Iterable[PoseReport], boot_id: str, request: Request) -> Message:
+def poses_page(poses: Iterable[PoseReport], boot_id: str, request: Request) -> Reply:
     """Poses since a number, of one run if the request names it."""
     try:
         since = count_of(request.parameters.get("since", "0"))
@@ -46,7 +46,7 @@ def poses_page(poses: Iterable[PoseReport], boot_id: str, request: Request) -> M
     return PosePage(boot_id=boot_id, poses=tuple(islice(later, POSE_PAGE)))
 
 
-def mission_part(journal: Journal, mission_id: str, number: int, revision: int) -> Message:
+def mission_part(journal: Journal, mission_id: str, number: int, revision: int) -> Reply:
     """A piece of a stored mission."""
     stored = journal.mission(mission_id, revision)
     if stored is None:

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, Literal, TypeVar
+from typing import Any, Final, TypeVar
 
 import msgspec
 
 from mission.document import Transform
 from mission.errors import InputError
-from mission.events import AnyEvent, PoseReport, State, StateReport
+from mission.events import AnyEvent, PoseReport, StateReport
+from mission.run.lease import Lease
+from mission.run.orders import Answer, Count, Reason, Word
 
 VERSION: Final = 1
 CHUNK_BYTES: Final = 32 * 1024
@@ -25,23 +27,6 @@ LOG_PAGE: Final = 100
 """Events in one answer of the log: some 30 kB, a second on a slow line."""
 POSE_PAGE: Final = 50
 """Poses in one answer: some 12 kB."""
-LEASE_S: Final = 60.0
-"""How long a commander keeps the robot after the last order."""
-LONGEST_VALID_S: Final = 60.0
-"""No order may claim to be valid for longer."""
-
-Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
-"""A number that JSON readers and SQLite hold exactly."""
-Word = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
-
-Verb = Literal["start", "pause", "resume", "skip", "retry", "abort", "home"]
-Reason = Literal[
-    "malformed", "expired", "id_reused", "wrong_state", "wrong_run", "wrong_mission", "no_mission",
-    "finished_before", "not_at_start", "off_route", "not_at_stop", "not_the_commander", "fenced",
-    "running", "revision_taken", "older_revision", "too_large", "incomplete", "digest", "infeasible",
-    "storage", "untrusted", "replayed", "way_differs",
-    "unsupported", "not_armed", "wrong_origin", "mission_differs", "no_position", "denied", "not_ready",
-]  # fmt: skip
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _SITE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}(/[A-Za-z0-9][A-Za-z0-9_.-]{0,63})*")
@@ -120,22 +105,11 @@ class Keys:
         return key.removeprefix(self.root.removesuffix(self.robot)).partition("/")[0]
 
 
-class Message(
-    msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is", forbid_unknown_fields=True
-):
-    """Base of every message: frozen, says what it is, and is strict about unknown keys."""
+class Tagged(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is", forbid_unknown_fields=True):
+    """Base of most messages: frozen, says what it is, and is strict about unknown keys."""
 
 
-class Lease(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Who commands a robot."""
-
-    commander: str
-    fence: int
-    """Grows with every change of hands."""
-    until_ns: int
-
-
-class Info(Message, frozen=True):
+class Info(Tagged, frozen=True):
     """What a robot says of itself on `info`."""
 
     protocol: int
@@ -155,7 +129,7 @@ class Info(Message, frozen=True):
     """Site to map, if the robot was told; else each mission's `frame.to_map` counts."""
 
 
-class Manifest(Message, frozen=True):
+class Manifest(Tagged, frozen=True):
     """What is about to be transferred, on `mission/<id>/begin`."""
 
     mission_id: Word
@@ -172,18 +146,18 @@ class Manifest(Message, frozen=True):
         return -(-self.size // self.chunk_bytes)
 
 
-class Ready(Message, frozen=True):
+class Ready(Tagged, frozen=True):
     """The robot awaits the chunks that are not in `held`."""
 
     held: tuple[int, ...]
 
 
-class ChunkHeld(Message, frozen=True):
+class ChunkHeld(Tagged, frozen=True):
     index: int
     sha256: str
 
 
-class Commit(Message, frozen=True):
+class Commit(Tagged, frozen=True):
     """Everything has been sent: verify and store it, on `mission/<id>/commit`."""
 
     manifest: Manifest
@@ -195,7 +169,7 @@ class Commit(Message, frozen=True):
     take_over: bool = False
 
 
-class Accepted(Message, frozen=True):
+class Accepted(Tagged, frozen=True):
     """The mission is stored on the robot, whole."""
 
     mission_id: str
@@ -207,14 +181,14 @@ class Accepted(Message, frozen=True):
     """Whether it will be followed from the next stop of the present run on."""
 
 
-class Rejected(Message, frozen=True):
+class Rejected(Tagged, frozen=True):
     """The mission was not taken; what the robot held before is unchanged."""
 
     reason: Reason
     messages: tuple[str, ...]
 
 
-class MissionPart(Message, frozen=True):
+class MissionPart(Tagged, frozen=True):
     """A piece of the stored mission, read back on `mission/<id>/part/<i>`."""
 
     manifest: Manifest
@@ -222,54 +196,20 @@ class MissionPart(Message, frozen=True):
     data: bytes
 
 
-class Command(Message, frozen=True):
-    """An order on `cmd/<verb>`; sent again with the same `cmd_id` it is carried out once."""
-
-    cmd_id: Word
-    verb: Verb
-    commander: Word
-    issued_ns: int
-    valid_for_s: float
-    fence: Count | None = None
-    """The lease number that the commander knew."""
-    take_over: bool = False
-    expect_state: tuple[State, ...] | None = None
-    """Refused in any other state, so that a late order does no harm."""
-    run_id: Word | None = None
-    mission_id: Word | None = None
-    revision: Count | None = None
-    stop: Word | None = None
-    """The stop that skip and retry are meant for."""
-    again: bool = False
-    from_here: bool = False
-
-
-class Answer(Message, frozen=True):
-    """What became of a command, stored before it is sent."""
-
-    cmd_id: str
-    verb: str
-    outcome: Literal["ok", "refused"]
-    reason: Reason | None
-    message: str
-    run_id: str | None
-    state: State
-
-
-class Malformed(Message, frozen=True):
+class Malformed(Tagged, frozen=True):
     """The request could not be read; nothing was done."""
 
     message: str
 
 
-class LogPage(Message, frozen=True):
+class LogPage(Tagged, frozen=True):
     """Events by number from the journal; `newest` tells whether there are more."""
 
     events: tuple[AnyEvent, ...]
     newest: int
 
 
-class PosePage(Message, frozen=True):
+class PosePage(Tagged, frozen=True):
     """Past poses in order; fewer than a page can hold if there are no more."""
 
     boot_id: str

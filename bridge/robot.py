@@ -19,10 +19,10 @@ from bridge.controller import Controller
 from bridge.journal import Journal, open_journal
 from bridge.link import Link
 from bridge.protocol import Keys
-from bridge.revision import RevisionPolicy
 from bridge.simulator import NO_FAULTS, Faults
 from mission.document import Transform
 from mission.errors import InputError
+from mission.run.revision import RevisionPolicy
 
 
 @dataclass(frozen=True)

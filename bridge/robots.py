@@ -10,7 +10,7 @@ import msgspec
 
 from mission.document import Mission, Point, RobotSpec, Scan
 from mission.events import Pose
-from mission.scans import ScanFailed, ScanResult
+from mission.run.scans import ScanFailed, ScanResult
 
 Outcome = Literal["arrived", "interrupted", "blocked"]
 

@@ -20,7 +20,7 @@ from bridge.robots import Outcome, Rest
 from mission.document import Mission, Point, RobotSpec, Scan
 from mission.errors import InputError
 from mission.events import Pose
-from mission.scans import ScanFailed, ScanResult
+from mission.run.scans import ScanFailed, ScanResult
 
 SLICE_S = 0.5
 """How often a moving robot's place is written down: what a crash can cost."""

@@ -22,27 +22,21 @@ import msgspec
 from bridge import follow
 from bridge.keys import Keys as HeldKeys
 from bridge.keys import now_utc, read_keys
-from bridge.lease import FREE_VERBS
 from bridge.link import Link
 from bridge.protocol import (
     CHUNK_BYTES,
-    LONGEST_VALID_S,
     VERSION,
     Accepted,
-    Answer,
     ChunkHeld,
-    Command,
     Commit,
     Info,
     Keys,
     Malformed,
     Manifest,
-    Message,
     MissionPart,
     Ready,
     Rejected,
     Reply,
-    Verb,
     decode,
     encode,
 )
@@ -50,6 +44,7 @@ from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from mission.events import AnyEvent, StateReport
 from mission.files.mission_json import parse
+from mission.run.orders import FREE_VERBS, LONGEST_VALID_S, Answer, Order, Verb
 
 TRY_S = 1.0
 """How long one try waits for its answer."""
@@ -255,7 +250,7 @@ class Station:
         return parse(b"".join(parts), f"mission {mission_id} on {self.keys.robot}")
 
     def command(self, verb: Verb, **details: Any) -> Answer:
-        """Give an order, once, and return the robot's answer; `details` are fields of `Command`.
+        """Give an order, once, and return the robot's answer; `details` are fields of `Order`.
 
         Raises
         ------
@@ -280,7 +275,7 @@ class Station:
             holder = self.held.holder
             raise AnswerIsNo(f"{what}: {holder.name} is a {holder.role}, and only stations give orders")
 
-    def give(self, order: Command, *, within_s: float | None = None) -> Answer:
+    def give(self, order: Order, *, within_s: float | None = None) -> Answer:
         """Give an order that was written before; given again it is still carried out once."""
         within_s = self.timeout_s if within_s is None else within_s
         reply = self._insist(self.keys.command(order.verb), encode(order), within_s)
@@ -290,7 +285,7 @@ class Station:
             raise AnswerIsNo(f"{self.keys.robot} refused {order.verb}: {why}", reason=answer.reason)
         return answer
 
-    def order(self, verb: Verb, **details: Any) -> Command:
+    def order(self, verb: Verb, **details: Any) -> Order:
         """An order for the robot as it is just now: late, it meets another state and is refused."""
         info = self.info()
         state, cautious = info.state, verb not in FREE_VERBS
@@ -306,7 +301,7 @@ class Station:
             "stop": state.stop if verb in ("skip", "retry") else None,
         }
         given = {key: value for key, value in details.items() if value is not None}
-        return Command(cmd_id=uuid.uuid4().hex, verb=verb, issued_ns=info.clock_ns, **(meant | given))
+        return Order(cmd_id=uuid.uuid4().hex, verb=verb, issued_ns=info.clock_ns, **(meant | given))
 
     def log(self, *, since: int = 0, run_id: str | None = None) -> tuple[AnyEvent, ...]:
         """All events of the journal above number `since`, of one run if given."""
@@ -379,7 +374,7 @@ class Station:
                 " see stopgo status"
             )
         try:
-            message: Message = msgspec.json.decode(reply, type=Reply)
+            message: Reply = msgspec.json.decode(reply, type=Reply)
         except msgspec.DecodeError as error:
             raise OutcomeUnknown(
                 f"{robot} answered {what} in words this stopgo does not know ({error}); update the older one"

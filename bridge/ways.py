@@ -158,15 +158,15 @@ def alone(given: Given, what: str, *options: str) -> None:
             raise InputError(f"{option} has no meaning with {what}; leave it out")
 
 
-Command = Callable[..., Any]
+CommandBody = Callable[..., Any]
 
 
-def by_way(*, without: tuple[str, ...] = ()) -> Callable[[Command], Command]:
+def by_way(*, without: tuple[str, ...] = ()) -> Callable[[CommandBody], CommandBody]:
     """Gives a command's first parameter, `way`, by the options of `way_of`; none that it goes `without`."""
     return partial(_by_way, without)
 
 
-def _by_way(without: tuple[str, ...], command: Command) -> Command:
+def _by_way(without: tuple[str, ...], command: CommandBody) -> CommandBody:
     (_, *options), (_, *own) = (
         [
             one

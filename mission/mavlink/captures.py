@@ -18,7 +18,7 @@ from mission.events import Pose
 from mission.geodesy import heading_of
 from mission.mavlink.autopilots import point_at
 from mission.mavlink.items import ItemList
-from mission.scans import ScanFailed, ScanResult, missing_in
+from mission.run.scans import ScanFailed, ScanResult, missing_in
 
 NEAR_M = 0.5
 """A failure that is told from farther away is of another stop."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from mission.document import Mission
 from mission.mavlink.manner import Manner
-from mission.scans import needs_heading
+from mission.run.scans import needs_heading
 
 
 def notes_of(mission: Mission, manner: Manner) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from mission.mavlink.autopilots import Autopilot
 from mission.mavlink.items import Command, Placed
 from mission.mavlink.keeping import as_sent
 from mission.mavlink.manner import Manner
-from mission.scans import needs_heading
+from mission.run.scans import needs_heading
 from mission.sense import problems_of
 
 LONGEST_SCRIPT_S = 255

@@ -7,10 +7,10 @@ import pytest
 
 from bridge.answers import answer_to, answered, remember_answer
 from bridge.journal import memory_journal
-from bridge.protocol import Command
-from bridge.run import Run
+from mission.run.orders import Order
+from mission.run.states import Run
 
-START = Command(cmd_id="once", verb="start", commander="alice", issued_ns=1, valid_for_s=5.0)
+START = Order(cmd_id="once", verb="start", commander="alice", issued_ns=1, valid_for_s=5.0)
 RUN = Run(state="RUNNING", run_id="r")
 
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from bridge.battery import time_left, what_is_missing
 from bridge.simulator import Fault, Faults
 from mission.errors import AnswerIsNo
+from mission.run.battery import time_left, what_is_missing
 from mission.schedule import schedule
 from tests.bridge.world import EXACT, Field, corridor
 

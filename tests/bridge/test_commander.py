@@ -7,16 +7,16 @@ import json
 import pytest
 
 from bridge.console import refusals_in
-from bridge.lease import Denied, claimed
-from bridge.protocol import LEASE_S, Lease
 from mission.errors import AnswerIsNo
 from mission.events import TakenOver
+from mission.run.lease import LEASE_S, Lease, claimed
+from mission.run.orders import Refused
 from tests.bridge.world import Field, corridor
 
 ALICE = Lease(commander="alice", fence=3, until_ns=10_000_000_000)
 
 
-def claim(lease: Lease | None, who: str, *, now_s: float = 0.0, **details: object) -> Lease | Denied:
+def claim(lease: Lease | None, who: str, *, now_s: float = 0.0, **details: object) -> Lease | Refused:
     given = {"fence": None, "take_over": False} | details
     return claimed(lease, who, now_ns=round(now_s * 1e9), **given)  # type: ignore[arg-type]
 
@@ -33,7 +33,7 @@ def test_an_order_renews_the_lease_and_keeps_its_number() -> None:
 
 def test_another_is_denied_until_the_lease_has_run_out() -> None:
     denied = claim(ALICE, "bob", now_s=4)
-    assert isinstance(denied, Denied)
+    assert isinstance(denied, Refused)
     assert "alice commands it for 6 s more" in denied.message
     assert claim(ALICE, "bob", now_s=10) == Lease(commander="bob", fence=4, until_ns=round(70e9))
 
@@ -43,14 +43,14 @@ def test_taking_over_raises_the_fence_and_older_orders_stay_outside() -> None:
     assert isinstance(taken, Lease)
     assert (taken.commander, taken.fence) == ("bob", 4)
     late = claim(taken, "alice", now_s=100, fence=3)
-    assert isinstance(late, Denied)
+    assert isinstance(late, Refused)
     assert late.reason == "fenced"
 
 
 def test_a_clock_that_jumped_back_does_not_lengthen_a_lease() -> None:
     far = Lease(commander="alice", fence=1, until_ns=round(1e15))
     denied = claim(far, "bob")
-    assert isinstance(denied, Denied)
+    assert isinstance(denied, Refused)
     assert "60 s more" in denied.message
 
 

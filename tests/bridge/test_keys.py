@@ -16,12 +16,13 @@ from bridge import keys as site_keys
 from bridge.agent import trusting
 from bridge.keys import Holder, Signature, Untrusted, holders, init_site, issue, now_utc, read_keys
 from bridge.link import Link, Request
-from bridge.protocol import Command, Keys, Reply, encode
+from bridge.protocol import Keys, Reply, encode
 from bridge.spawn import end_robot, free_port, start_robot
 from bridge.station import Station, connect
 from bridge.zenoh_link import Guard, check_endpoint, connecting
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import PoseReport, Scanned
+from mission.run.orders import Order
 from tests.bridge.test_fleet import router
 from tests.bridge.test_zenoh import stopgo
 from tests.bridge.world import corridor
@@ -271,7 +272,7 @@ def test_the_commands_make_keys(tmp_path: Path) -> None:
 
 
 def test_a_command_is_signed_for_one_robot_only(site: Path) -> None:
-    command = Command(cmd_id="c", verb="abort", commander="alice", issued_ns=0, valid_for_s=1.0)
+    command = Order(cmd_id="c", verb="abort", commander="alice", issued_ns=0, valid_for_s=1.0)
     signature = signed(site, "site/alice", Keys("r1").command("abort"), encode(command))
     with pytest.raises(Untrusted):
         holder_of(site, Keys("r2").command("abort"), encode(command), signature)

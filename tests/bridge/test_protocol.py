@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
+from msgspec import Struct
 
 from bridge import protocol
-from bridge.commands import STATES
-from bridge.protocol import Keys, Message, Reason
+from bridge.protocol import Keys, Tagged
 from mission.errors import InputError
 from mission.events import AnyEvent, State, StopState
+from mission.run.decision import STATES
+from mission.run.orders import Answer, Order, Reason
 
 TEXT = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
 
@@ -22,9 +24,9 @@ def test_every_reason_is_explained(reason: str) -> None:
     assert f"| `{reason}` |" in TEXT
 
 
-@pytest.mark.parametrize("message", Message.__subclasses__())
-def test_every_message_is_listed_with_its_fields(message: type[Message]) -> None:
-    row = re.search(rf"^\| `{message.__name__}` \|(.*)\|$", TEXT, re.MULTILINE)
+@pytest.mark.parametrize("message", [*Tagged.__subclasses__(), Order, Answer])
+def test_every_message_is_listed_with_its_fields(message: type[Struct]) -> None:
+    row = re.search(rf"^\| `{message.__struct_config__.tag}` \|(.*)\|$", TEXT, re.MULTILINE)
     assert row is not None
     for field in message.__struct_fields__:
         assert re.search(rf"\b{field}\b", row.group(1)), f"{message.__name__}.{field}"

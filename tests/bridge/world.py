@@ -17,8 +17,7 @@ from bridge.controller import Controller
 from bridge.inbox import Inbox
 from bridge.journal import Journal, memory_journal
 from bridge.link import MemoryLink, Switchboard
-from bridge.protocol import Answer, Command, Commit, Keys, Manifest, Verb
-from bridge.revision import RevisionPolicy
+from bridge.protocol import Commit, Keys, Manifest
 from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
 from bridge.station import Station
 from mission.document import (
@@ -35,6 +34,8 @@ from mission.document import (
     Stop,
     sealed,
 )
+from mission.run.orders import Answer, Order, Verb
+from mission.run.revision import RevisionPolicy
 
 EXACT = Wear(noise_m=0.0, noise_rad=0.0, battery_per_s=0.0)
 WALKING = RobotSpec(radius=0.35, speed=0.5, turn_rate=math.radians(45), acceleration=0.5)
@@ -113,9 +114,9 @@ class Field:
     def order(self, verb: Verb, **details: Any) -> Answer:
         return self.controller.obey(self.command(verb, **details))
 
-    def command(self, verb: Verb, **details: Any) -> Command:
+    def command(self, verb: Verb, **details: Any) -> Order:
         given = {"cmd_id": f"c{next(self.ids)}", "commander": "test", "valid_for_s": 5.0} | details
-        return Command(verb=verb, **({"issued_ns": self.clock.now_ns()} | given))
+        return Order(verb=verb, **({"issued_ns": self.clock.now_ns()} | given))
 
     def work(self, *, most: int = 500) -> int:
         """Let the robot work until there is nothing to do; how many pieces of work that were."""

@@ -22,14 +22,15 @@ from bridge.clock import WallClock
 from bridge.controller import Controller
 from bridge.journal import memory_journal
 from bridge.keys import init_site, issue, now_utc, read_keys
-from bridge.lease import lasting_ns
 from bridge.link import Switchboard
-from bridge.protocol import Answer, Keys, Rejected, Verb
+from bridge.protocol import Keys, Rejected
 from bridge.simulator import SimulatedBase, SimulatedScanner
 from bridge.station import Station
 from mission.document import Mission
 from mission.errors import AnswerIsNo, InputError
 from mission.events import AnyEvent, Finished, PoseReport, Scanned, StateReport
+from mission.run.lease import lasting_ns
+from mission.run.orders import Answer, Verb
 from tests.bridge.test_push import manifest_of
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size

@@ -15,10 +15,11 @@ from typing import TypeVar
 import pytest
 
 from bridge.link import Request
-from bridge.protocol import Answer, Command, Verb, encode
-from bridge.run import Run
+from bridge.protocol import encode
 from mission.document import Mission
 from mission.events import Event, Finished, Scanned, Started
+from mission.run.orders import Answer, Order, Verb
+from mission.run.states import Run
 from tests.bridge.test_push import manifest_of
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
@@ -88,7 +89,7 @@ class Trial:
             self.insist(lambda request=request: self.field.inbox.receive(request))  # type: ignore[misc]
 
     def order(self, verb: Verb) -> Answer:
-        command: Command = self.field.command(verb)
+        command: Order = self.field.command(verb)
         return self.insist(lambda: self.field.controller.obey(command))
 
     def finish(self) -> None:

@@ -9,7 +9,8 @@ import msgspec
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bridge.protocol import Command, Malformed, Reply, encode
+from bridge.protocol import Malformed, Reply, encode
+from mission.run.orders import Order
 from tests.bridge.test_push import manifest_of
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
@@ -124,7 +125,7 @@ def test_no_payload_on_any_key_brings_the_robot_down() -> None:
 def test_a_command_on_the_key_of_another_verb_is_malformed() -> None:
     field = Field()
     station = field.station()
-    command = Command(cmd_id="c", verb="abort", commander="x", issued_ns=0, valid_for_s=1.0)
+    command = Order(cmd_id="c", verb="abort", commander="x", issued_ns=0, valid_for_s=1.0)
     reply = station.link.ask(field.keys.command("pause"), encode(command), timeout_s=1)
     assert reply is not None
     assert isinstance(msgspec.json.decode(reply, type=Reply), Malformed)

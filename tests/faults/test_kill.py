@@ -23,12 +23,13 @@ import pytest
 
 from bridge.journal import open_journal
 from bridge.keys import init_site, issue, now_utc
-from bridge.protocol import Command, encode
+from bridge.protocol import encode
 from bridge.spawn import end_robot, free_port, start_robot
 from bridge.station import Station, connect
 from mission.document import Mission, Scan
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started
+from mission.run.orders import Order
 from tests.bridge.world import corridor
 from tests.faults.sizes import size
 
@@ -111,7 +112,7 @@ def stubbornly(act: Callable[[], T], outcome: Outcome) -> T:
     raise AssertionError("no answer for a minute")
 
 
-def give(station: Station, order: Command, outcome: Outcome) -> bool:
+def give(station: Station, order: Order, outcome: Outcome) -> bool:
     """Give the order twice, each time until it is answered; whether it was carried out."""
     outcome.orders += 1
     carried_out = []

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import msgspec
 
-from bridge import run as runs
 from bridge.clock import Clock, WallClock
 from bridge.link import MemoryLink, Request, Switchboard
 from bridge.mavlink.desk.follower import Follower
@@ -35,12 +34,10 @@ from bridge.protocol import (
     CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
     VERSION,
-    Command,
     Info,
     Keys,
-    Lease,
     Malformed,
-    Message,
+    Reply,
     count_of,
     decode,
     encode,
@@ -50,6 +47,9 @@ from mission import __version__
 from mission.errors import RobotUnreachable
 from mission.events import PoseReport, StateReport
 from mission.mavlink.telemetry import is_lost
+from mission.run import states as runs
+from mission.run.lease import Lease
+from mission.run.orders import Order
 
 TICK_S = 0.2
 ASK_AGAIN_S = 2.0
@@ -270,11 +270,11 @@ class Desk:
     def _command(self, request: Request) -> bytes:
         return encode(self._obey(request))
 
-    def _obey(self, request: Request) -> Message:
+    def _obey(self, request: Request) -> Reply:
         try:
-            command = decode(request.payload, Command)
+            order = decode(request.payload, Order)
         except msgspec.DecodeError as error:
-            return Malformed(message=f"Command: {error}")
-        answer = self._orders.obey(command)
+            return Malformed(message=f"Order: {error}")
+        answer = self._orders.obey(order)
         self._follower.run = self._book.run
         return answer

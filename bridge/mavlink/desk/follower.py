@@ -8,7 +8,6 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
-from bridge import run as runs
 from bridge.mavlink.desk import progress
 from bridge.mavlink.desk.hands import Denied, Hands
 from bridge.mavlink.desk.logbook import Logbook, Ordered, Owed
@@ -19,11 +18,12 @@ from bridge.mavlink.desk.visits import Course
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.transfer.download import download
-from bridge.run import Change, Run
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.events import Arrived
 from mission.mavlink.autopilots import differences
 from mission.mavlink.telemetry import began_again
+from mission.run import states as runs
+from mission.run.states import Change, Run
 
 SETTLED_NS = 1_500_000_000
 """A heartbeat this soon after a change may have been sent before it."""
@@ -180,7 +180,7 @@ class Follower:
         if run.state != "READY" or not sight.drives or sight.place >= course.end or not ours:
             return None
         now_ns = self._book.clock.now_ns()
-        return progress.started(run, run_id=uuid.uuid4().hex[:12], now_ns=now_ns, by=by)
+        return runs.started(run, run_id=uuid.uuid4().hex[:12], now_ns=now_ns, by=by)
 
     def _by(self, sight: Sight) -> str:
         """Who has changed the mode: whoever gave an order to that effect whose outcome was unknown."""

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from bridge.clock import Clock
-from bridge.commands import Refused
 from bridge.mavlink.desk.lookout import Lookout
 from bridge.mavlink.desk.modes import AUTO, HOLD, Modes
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.wire import dialect
 from mission.errors import OutcomeUnknown
+from mission.run.orders import Refused
 
 SHOWS_S = 5.0
 """A vehicle beats every second; so long it may take until it shows what it was told."""

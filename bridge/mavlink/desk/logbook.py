@@ -19,17 +19,17 @@ from typing import Literal
 
 import msgspec
 
-from bridge import run as runs
 from bridge.clock import Clock, WallClock
 from bridge.journal import Journal, shared_journal
 from bridge.mavlink.desk.visits import Course, course_of
 from bridge.mavlink.line.url import Url
 from bridge.protocol import CHUNK_BYTES, Manifest
-from bridge.run import Change, Run
 from mission.document import Mission
 from mission.events import Aborted
 from mission.mavlink.items import ItemList
 from mission.mavlink.telemetry import BACK_MS
+from mission.run import states as runs
+from mission.run.states import Change, Run
 
 REBOOT_NS = 5 * 10**9
 """A vehicle whose clock began so much later than it was known to was started anew."""

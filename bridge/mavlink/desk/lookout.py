@@ -14,13 +14,13 @@ from bridge.mavlink.desk.visits import Course
 from bridge.mavlink.gateway.local import LocalFrame, local_frame
 from bridge.mavlink.line.peer import Origin, origin_of
 from bridge.mavlink.line.wire import Message, dialect
-from bridge.run import Run
 from mission.events import Arrived, Pose
 from mission.geodesy import heading_of
 from mission.mavlink.autopilots import autopilot_named, point_at
 from mission.mavlink.captures import Capture, Picture, capture_of
 from mission.mavlink.origin import is_elsewhere
 from mission.mavlink.telemetry import charge_of, is_lost, stands_still
+from mission.run.states import Run
 
 CAPTURES_KEPT = 100
 TOLD = (

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from bridge.mavlink.desk.progress import Sight, passed_by
 from bridge.mavlink.desk.visits import Course
-from bridge.run import Run
 from mission.document import Point
 from mission.events import Pose
 from mission.mavlink.autopilots import point_at
+from mission.run.states import Run
 
 PASSED = frozenset({"corner", "stop", "return"})
 """Roles of waypoints."""

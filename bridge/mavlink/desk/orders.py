@@ -13,11 +13,8 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from bridge import run as runs
 from bridge.answers import answer_to, answered, remember_answer
 from bridge.clock import Clock
-from bridge.commands import Decision, Refused, Situation, decide, handed_over
-from bridge.lease import FREE_VERBS
 from bridge.mavlink.desk import progress
 from bridge.mavlink.desk.hands import Denied, Hands
 from bridge.mavlink.desk.logbook import Logbook, Ordered
@@ -29,15 +26,17 @@ from bridge.mavlink.desk.visits import Course
 from bridge.mavlink.gateway.local import apart
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.transfer.download import download
-from bridge.protocol import Answer, Command, Lease
-from bridge.run import Change, Run
 from mission.document import Mission
 from mission.events import Pose
 from mission.mavlink.autopilots import differences
+from mission.run import states as runs
+from mission.run.decision import Decision, Situation, decide, handed_over
+from mission.run.lease import Lease
+from mission.run.orders import DRIVING, FREE_VERBS, Answer, Order, Refused
+from mission.run.states import Change, Run
 
 ORDERING_NS = 20 * 10**9
 """One step of an order takes no longer; then what the vehicle does counts as somebody else's again."""
-DRIVING = ("start", "resume", "retry")
 NOWHERE = Pose(x=math.inf, y=math.inf, heading=0.0)
 UNREMEMBERED = (
     "nothing is remembered of a mission pushed to this vehicle; push one by this very URL,"
@@ -73,7 +72,7 @@ class Orders:
         self._wall = wall
         self._consent = consent
 
-    def obey(self, command: Command) -> Answer:
+    def obey(self, order: Order) -> Answer:
         """Carry out an order once, and remember what was answered.
 
         Raises
@@ -81,37 +80,37 @@ class Orders:
         OutcomeUnknown
             If the vehicle was told and does not show what it does; nothing is stored then.
         """
-        before = answered(self._book.journal, command, self._book.run)
+        before = answered(self._book.journal, order, self._book.run)
         if before is not None:
             return before
-        decision = self._in_the_way(command) or self._decided(command)
+        decision = self._in_the_way(order) or self._decided(order)
         if isinstance(decision, Refused):
-            return self._refused(command, decision)
+            return self._refused(order, decision)
         course = self._book.course
         assert course is not None  # without a mission nothing is decided
-        with self._ordering(command):
+        with self._ordering(order):
             try:
-                change = VERBS[command.verb](self, command, course, decision)
+                change = VERBS[order.verb](self, order, course, decision)
             except Denied as denied:
-                return self._stored(command, denied.refused, None)
-            return self._stored(command, change, decision.lease)
+                return self._stored(order, denied.refused, None)
+            return self._stored(order, change, decision.lease)
 
-    def _refused(self, command: Command, refused: Refused) -> Answer:
+    def _refused(self, order: Order, refused: Refused) -> Answer:
         """A pause that the run has no use for still stops a vehicle that drives, whoever started it."""
         drives = self._lookout.mode == AUTO and self._lookout.armed
-        if command.verb != "pause" or not drives or refused.reason not in ("wrong_state", "no_mission"):
-            return self._stored(command, refused, None)
-        with self._ordering(command):
+        if order.verb != "pause" or not drives or refused.reason not in ("wrong_state", "no_mission"):
+            return self._stored(order, refused, None)
+        with self._ordering(order):
             try:
                 self._hands.hold()
             except Denied as denied:
-                return self._stored(command, denied.refused, None)
-            return self._stored(command, Change(self._book.run), None)
+                return self._stored(order, denied.refused, None)
+            return self._stored(order, Change(self._book.run), None)
 
-    def _in_the_way(self, command: Command) -> Refused | None:
+    def _in_the_way(self, order: Order) -> Refused | None:
         """Only one order at a time, but for those that stop."""
         other = self._book.ordered
-        if other is None or command.verb in FREE_VERBS or other.until_ns <= self._book.clock.now_ns():
+        if other is None or order.verb in FREE_VERBS or other.until_ns <= self._book.clock.now_ns():
             return None
         return Refused("wrong_state", f"{other.verb} by {other.by} is being carried out; wait for its end")
 
@@ -130,20 +129,20 @@ class Orders:
         satellites = "; or add --any-origin, if it finds its place by satellites"
         return Refused("wrong_origin", wrong + satellites) if wrong else None
 
-    def _decided(self, command: Command) -> Decision | Refused:
+    def _decided(self, order: Order) -> Decision | Refused:
         course, run, here = self._book.course, self._book.run, self._lookout.pose
         if course is None:
             return Refused("no_mission", UNREMEMBERED)
-        if command.verb in DRIVING and self._lookout.items == 0:
+        if order.verb in DRIVING and self._lookout.items == 0:
             return Refused("no_mission", CLEARED)
-        elsewhere = self._elsewhere(course) if command.verb in DRIVING else None
+        elsewhere = self._elsewhere(course) if order.verb in DRIVING else None
         if elsewhere is not None:
             return elsewhere
-        if here is None and command.verb not in FREE_VERBS:
+        if here is None and order.verb not in FREE_VERBS:
             return Refused("no_position", "the vehicle does not tell where it is; does its navigation run?")
-        if here is not None and command.verb != "start":
+        if here is not None and order.verb != "start":
             here = on_way(run, course, here)
-        return decide(command, self._situation(run, course.mission, here or NOWHERE))
+        return decide(order, self._situation(run, course.mission, here or NOWHERE))
 
     def _situation(self, run: Run, mission: Mission, pose: Pose) -> Situation:
         journal = self._book.journal
@@ -157,7 +156,7 @@ class Orders:
 
     # What each verb does
 
-    def _start(self, command: Command, course: Course, decision: Decision) -> Change:
+    def _start(self, order: Order, course: Course, decision: Decision) -> Change:
         run = decision.change.run
         sight = self._sight(run, course)
         self._ready(course)
@@ -165,38 +164,38 @@ class Orders:
         self._go(course, first, None)
         return decision.change
 
-    def _resume(self, command: Command, course: Course, decision: Decision) -> Change:
+    def _resume(self, order: Order, course: Course, decision: Decision) -> Change:
         run = self._book.run
         sight = self._sight(run, course)
         self._ready(course)
         lost = run.stop_state == "SCANNING" and not self._keeps_scan(run, course, sight)
         run = runs.changed(run, stop_state="WAITING") if lost else run
         self._go(course, onward(run, course, sight, self._here()), sight)
-        return self._resumed(run, command, decision)
+        return self._resumed(run, order, decision)
 
-    def _resumed(self, run: Run, command: Command, decision: Decision) -> Change:
+    def _resumed(self, run: Run, order: Order, decision: Decision) -> Change:
         """The run goes on, in whoever's hands it is now."""
         before = self._book.journal.fact("lease", Lease)
-        change = progress.resumed(run, command.commander)
+        change = runs.resumed(run, order.commander)
         return Change(change.run, (*handed_over(before, decision.lease), *change.events))
 
     def _keeps_scan(self, run: Run, course: Course, sight: Sight) -> bool:
         visit = course.visits[run.at]
         return visit.at < sight.place < visit.after
 
-    def _retry(self, command: Command, course: Course, decision: Decision) -> Change:
+    def _retry(self, order: Order, course: Course, decision: Decision) -> Change:
         """Once more to the stop; the vehicle stands on the way to it, or beside it."""
         run = runs.changed(self._book.run, stop_state="WAITING", approaches=0)
         sight = self._sight(run, course)
         self._ready(course)
         self._go(course, onward(run, course, sight, self._here()), sight)
-        return self._resumed(run, command, decision)
+        return self._resumed(run, order, decision)
 
-    def _pause(self, command: Command, course: Course, decision: Decision) -> Change:
+    def _pause(self, order: Order, course: Course, decision: Decision) -> Change:
         self._hands.hold()
-        return progress.halted(self._book.run, f"pause by {command.commander}", stands=True)
+        return runs.paused(self._book.run, f"pause by {order.commander}")
 
-    def _skip(self, command: Command, course: Course, decision: Decision) -> Change:
+    def _skip(self, order: Order, course: Course, decision: Decision) -> Change:
         """The way to the stop is still driven; the vehicle is led past its waits once it is there."""
         before, after = self._book.run, decision.change.run
         sight = self._sight(after, course)
@@ -213,13 +212,13 @@ class Orders:
             self._hands.jump(course.sequence(beyond))
         return decision.change
 
-    def _abort(self, command: Command, course: Course, decision: Decision) -> Change:
+    def _abort(self, order: Order, course: Course, decision: Decision) -> Change:
         self._hands.hold()
         if self._consent.disarm:
             self._hands.arm(False)
         return decision.change
 
-    def _home(self, command: Command, course: Course, decision: Decision) -> Change:
+    def _home(self, order: Order, course: Course, decision: Decision) -> Change:
         raise Denied(Refused("unsupported", HOMEWARD))
 
     # What several of them need
@@ -270,12 +269,12 @@ class Orders:
 
     # Storing
 
-    def _ordering(self, command: Command) -> _Ordering:
-        mode = HOLD if command.verb in FREE_VERBS else AUTO
-        ordered = Ordered(verb=command.verb, by=command.commander, mode=mode, until_ns=0)
+    def _ordering(self, order: Order) -> _Ordering:
+        mode = HOLD if order.verb in FREE_VERBS else AUTO
+        ordered = Ordered(verb=order.verb, by=order.commander, mode=mode, until_ns=0)
         return _Ordering(self._book, self._hands, ordered)
 
-    def _stored(self, command: Command, outcome: Change | Refused, lease: Lease | None) -> Answer:
+    def _stored(self, order: Order, outcome: Change | Refused, lease: Lease | None) -> Answer:
         """The answer, stored together with what the order has changed."""
         refused = outcome if isinstance(outcome, Refused) else None
         journal = self._book.journal
@@ -285,8 +284,8 @@ class Orders:
                 journal.forget_fact("owed")
             if lease is not None:
                 journal.store_fact("lease", lease)
-            answer = answer_to(command, refused, self._book.run)
-            remember_answer(journal, command, answer)
+            answer = answer_to(order, refused, self._book.run)
+            remember_answer(journal, order, answer)
         return answer
 
 
@@ -315,7 +314,7 @@ class _Ordering:
         self._book.journal.store_fact("ordered", msgspec.structs.replace(self._ordered, until_ns=until_ns))
 
 
-VERBS: dict[str, Callable[[Orders, Command, Course, Decision], Change]] = {
+VERBS: dict[str, Callable[[Orders, Order, Course, Decision], Change]] = {
     "start": Orders._start,
     "pause": Orders._pause,
     "resume": Orders._resume,

@@ -12,12 +12,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from bridge import run as runs
 from bridge.mavlink.desk.visits import Course, Visit
-from bridge.run import Change, Run, changed, deviation
 from mission.document import Stop
-from mission.events import Paused, Pose, Resumed, Settled, Started, Unconfirmed
-from mission.scans import ScanFailed, ScanResult, turned_away
+from mission.events import Pose, Settled, Unconfirmed
+from mission.run import states as runs
+from mission.run.scans import ScanFailed, ScanResult, turned_away
+from mission.run.states import Change, Run, changed, deviation
 
 SOMEBODY = "the vehicle's operator"
 """Who gives orders that were not given here."""
@@ -183,35 +183,12 @@ def taken_over(run: Run, course: Course, sight: Sight, *, by: str = SOMEBODY) ->
     going = run.state in ("RUNNING", "HOMING")
     if going and not sight.drives and sight.place < course.end:
         why = "disarmed" if sight.mode == "AUTO" else f"mode {sight.mode}"
-        return halted(run, f"{why}, by {by}", stands=sight.mode == "HOLD")
+        return runs.paused(run, f"{why}, by {by}", stands=sight.mode == "HOLD")
     if run.state in ("PAUSED", "HELD") and sight.drives and sight.place < course.end:
-        return resumed(run, by)
+        return runs.resumed(run, by)
     if run.state == "PAUSED" and sight.place >= course.end:  # it went on unseen, to the end
-        return resumed(run, by)
+        return runs.resumed(run, by)
     return None
-
-
-def halted(run: Run, reason: str, *, stands: bool) -> Change:
-    """The run waits; a scan under way goes on if the vehicle stands where it is, else it is taken again."""
-    kept = ("VERIFYING", "SCANNING") if stands else ("VERIFYING",)
-    keep = run.stop_state if run.stop_state in kept else "WAITING"
-    homing = run.homing or run.state == "HOMING"
-    paused = changed(run, state="PAUSED", stop_state=keep, reason=reason, homing=homing)
-    return Change(paused, (partial(Paused, reason=reason),))
-
-
-def resumed(run: Run, by: str) -> Change:
-    keep = run.stop_state if run.stop_state in ("VERIFYING", "SCANNING") else "WAITING"
-    onward = changed(run, state="HOMING" if run.homing else "RUNNING", stop_state=keep, attempt=0, reason="")
-    return Change(onward, (partial(Resumed, commander=by),))
-
-
-def started(run: Run, *, run_id: str, now_ns: int, by: str) -> Change:
-    """A new run, begun by whoever switched the vehicle to AUTO."""
-    fresh = Run(
-        state="RUNNING", mission_id=run.mission_id, revision=run.revision, run_id=run_id, started_ns=now_ns
-    )
-    return Change(fresh, (partial(Started, commander=by),))
 
 
 def held_by_vehicle(run: Run, items: int | None) -> Run:

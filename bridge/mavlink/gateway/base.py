@@ -18,7 +18,7 @@ from bridge.mavlink.line.peer import Origin
 from bridge.robots import Outcome, Rest
 from mission.document import Mission, Point, RobotSpec, SiteOrigin
 from mission.events import Pose
-from mission.scans import needs_heading, turned_away
+from mission.run.scans import needs_heading, turned_away
 
 TICK_S = 0.1
 AGAIN_S = 1.0

@@ -17,7 +17,7 @@ from mission.errors import OutcomeUnknown, RobotUnreachable
 from mission.mavlink.captures import Picture, picture_of, result_of
 from mission.mavlink.numbers import numbers_of
 from mission.mavlink.writing import SCAN_MESSAGE
-from mission.scans import ScanFailed, ScanResult
+from mission.run.scans import ScanFailed, ScanResult
 
 Order = tuple[int, tuple[float, ...]]
 """A command and its params."""

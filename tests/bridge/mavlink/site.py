@@ -22,13 +22,13 @@ from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.store import Store
 from bridge.mavlink.simulated.vehicle import Setting
-from bridge.run import Run
 from bridge.station import Station
 from mission.document import Mission, Scan, SiteOrigin, Stop
 from mission.events import AnyEvent, Pose
 from mission.mavlink.autopilots import autopilot_named, upload_of
 from mission.mavlink.items import ItemList
 from mission.mavlink.translate import translate
+from mission.run.states import Run
 from tests.bridge.mavlink.scripted import free_udp_port
 from tests.mission.worlds import mission_of, stop
 

@@ -8,11 +8,11 @@ from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.logbook import Logbook, remember
 from bridge.mavlink.desk.lookout import Lookout
 from bridge.mavlink.desk.modes import AUTOS, Modes
-from bridge.mavlink.desk.progress import started
 from bridge.mavlink.gateway.driving import DRIVING
 from bridge.mavlink.line.wire import Message, dialect
 from mission.events import Paused
 from mission.mavlink.translate import translate
+from mission.run.states import started
 from tests.bridge.mavlink.site import tour
 
 ROVER = DRIVING["ardupilot"]

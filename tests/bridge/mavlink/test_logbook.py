@@ -10,13 +10,12 @@ import pytest
 
 from bridge.journal import open_journal
 from bridge.mavlink.desk.logbook import Logbook, forget, logbook, name_of, remember, usual_folder
-from bridge.mavlink.desk.progress import started
 from bridge.mavlink.desk.standing import check_run_over
 from bridge.mavlink.line.url import Url
-from bridge.run import Change, Run, changed
 from mission.errors import AnswerIsNo, InputError
 from mission.events import Aborted, Paused
 from mission.mavlink.translate import translate
+from mission.run.states import Change, Run, changed, started
 from tests.bridge.mavlink.site import tour
 
 URL = Url("udpout", "127.0.0.1", 14550)

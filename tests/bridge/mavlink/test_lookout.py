@@ -12,10 +12,10 @@ from bridge.mavlink.desk.modes import AUTOS, Modes
 from bridge.mavlink.desk.visits import Course, course_of
 from bridge.mavlink.gateway.driving import DRIVING
 from bridge.mavlink.line.wire import dialect
-from bridge.run import Run
 from mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic
 from mission.mavlink.translate import translate
-from mission.scans import ScanFailed, ScanResult
+from mission.run.scans import ScanFailed, ScanResult
+from mission.run.states import Run
 from tests.bridge.mavlink.site import tour
 
 UNKNOWN, ACTIVE, COMPLETE = 0, dialect.MISSION_STATE_ACTIVE, dialect.MISSION_STATE_COMPLETE

@@ -8,11 +8,11 @@ import pytest
 from bridge.mavlink.desk.onward import onward
 from bridge.mavlink.desk.progress import Sight, held_by_vehicle, passed_by, steps, taken_over
 from bridge.mavlink.desk.visits import Course, course_of
-from bridge.run import Run
 from mission.document import ScannerSpec
 from mission.events import AnyEvent, Pose
 from mission.mavlink.translate import translate
-from mission.scans import ScanFailed, ScanResult
+from mission.run.scans import ScanFailed, ScanResult
+from mission.run.states import Run
 from tests.bridge.mavlink.site import told, tour
 
 SCAN = ScanResult(file="scan-1.e57", size=1600, points=100, sha256="0" * 64)

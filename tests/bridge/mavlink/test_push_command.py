@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 
 from bridge.mavlink.desk.logbook import logbook, remember
-from bridge.mavlink.desk.progress import started
 from bridge.mavlink.line.peer import reached
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import dialect
@@ -29,6 +28,7 @@ from mission.files.imports import qgc_plan, qgc_waypoints
 from mission.files.imports.track import Given
 from mission.files.mission_json import write
 from mission.mavlink.translate import translate
+from mission.run.states import started
 from tests.bridge.mavlink.lists import held, stops
 from tests.bridge.mavlink.scripted import Scripted, free_udp_port
 from tests.bridge.mavlink.site import tour

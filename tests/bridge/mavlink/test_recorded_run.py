@@ -16,13 +16,13 @@ from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.logbook import Logbook, remember
 from bridge.mavlink.desk.lookout import Lookout
 from bridge.mavlink.desk.modes import AUTOS, Modes
-from bridge.mavlink.desk.progress import started
 from bridge.mavlink.gateway.driving import DRIVING
 from bridge.mavlink.line.wire import dialect
 from mission.document import Mission, SiteOrigin
 from mission.events import AnyEvent, Arrived, Failed
 from mission.mavlink.back import recognise
 from mission.mavlink.items import Command, Item, ItemList
+from mission.run.states import started
 from tests.bridge.mavlink.site import told
 from tests.mission.worlds import mission_of, stop
 

@@ -14,7 +14,7 @@ from bridge.mavlink.line.peer import Ack
 from bridge.mavlink.line.wire import Box, Message, Who, dialect
 from mission.document import Scan
 from mission.errors import OutcomeUnknown
-from mission.scans import ScanFailed, ScanResult
+from mission.run.scans import ScanFailed, ScanResult
 from tests.bridge.mavlink.gateway import site_mission
 
 SHA = hashlib.sha256(b"scan").hexdigest()

@@ -14,11 +14,11 @@ from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.peer import reached as found_peer
 from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.simulated.store import Store
-from bridge.protocol import Command
 from mission.document import Scan, SiteOrigin
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import Aborted, Pose, Resumed, Started
 from mission.mavlink.translate import translate
+from mission.run.orders import Order
 from tests.bridge.mavlink.site import ALL, Site, told, tour, until, watched
 
 PROFILES = ["ardupilot", "px4"]
@@ -119,7 +119,7 @@ def test_a_mission_that_another_station_has_cleared_is_not_told_or_started(tmp_p
 
 
 def test_an_abort_under_a_used_id_is_refused_and_never_told_that_it_was_done(tmp_path: Path) -> None:
-    start = Command(cmd_id="once", verb="start", commander="test", issued_ns=0, valid_for_s=5.0)
+    start = Order(cmd_id="once", verb="start", commander="test", issued_ns=0, valid_for_s=5.0)
     abort = msgspec.structs.replace(start, verb="abort")
     with Site(tmp_path).book() as book:
         no_vehicle: Any = None

@@ -6,41 +6,44 @@ every change of hands, so that an order given under an older one is recognised h
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Final
 
 import msgspec
 
-from bridge.protocol import LEASE_S, Lease, Reason
+from mission.run.orders import Refused
 
-FREE_VERBS = ("pause", "abort")
-"""Orders that any station may give at any time."""
+LEASE_S: Final = 60.0
+"""How long a commander keeps the robot after the last order."""
 
 
-@dataclass(frozen=True)
-class Denied:
-    reason: Reason
-    message: str
+class Lease(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Who commands a robot."""
+
+    commander: str
+    fence: int
+    """Grows with every change of hands."""
+    until_ns: int
 
 
 def claimed(
     lease: Lease | None, commander: str, *, fence: int | None, take_over: bool, now_ns: int
-) -> Lease | Denied:
-    """The lease in the hands of `commander`, renewed; denied while another holds it.
+) -> Lease | Refused:
+    """The lease in the hands of `commander`, renewed; refused while another holds it.
 
-    `fence` is the number that the commander last knew; an older one than the robot's is denied unless
+    `fence` is the number that the commander last knew; an older one than the robot's is refused unless
     the order takes over.
     """
     if lease is None:
         return Lease(commander=commander, fence=1, until_ns=now_ns + lasting_ns())
     if fence is not None and fence < lease.fence and not take_over:
-        return Denied(
+        return Refused(
             "fenced", f"the order is of lease {fence}; the robot is at {lease.fence} ({lease.commander})"
         )
     if commander == lease.commander:
         return msgspec.structs.replace(lease, until_ns=now_ns + lasting_ns())
     left_s = remaining_s(lease, now_ns)
     if left_s > 0 and not take_over:
-        return Denied(
+        return Refused(
             "not_the_commander",
             f"{lease.commander} commands it for {left_s:.0f} s more; wait, or add --take-over",
         )

@@ -26,13 +26,15 @@ from mission.events import (
     LinkLost,
     Paused,
     Pose,
+    Resumed,
     Scanned,
     Settled,
     Skipped,
+    Started,
     State,
     StopState,
 )
-from mission.scans import ScanFailed, ScanResult, missing_in
+from mission.run.scans import ScanFailed, ScanResult, missing_in
 
 After = Literal["FINISHED", "ABORTED", "PAUSED"]
 
@@ -109,11 +111,39 @@ def rebooted(run: Run) -> Change:
     """After a reboot nothing moves until somebody resumes; an unfinished scan will be taken again."""
     if run.over:
         return Change(run)
-    stop_state = "VERIFYING" if run.stop_state == "VERIFYING" else "WAITING"
-    reason = run.reason if run.state == "PAUSED" else "reboot"
-    homing = run.homing or run.state == "HOMING"
-    halted = changed(run, state="PAUSED", stop_state=stop_state, reason=reason, homing=homing)
-    return Change(halted, (partial(Paused, reason="reboot"),))
+    change = paused(run, "reboot", stands=False)
+    return Change(changed(change.run, reason=run.reason), change.events) if run.state == "PAUSED" else change
+
+
+def started(run: Run, *, run_id: str, now_ns: int, by: str, left_out: tuple[str, ...] = ()) -> Change:
+    """A new run of the mission that lies ready or was run before, without the first stops if so said."""
+    fresh = Run(
+        state="RUNNING", mission_id=run.mission_id, revision=run.revision, run_id=run_id, started_ns=now_ns,
+        leg=len(left_out), at=len(left_out), skipped=left_out,
+    )  # fmt: skip
+    skips = (partial(Skipped, stop=stop, reason="started beyond it") for stop in left_out)
+    return Change(fresh, (partial(Started, commander=by), *skips))
+
+
+def paused(run: Run, reason: str, *, stands: bool = True) -> Change:
+    """The run waits. A robot that stands ends the scan it is in, so that no stop is scanned twice."""
+    kept = ("SCANNING", "VERIFYING") if stands else ("VERIFYING",)
+    waiting = changed(
+        run, state="PAUSED", stop_state=run.stop_state if run.stop_state in kept else "WAITING",
+        reason=reason, homing=run.homing or run.state == "HOMING",
+    )  # fmt: skip
+    return Change(waiting, (partial(Paused, reason=reason),))
+
+
+def resumed(run: Run, by: str) -> Change:
+    """The run goes on; one that was held has all its tries again."""
+    going = changed(
+        run, state="HOMING" if run.homing else "RUNNING", reason=run.reason if run.homing else "",
+        stop_state=run.stop_state if run.stop_state in ("SCANNING", "VERIFYING") else "WAITING",
+    )  # fmt: skip
+    if run.state == "HELD":
+        going = changed(going, attempt=0, approaches=0)
+    return Change(going, (partial(Resumed, commander=by),))
 
 
 def leaving(run: Run) -> Change:
@@ -179,7 +209,7 @@ def verified(run: Run, mission: Mission, pose: Pose) -> Change:
 
 
 def next_stop(run: Run, mission: Mission) -> Change:
-    """On to the next stop; with a new revision waiting, that one says what is next (`bridge.revision`)."""
+    """On to the next stop; a new revision that waits says itself what is next."""
     between = changed(run, at=run.at + 1, stop_state="WAITING", attempt=0, approaches=0, scan=None)
     return Change(between) if between.next_revision is not None else onward(between, mission)
 

@@ -1,0 +1,236 @@
+"""What each order does to a run, or why it is refused: decided here, without touching anything."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from mission.document import Mission
+from mission.events import Pose, TakenOver
+from mission.run import way
+from mission.run.battery import what_is_missing
+from mission.run.lease import Lease, claimed
+from mission.run.orders import DRIVING, FREE_VERBS, LONGEST_VALID_S, Order, Refused
+from mission.run.states import (
+    Change,
+    Run,
+    Telling,
+    changed,
+    ended,
+    paused,
+    resumed,
+    sent_home,
+    skipped,
+    started,
+    stop_of,
+)
+
+
+@dataclass(frozen=True)
+class Situation:
+    """All that a decision depends on."""
+
+    run: Run
+    mission: Mission | None
+    has_run: bool
+    """Whether this mission has been run before."""
+    pose: Pose
+    now_ns: int
+    """On the run's clock."""
+    command_ns: int
+    """On the clock of commands."""
+    new_run_id: str
+    lease: Lease | None
+    battery: float
+    endurance_s: float | None
+    not_ready: str = ""
+    """Why the robot's base cannot drive at present."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What an order leads to, and who commands the robot from then on."""
+
+    change: Change
+    lease: Lease | None
+
+
+def decide(order: Order, situation: Situation) -> Decision | Refused:
+    """What a order leads to; late, foreign, misdirected and impossible ones are refused."""
+    late = _too_late(order, situation)
+    if late:
+        return late
+    lease = situation.lease if order.verb in FREE_VERBS else _claim(order, situation)
+    if isinstance(lease, Refused):
+        return lease
+    change = _misdirected(order, situation) or _verb(order, situation)
+    if isinstance(change, Refused):
+        return change
+    return Decision(Change(change.run, (*handed_over(situation.lease, lease), *change.events)), lease)
+
+
+def _claim(order: Order, situation: Situation) -> Lease | Refused:
+    return claimed(
+        situation.lease, order.commander,
+        fence=order.fence, take_over=order.take_over, now_ns=situation.command_ns,
+    )  # fmt: skip
+
+
+def handed_over(before: Lease | None, after: Lease | None) -> tuple[Telling, ...]:
+    """What is told when the robot changes hands."""
+    if before is None or after is None or before.commander == after.commander:
+        return ()
+    return (partial(TakenOver, commander=after.commander, before=before.commander),)
+
+
+def _too_late(order: Order, situation: Situation) -> Refused | None:
+    if not 0 < order.valid_for_s <= LONGEST_VALID_S:
+        return Refused(
+            "expired", f"valid for {order.valid_for_s:g} s; at most {LONGEST_VALID_S:g} s are taken"
+        )
+    age = (situation.command_ns - order.issued_ns) / 1e9
+    if not -order.valid_for_s <= age <= order.valid_for_s:
+        return Refused(
+            "expired", f"{order.verb} is {age:.1f} s old and was valid for {order.valid_for_s:g} s"
+        )
+    return None
+
+
+def _misdirected(order: Order, situation: Situation) -> Refused | None:
+    run = situation.run
+    if order.expect_state is not None and run.state not in order.expect_state:
+        return Refused("wrong_state", f"the robot is {run.state}, not {' or '.join(order.expect_state)}")
+    if order.run_id is not None and order.run_id != run.run_id:
+        return Refused("wrong_run", f"the robot's run is {run.run_id}, not {order.run_id}")
+    if order.mission_id is not None and order.mission_id != run.mission_id:
+        return Refused("wrong_mission", f"the robot's mission is {run.mission_id}, not {order.mission_id}")
+    if order.revision is not None and order.revision != run.revision:
+        return Refused("wrong_mission", f"the robot holds revision {run.revision}, not {order.revision}")
+    return None
+
+
+def _verb(order: Order, situation: Situation) -> Change | Refused:
+    needed = STATES[order.verb]
+    if situation.mission is None:
+        return Refused("no_mission", "the robot holds no mission; push one first")
+    if situation.run.state not in needed:
+        return Refused(
+            "wrong_state", f"{order.verb} needs {' or '.join(needed)}; the robot is {situation.run.state}"
+        )
+    if situation.not_ready and order.verb in DRIVING:
+        return Refused("not_ready", situation.not_ready)
+    return VERBS[order.verb](order, situation.mission, situation)
+
+
+def _start(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
+    if situation.has_run and not order.again:
+        return Refused(
+            "finished_before", f"mission {mission.name} has been run before; start --again runs it anew"
+        )
+    leg = _starting_leg(order, mission, situation.pose)
+    if isinstance(leg, Refused):
+        return leg
+    missing = what_is_missing(
+        mission, battery=situation.battery, endurance_s=situation.endurance_s, first=leg
+    )
+    if missing:
+        return Refused("infeasible", missing)
+    left_out = tuple(stop.id for stop in mission.stops[:leg])
+    return started(
+        situation.run, run_id=situation.new_run_id, now_ns=situation.now_ns, by=order.commander,
+        left_out=left_out,
+    )  # fmt: skip
+
+
+def _starting_leg(order: Order, mission: Mission, pose: Pose) -> int | Refused:
+    tolerance = mission.stops[0].tolerance_m
+    start = mission.start
+    away = math.hypot(pose.x - start.x, pose.y - start.y)
+    if not order.from_here:
+        if away <= tolerance:
+            return 0
+        return Refused("not_at_start", f"the robot is {away:.2f} m from the mission's start {_xy(start)}; "
+                       "drive it there, or start --from-here on the route")  # fmt: skip
+    leg, place = way.nearest_leg(mission, pose)
+    if place.distance > mission.stops[leg].tolerance_m:
+        return Refused("off_route", f"the robot is {place.distance:.2f} m from the route's nearest point")
+    return leg
+
+
+def _pause(order: Order, mission: Mission, situation: Situation) -> Change:
+    return paused(situation.run, f"pause by {order.commander}")
+
+
+def _resume(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
+    off = off_route(situation.run, mission, situation.pose)
+    return off or resumed(situation.run, order.commander)
+
+
+def off_route(run: Run, mission: Mission, pose: Pose) -> Refused | None:
+    """Refused if the robot stands farther from its leg than the stop's tolerance."""
+    legs = way.legs_of(mission)
+    leg = min(run.leg, len(legs) - 1)
+    tolerance = mission.stops[min(leg, len(mission.stops) - 1)].tolerance_m
+    near = [way.nearest(legs[index], pose).distance for index in {leg, max(0, leg - 1)}]
+    if min(near) <= tolerance:
+        return None
+    return Refused("off_route", f"the robot is {min(near):.2f} m off its route (tolerance {tolerance:g} m); "
+                   "bring it back onto it")  # fmt: skip
+
+
+def _skip(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
+    run = situation.run
+    stop = stop_of(run, mission)
+    if stop is None or (order.stop is not None and order.stop != stop.id):
+        return Refused(
+            "not_at_stop", f"the robot works on {stop.id if stop else 'no stop'}, not {order.stop}"
+        )
+    # A skip is an answer to a hold, so the robot goes on; one that pauses stays paused.
+    going = changed(run, state="RUNNING", reason="") if run.state == "HELD" else run
+    return skipped(going, mission, f"skip by {order.commander}")
+
+
+def _retry(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
+    stop = stop_of(situation.run, mission)
+    if order.stop is not None and (stop is None or order.stop != stop.id):
+        return Refused(
+            "not_at_stop", f"the robot works on {stop.id if stop else 'no stop'}, not {order.stop}"
+        )
+    return _resume(order, mission, situation)
+
+
+def _abort(order: Order, mission: Mission, situation: Situation) -> Change:
+    return ended(changed(situation.run, reason=f"abort by {order.commander}"), "ABORTED")
+
+
+def _home(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
+    off = off_route(situation.run, mission, situation.pose)
+    if off:
+        return off
+    reason = f"sent home by {order.commander}"
+    return sent_home(changed(situation.run, state="RUNNING"), mission, then="ABORTED", reason=reason)
+
+
+Deciding = Callable[[Order, Mission, Situation], Change | Refused]
+
+VERBS: dict[str, Deciding] = {
+    "start": _start, "pause": _pause, "resume": _resume, "skip": _skip,
+    "retry": _retry, "abort": _abort, "home": _home,
+}  # fmt: skip
+
+STATES: dict[str, tuple[str, ...]] = {
+    "start": ("READY", "FINISHED", "ABORTED"),
+    "pause": ("RUNNING", "HOMING"),
+    "resume": ("PAUSED",),
+    "skip": ("RUNNING", "PAUSED", "HELD"),
+    "retry": ("HELD",),
+    "abort": ("RUNNING", "PAUSED", "HELD", "HOMING"),
+    "home": ("RUNNING", "PAUSED", "HELD"),
+}
+"""The states in which each verb means something."""
+
+
+def _xy(start: object) -> str:
+    return f"({getattr(start, 'x', 0.0):.2f}, {getattr(start, 'y', 0.0):.2f})"

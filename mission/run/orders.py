@@ -1,0 +1,76 @@
+"""What a station may order a robot to do with its run, and what the robot answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal
+
+import msgspec
+
+from mission.events import State
+
+LONGEST_VALID_S: Final = 60.0
+"""No order may claim to be valid for longer."""
+
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+"""A number that JSON readers and SQLite hold exactly."""
+Word = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
+
+Verb = Literal["start", "pause", "resume", "skip", "retry", "abort", "home"]
+FREE_VERBS: tuple[Verb, ...] = ("pause", "abort")
+"""Orders that any station may give at any time."""
+DRIVING: tuple[Verb, ...] = ("start", "resume", "retry", "home")
+"""Orders that a robot which cannot drive refuses at once."""
+
+Reason = Literal[
+    "malformed", "expired", "id_reused", "wrong_state", "wrong_run", "wrong_mission", "no_mission",
+    "finished_before", "not_at_start", "off_route", "not_at_stop", "not_the_commander", "fenced",
+    "running", "revision_taken", "older_revision", "too_large", "incomplete", "digest", "infeasible",
+    "storage", "untrusted", "replayed", "way_differs",
+    "unsupported", "not_armed", "wrong_origin", "mission_differs", "no_position", "denied", "not_ready",
+]  # fmt: skip
+"""Why a robot refuses an order, or a mission."""
+
+
+class Order(
+    msgspec.Struct, frozen=True, kw_only=True, tag="Command", tag_field="is", forbid_unknown_fields=True
+):
+    """An order; sent again with the same `cmd_id` it is carried out once."""
+
+    cmd_id: Word
+    verb: Verb
+    commander: Word
+    issued_ns: int
+    valid_for_s: float
+    fence: Count | None = None
+    """The lease number that the commander knew."""
+    take_over: bool = False
+    expect_state: tuple[State, ...] | None = None
+    """Refused in any other state, so that a late order does no harm."""
+    run_id: Word | None = None
+    mission_id: Word | None = None
+    revision: Count | None = None
+    stop: Word | None = None
+    """The stop that skip and retry are meant for."""
+    again: bool = False
+    from_here: bool = False
+
+
+class Answer(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is", forbid_unknown_fields=True):
+    """What became of an order, stored before it is sent."""
+
+    cmd_id: str
+    verb: str
+    outcome: Literal["ok", "refused"]
+    reason: Reason | None
+    message: str
+    run_id: str | None
+    state: State
+
+
+@dataclass(frozen=True)
+class Refused:
+    """Why an order, or a mission, is not taken."""
+
+    reason: Reason
+    message: str
