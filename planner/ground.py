@@ -19,6 +19,7 @@ from planner.shapes import (
     GROWTH,
     HAIRLINE,
     QUARTER,
+    SLACK,
     local_origin,
     polygon_parts,
     segments_of,
@@ -77,19 +78,29 @@ class Ground:
 def drivable(ground: Ground, settings: Settings) -> tuple[BaseGeometry, FloatArray]:
     """Where the robot's centre may drive, and the exact crossings of gaps just wide enough."""
     walls = ground.walls(settings)
-    area = snapped(clear_of(walls, ground))
+    area = snapped(_clear_of(walls, ground))
+    if not _keeps(area, walls):
+        area = snapped(_clear_of(walls, ground, grid_size=GRID))
     area = shapely.MultiPolygon([part for part in polygon_parts(area) if part.area > GRID])
     if area.is_empty:
         return area, np.empty((0, 2, 2))
     return area, crossings_through(tight_gaps(walls), walls, area, ground.outline)
 
 
-def clear_of(walls: Walls, ground: Ground) -> BaseGeometry:
+def _clear_of(walls: Walls, ground: Ground, *, grid_size: float | None = None) -> BaseGeometry:
     """The ground that keeps every wall's clearance, drawn a little too small: arcs are round from outside.
 
     What lies inside keeps its clearance; what is missing keeps less than 2 % more.
     """
     kept = walls.clearance > 0
     reach = walls.clearance[kept] * GROWTH + 2 * GRID
-    near = widened(walls.shapes()[kept], reach, quad_segs=QUARTER)
-    return ground.outline.difference(ground.obstacles).difference(near)
+    near = widened(walls.shapes()[kept], reach, quad_segs=QUARTER, grid_size=grid_size)
+    return ground.outline.difference(ground.obstacles, grid_size=grid_size).difference(
+        near, grid_size=grid_size
+    )
+
+
+def _keeps(area: BaseGeometry, walls: Walls) -> bool:
+    """Whether an area keeps every clearance: without a grid, GEOS now and then loses what is taken off."""
+    shapely.prepare(area)
+    return not shapely.dwithin(area, walls.shapes(), walls.clearance - SLACK).any()

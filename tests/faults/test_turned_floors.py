@@ -26,9 +26,14 @@ def drawing(name: str) -> MovableDrawing:
     return MovableDrawing(DRAWINGS[name])
 
 
+AWKWARD = {"duplex-l1": [Place(269.8539871307857)]}
+"""Where a union of GEOS loses a piece without an error."""
+
+
 @cache
 def anywhere(name: str) -> dict[Place, Figures]:
-    return {place: drawing(name).figures(place) for place in places(FEW if name in LARGE else ANGLES, seed=1)}
+    some = places(FEW if name in LARGE else ANGLES, seed=1)
+    return {place: drawing(name).figures(place) for place in (*AWKWARD.get(name, ()), *some)}
 
 
 @pytest.mark.parametrize("name", DRAWINGS)
