@@ -14,7 +14,6 @@ from shapely.geometry.base import BaseGeometry
 from mission.geometry import BoolArray, FloatArray, IntArray
 from mission.planning import NavigableSpace
 from planner.reach import INSIDE, reach_of
-from planner.rooms import THIN
 from planner.shapes import SLACK, local_origin, polygon_parts, segments_of, to_shape
 
 APART = 0.1
@@ -45,7 +44,7 @@ def gap_before(space: NavigableSpace, shape: BaseGeometry, parts: Set[int]) -> s
     gaps = _gaps_of(space)
     apart = (gaps.here != gaps.there) & (gaps.there >= 0) & ~np.isin(gaps.here, sorted(parts))
     at = np.flatnonzero(apart)
-    at = at[shapely.dwithin(shape, shapely.points(gaps.begin[at]), THIN)]
+    at = at[shapely.dwithin(shape, shapely.points(gaps.begin[at]), INSIDE)]
     if not len(at):
         return ""
     there = np.isin(gaps.there[at], sorted(parts))

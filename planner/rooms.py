@@ -10,8 +10,8 @@ from mission.floor import FloorPlan
 from mission.planning import RoomSpace
 from mission.settings import Settings
 from planner.ground import Ground
-from planner.openings import part_near
-from planner.shapes import boundary_lines, polygon_parts, to_polygons, to_shape
+from planner.openings import part_near, threshold
+from planner.shapes import polygon_parts, to_polygons, to_shape, union
 
 LEAST_UNNAMED = 0.5
 """Floor outside every room smaller than this (m²) is a threshold or a niche, not a room."""
@@ -60,18 +60,13 @@ def _stop_area(ground: Ground, settings: Settings) -> BaseGeometry:
 def _unnamed(
     ground: Ground, drive_area: BaseGeometry, rooms: list[BaseGeometry]
 ) -> list[tuple[str, BaseGeometry]]:
-    """Floor outside every room: each part of the floor by itself where there are no rooms at all."""
+    """Floor outside every room, up to walls and thresholds; without any room, each part of the floor."""
     if not rooms:
         parts = sorted(polygon_parts(to_shape(ground.floor.outline, ground.origin)), key=lambda p: p.bounds)
         names = ["floor"] if len(parts) == 1 else [f"floor {k + 1}" for k in range(len(parts))]
         return list(zip(names, parts, strict=True))
-    inside = shapely.union_all(rooms)
-    thresholds = shapely.union_all(shapely.buffer(boundary_lines(inside), THIN, cap_style="square"))
-    outside = ground.outline.difference(inside).difference(thresholds)
+    doors = [threshold(item) for item in ground.crossings if not item.clear.is_empty]
+    outside = ground.outline.difference(union([*rooms, *doors])).difference(ground.obstacles)
     parts = [p for p in polygon_parts(outside) if p.intersection(drive_area).area > LEAST_UNNAMED]
     ordered = sorted(parts, key=lambda part: part.bounds)
     return [(f"unnamed {k + 1}", part) for k, part in enumerate(ordered)]
-
-
-THIN = 0.3
-"""Floor this close to a room (m) belongs to a wall or a threshold."""
