@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Iterator
+
+import pytest
+
+from tests.faults.sizes import FULL
 
 
 def pytest_configure() -> None:
@@ -15,3 +20,15 @@ def pytest_configure() -> None:
     os.environ["MAVLINK20"] = "1"
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def own_time(request: pytest.FixtureRequest) -> Iterator[None]:
+    """The test's threads wait in a time of their own; in the long form of the tests, in real time."""
+    if FULL or request.node.get_closest_marker("real_time"):
+        yield
+        return
+    from tests.own_time import stepped_into
+
+    with stepped_into():
+        yield

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import heapq
 import random
-import select
-import socket
 import threading
 import time
 from dataclasses import dataclass
-from typing import Any
 
+from bridge.mavlink.line.transport import Transport, open_transport
 from bridge.mavlink.line.url import Url
+from tests.bridge.mavlink.scripted import free_udp_port
 
 WAIT_S = 0.05
 
@@ -33,58 +32,49 @@ class Lossy:
 
     def __init__(self, target: int, roughness: Roughness, *, seed: int) -> None:
         self.roughness = roughness
+        self.url = Url("udpout", "127.0.0.1", free_udp_port())
         self._chance = random.Random(seed)
-        self._near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._near.bind(("127.0.0.1", 0))
-        self._far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._far.connect(("127.0.0.1", target))
-        self.port: int = self._near.getsockname()[1]
-        self.url = Url("udpout", "127.0.0.1", self.port)
-        self._station: Any = None
-        self._due: list[tuple[float, int, bool, bytes]] = []
+        self._near = open_transport(Url("udpin", "127.0.0.1", self.url.number))
+        self._far = open_transport(Url("udpout", "127.0.0.1", target))
+        self._due: list[tuple[float, int, Transport, bytes]] = []
         self._carried = 0
+        self._lock = threading.Lock()
         self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._work, daemon=True)
+        self._threads = [
+            threading.Thread(target=self._work, args=ends, daemon=True)
+            for ends in ((self._near, self._far), (self._far, self._near))
+        ]
 
     def __enter__(self) -> Lossy:
-        self._thread.start()
+        for thread in self._threads:
+            thread.start()
         return self
 
     def __exit__(self, *exception: object) -> None:
         self._closing.set()
-        self._thread.join()
+        for thread in self._threads:
+            thread.join()
         self._near.close()
         self._far.close()
 
-    def _work(self) -> None:
+    def _work(self, source: Transport, sink: Transport) -> None:
+        """Take what comes in at one end, and give what is due at either."""
         while not self._closing.is_set():
-            wait_s = min(WAIT_S, self._due[0][0] - time.monotonic()) if self._due else WAIT_S
-            ready, _, _ = select.select([self._near, self._far], [], [], max(0.0, wait_s))
-            for line in ready:
-                self._take(line)
-            while self._due and self._due[0][0] <= time.monotonic():
-                self._give(*heapq.heappop(self._due)[2:])
+            with self._lock:
+                wait_s = min(WAIT_S, self._due[0][0] - time.monotonic()) if self._due else WAIT_S
+            for _, data in source.read(max(0.0, wait_s)):
+                self._take(sink, data)
+            with self._lock:
+                while self._due and self._due[0][0] <= time.monotonic():
+                    _, _, to, data = heapq.heappop(self._due)
+                    to.write(data)
 
-    def _take(self, line: socket.socket) -> None:
-        try:
-            data, source = line.recvfrom(65536)
-        except ConnectionRefusedError:  # the vehicle is not there at the moment
-            return
-        if line is self._near:
-            self._station = source
-        chance, rough = self._chance.random, self.roughness
-        if chance() < rough.loss:
-            return
-        for _ in range(2 if chance() < rough.doubled else 1):
-            late = rough.delay_s * (2 if chance() < rough.overtaken else 1)
-            self._carried += 1
-            heapq.heappush(self._due, (time.monotonic() + late, self._carried, line is self._near, data))
-
-    def _give(self, to_vehicle: bool, data: bytes) -> None:
-        try:
-            if to_vehicle:
-                self._far.send(data)
-            elif self._station is not None:
-                self._near.sendto(data, self._station)
-        except ConnectionRefusedError:
-            pass
+    def _take(self, sink: Transport, data: bytes) -> None:
+        with self._lock:
+            chance, rough = self._chance.random, self.roughness
+            if chance() < rough.loss:
+                return
+            for _ in range(2 if chance() < rough.doubled else 1):
+                late = rough.delay_s * (2 if chance() < rough.overtaken else 1)
+                self._carried += 1
+                heapq.heappush(self._due, (time.monotonic() + late, self._carried, sink, data))

@@ -15,6 +15,8 @@ from recordings.field import FieldRecording
 from recordings.review import review
 from tests.bridge.mavlink.site import ALL, Site, told, tour, until, watched
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 
 def test_a_run_is_told_from_start_to_finish(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot")

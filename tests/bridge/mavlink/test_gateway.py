@@ -31,6 +31,8 @@ from tests.bridge.mavlink.gateway import (
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.bridge.mavlink.scripted import free_udp_port
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 ALL = ["s1", "s2"]
 WAYS = [("ardupilot", "camera"), ("ardupilot", "script"), ("px4", "camera")]
 

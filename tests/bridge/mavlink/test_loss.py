@@ -14,6 +14,8 @@ from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.bridge.mavlink.scripted import free_udp_port
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 LOSSY = Roughness(delay_s=0.005, loss=0.1)
 LOSSIER = Roughness(delay_s=0.005, loss=0.3)
 ROUGH = Roughness(delay_s=0.005, loss=0.1, doubled=0.2, overtaken=0.2)

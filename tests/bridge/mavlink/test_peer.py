@@ -10,6 +10,8 @@ from bridge.mavlink.line.wire import Message, Who, dialect, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from tests.bridge.mavlink.scripted import Scripted, free_udp_port
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 ARM = dialect.MAV_CMD_COMPONENT_ARM_DISARM
 
 

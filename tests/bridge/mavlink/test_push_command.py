@@ -33,6 +33,8 @@ from tests.bridge.mavlink.lists import held, stops
 from tests.bridge.mavlink.scripted import Scripted, free_udp_port
 from tests.bridge.mavlink.site import tour
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 KEY = bytes(range(32))
 Run = Callable[..., tuple[int, str, str]]
 
@@ -233,6 +235,7 @@ class Stalls(Scripted):
             super().on_mission_item_int(message, to)
 
 
+@pytest.mark.real_time
 def test_ctrl_c_cancels_and_tells_what_is_on_the_vehicle(tmp_path: Path, mission: Mission) -> None:
     write(sealed(mission), tmp_path / "mission.json")
     with Stalls(held(stops(3))) as stalling:

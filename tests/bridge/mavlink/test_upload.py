@@ -21,6 +21,8 @@ from tests.bridge.mavlink.lists import SITE, held, stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.bridge.mavlink.scripted import Scripted
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 OLD, NEW = stops(3), stops(20, east=7)
 HELD_NEW = Uploaded(items=40, already=False)
 

@@ -18,6 +18,8 @@ from mission.events import Arrived, Held, Paused, Resumed, Started
 from mission.mavlink.translate import translate
 from tests.bridge.mavlink.site import ALL, Site, told, tour, until, watched
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 
 def by_hand(peer: Peer, mode: tuple[int, int]) -> None:
     """Somebody else changes the mode."""

@@ -21,6 +21,8 @@ from mission.mavlink.translate import translate
 from mission.run.orders import Order
 from tests.bridge.mavlink.site import ALL, Site, told, tour, until, watched
 
+pytestmark = pytest.mark.usefixtures("own_time")
+
 PROFILES = ["ardupilot", "px4"]
 
 
