@@ -11,7 +11,7 @@ from mission.floor import Finding, Rank
 from mission.geometry import BoolArray, FloatArray
 from mission.planning import Candidates, Route, Selection, weights_of
 from mission.seen import seen_units
-from planner.plausible import doubts_of, near_a_leg
+from planner.plausible import doubts_of, near_legs
 from planner.reach import reach_of
 from planner.shapes import local_origin, to_shape
 from planner.unreached import unreached
@@ -26,7 +26,6 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
     left_out = unreached(candidates, parts)
     reached = _reached_m2(candidates, parts)
     findings = (*space.findings, *doubts_of(route, reached_m2=reached))
-    touching = {id(item) for item in findings if near_a_leg(item, route)}
     whole, rooms, kinds = shares_of(selection, why={item.room: item.why for item in left_out})
     return Figures(
         rule=settings.coverage_rule,
@@ -36,7 +35,7 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
         rooms_m2=sum(polygon.area for room in space.rooms for polygon in room.area),
         reached_m2=reached,
         unreached=left_out,
-        findings=ranked(findings, touching),
+        findings=ranked(findings, near_legs(findings, route)),
     )
 
 
@@ -53,13 +52,16 @@ def shares_of(
     return whole, _rooms(ledger, selection, why or {}), worst_first(kinds)
 
 
-def ranked(findings: tuple[Finding, ...], touching: set[int]) -> tuple[Finding, ...]:
-    """Findings that bear on the plan most first: those beside a leg, then by rank, then as they were."""
+def ranked(findings: tuple[Finding, ...], near: set[int]) -> tuple[Finding, ...]:
+    """Findings that bear on the plan most first: those beside a leg, then by rank, then as they were.
 
-    def key(item: Finding) -> tuple[bool, int]:
-        return (id(item) not in touching or item.rank == Rank.NOTE, item.rank)
+    `near` are the places in `findings` of those beside a leg; notes are never among them.
+    """
 
-    return tuple(sorted(findings, key=key))
+    def key(k: int) -> tuple[bool, int]:
+        return (k not in near or findings[k].rank == Rank.NOTE, findings[k].rank)
+
+    return tuple(findings[k] for k in sorted(range(len(findings)), key=key))
 
 
 def _rooms(ledger: _Ledger, selection: Selection, why: Mapping[str, str]) -> tuple[Share, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -37,7 +36,7 @@ def doubts_of(route: Route, *, reached_m2: float) -> tuple[Finding, ...]:
     """What is doubtful about a plan, seen as a whole."""
     space = route.selection.visibility.candidates.space
     return (
-        *over_ignored(space.floor, _legs(route), stops=len(route.approaches), radius=space.settings.radius),
+        *over_ignored(space.floor, legs_of(route), stops=len(route.approaches), radius=space.settings.radius),
         *_little_reached(space, reached_m2),
         *_missing_walls(space),
         *_stray_elements(space.floor),
@@ -45,20 +44,20 @@ def doubts_of(route: Route, *, reached_m2: float) -> tuple[Finding, ...]:
     )
 
 
-def near_a_leg(finding: Finding, route: Route) -> bool:
-    """Whether a finding's place lies where the robot drives, or right beside it."""
-    if finding.code == LEG_OVER_IGNORED:
-        return True
+def near_legs(findings: Sequence[Finding], route: Route) -> set[int]:
+    """Places in `findings` of those that lie where the robot drives, or right beside it."""
     space = route.selection.visibility.candidates.space
-    if finding.at is None:
-        return False
-    place = shapely.Point(np.array(finding.at) - local_origin(space.floor))
+    origin, legs = local_origin(space.floor), shapely.union_all(legs_of(route))
     reach = space.settings.radius + BESIDE_LEG
-    return any(leg.distance(place) <= reach for leg in _legs(route))
+    near = set()
+    for k, item in enumerate(findings):
+        beside = item.at is not None and legs.distance(shapely.Point(np.array(item.at) - origin)) <= reach
+        if beside or item.code == LEG_OVER_IGNORED:
+            near.add(k)
+    return near
 
 
-@lru_cache(maxsize=1)
-def _legs(route: Route) -> tuple[BaseGeometry, ...]:
+def legs_of(route: Route) -> tuple[BaseGeometry, ...]:
     """Every leg in the local frame, the way back last."""
     origin = local_origin(route.selection.visibility.candidates.space.floor)
     legs = route.approaches if route.return_leg is None else (*route.approaches, route.return_leg)
