@@ -11,7 +11,7 @@ from mission.planning import RoomSpace
 from mission.settings import Settings
 from planner.ground import Ground
 from planner.openings import part_near, threshold
-from planner.shapes import polygon_parts, to_polygons, to_shape, union
+from planner.shapes import polygon_parts, roughly_widened, to_polygons, to_shape, union
 
 LEAST_UNNAMED = 0.5
 """Floor outside every room smaller than this (m²) is a threshold or a niche, not a room."""
@@ -49,11 +49,10 @@ def _without_inner(
 
 
 def _stop_area(ground: Ground, settings: Settings) -> BaseGeometry:
-    """Where stops may be, to look at: whole outlines are widened at once, quickly but not exactly."""
+    """Where stops may be, to look at."""
     keep = max(settings.d_sec, settings.radius)
     edges = shapely.boundary(to_shape(ground.floor.outline, ground.origin))
-    near = [ground.obstacles.buffer(keep), edges.buffer(settings.edge)]
-    near = shapely.make_valid(near, method="structure", keep_collapsed=False)
+    near = (roughly_widened(ground.obstacles, keep), roughly_widened(edges, settings.edge))
     return ground.outline.difference(near[0]).difference(near[1])
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import shapely
@@ -183,6 +184,12 @@ def widened(
     gives a polygon whose rings cross, which no later operation can be asked about.
     """
     return shapely.union_all(shapely.buffer(lines, distance, quad_segs=quad_segs), grid_size=grid_size)
+
+
+def roughly_widened(shape: BaseGeometry, distance: float, **style: Any) -> BaseGeometry:
+    """A shape widened as a whole, made sound: quick, and off by up to 1 % of the distance."""
+    wide = shapely.buffer(shape, distance, **style)
+    return shapely.make_valid(wide, method="structure", keep_collapsed=False)
 
 
 def holds(region: BaseGeometry, shape: BaseGeometry, *, slack: float) -> bool:

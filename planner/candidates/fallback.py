@@ -8,7 +8,7 @@ import shapely
 from mission.geometry import FloatArray
 from mission.planning import KEPT
 from planner.candidates.place import Place
-from planner.shapes import polygon_parts
+from planner.shapes import polygon_parts, roughly_widened
 
 HAIR = 1e-6
 """Clearances are shortened by this to find strips that are allowed but have no width."""
@@ -18,9 +18,9 @@ def best_point(place: Place, room: int) -> FloatArray | None:
     """The allowed point of a room farthest from elements and floor edges, or None if none is allowed."""
     settings = place.space.settings
     allowed = place.rooms[room].difference(
-        place.obstacles.buffer(place.element_clearance - HAIR, quad_segs=64)
+        roughly_widened(place.obstacles, place.element_clearance - HAIR, quad_segs=64)
     )
-    edges = shapely.boundary(place.outline).buffer(max(settings.edge - HAIR, 0.0), quad_segs=64)
+    edges = roughly_widened(shapely.boundary(place.outline), max(settings.edge - HAIR, 0.0), quad_segs=64)
     pieces = polygon_parts(allowed.intersection(place.outline).difference(edges))
     points = [xy for piece in pieces for xy in _middles(piece)]
     if not points:

@@ -18,7 +18,7 @@ from mission.geometry import FloatArray, IntArray
 from mission.planning import KEPT, SLIVER, TOO_SMALL, NavigableSpace
 from planner.candidates.grid import main_axes
 from planner.candidates.place import Place
-from planner.shapes import GRID, one_shape, polygon_parts, segments_of
+from planner.shapes import GRID, one_shape, polygon_parts, roughly_widened, segments_of
 
 LEAST_ANGLE = float(np.arcsin(1 / 6))
 """alpha_min in radians: sin alpha_min = l_min / (6 l_min) (paper, Eq. 2), 9.594° whatever l_min is."""
@@ -103,7 +103,7 @@ def _left(place: Place, room: int, points: FloatArray, early: IntArray) -> int:
 
 def seeds_of(shape: BaseGeometry, drawn: Drawn, *, d_max: float) -> FloatArray:
     """Seeds (n, 2) of a room: segments longer than `d_max` metres are split evenly."""
-    around = shapely.buffer(shape, AT_ROOM, join_style="mitre")
+    around = roughly_widened(shape, AT_ROOM, join_style="mitre")
     near = drawn.edges[shapely.intersects(drawn.edges, around)]
     drawn_lines = [*shapely.linestrings(segments_of(shape)), *shapely.intersection(near, around)]
     lines = [line for line in drawn_lines if line.length > GRID or line.geom_type == "Point"]
