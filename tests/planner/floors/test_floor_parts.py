@@ -82,6 +82,28 @@ def test_a_joint_between_slabs_is_closed_and_told(read: Read, joint: float, degr
     assert plan.findings[0].at is not None
 
 
+@pytest.mark.parametrize("degrees", [0.0, 53.0])
+def test_a_joint_that_widens_is_closed_as_far_as_it_is_one(read: Read, degrees: float) -> None:
+    """From 0.4 mm in the south to 4 mm, and beside another slab to 40 mm in the north."""
+
+    def draw(model: Modelspace) -> None:
+        for corners in (
+            [(0, 0), (10, 0), (10, 8), (0, 8)],
+            [(10.0004, 0), (16, 0), (16, 8), (10.004, 8)],
+            [(16.0004, 0), (20, 0), (20, 8), (16.04, 8)],
+        ):
+            model.add_lwpolyline(corners, close=True, dxfattribs={"layer": "FLOOR"})
+        for slab in model:
+            slab.transform(Matrix44.z_rotate(math.radians(degrees)))
+
+    plan = read(draw, floor=False)
+    assert len(plan.outline) == 1
+    # The second gap is 20 mm wide at y = 3.96, and open from there on: a trapezoid.
+    left_open = (0.02 + 0.04) / 2 * (8 - (0.02 - 0.0004) / (0.04 - 0.0004) * 8)
+    assert plan.area == pytest.approx(20 * 8 - left_open, abs=1e-3)
+    assert codes(plan) == ["joint_closed"] * 2
+
+
 @pytest.mark.parametrize("degrees", range(0, 360, 10))
 def test_slabs_that_touch_are_one_at_any_angle(read: Read, degrees: int) -> None:
     def draw(model: Modelspace) -> None:
