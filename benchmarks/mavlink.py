@@ -24,8 +24,8 @@ from bridge.mavlink.simulated.vehicle import Setting
 from bridge.mavlink.transfer.download import download
 from bridge.mavlink.transfer.upload import upload
 from mission.errors import StopgoError
-from mission.mavlink.autopilots import differences, upload_of
 from mission.mavlink.items import ItemList
+from mission.mavlink.read_back import differences, upload_of
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.bridge.mavlink.scripted import free_udp_port

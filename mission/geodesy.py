@@ -43,6 +43,11 @@ def from_steps(lat: int, lon: int) -> Geodetic:
     return Geodetic(lat=lat / STEPS_PER_DEGREE, lon=lon / STEPS_PER_DEGREE)
 
 
+def to_steps(place: Geodetic) -> tuple[int, int]:
+    """Latitude and longitude in steps."""
+    return round(place.lat * STEPS_PER_DEGREE), round(place.lon * STEPS_PER_DEGREE)
+
+
 def to_geodetic(origin: SiteOrigin, point: Point, rule: str = "wgs84") -> Geodetic:
     """The place of a point of the site's frame (metres), by one of `RULES`."""
     east, north = _turned(point, math.radians(origin.heading_deg))

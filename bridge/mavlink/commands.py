@@ -25,10 +25,11 @@ from mission.errors import InputError
 from mission.files.atomic import write_atomic
 from mission.files.exports import qgc_plan, qgc_waypoints
 from mission.geodesy import STEPS_PER_DEGREE
-from mission.mavlink.autopilots import AUTOPILOTS, autopilot_named, home_item
+from mission.mavlink.autopilots import AUTOPILOTS, autopilot_named
+from mission.mavlink.fields import PLACED
 from mission.mavlink.items import Command, Frame, Item, ItemList
-from mission.mavlink.keeping import PLACED
 from mission.mavlink.manner import ScanWait, Settle, Trigger
+from mission.mavlink.read_back import home_item
 from mission.mavlink.translate import translate
 from mission.table import table
 
@@ -75,7 +76,7 @@ def push_mission(
     with ExitStack() as opened:
         with if_stopped(say, lambda: NOTHING_SENT):
             url, peer = opened.enter_context(_peer(line))
-        sent = made or _translated(mission, peer.autopilot, writing)
+        sent = made or _translated(mission, peer.autopilot.name, writing)
         if not leave.while_running:
             with logbook(url, peer.who.system, state) as book:
                 check_run_over(peer, url, book, "a push")
@@ -103,7 +104,7 @@ def fetch_mission(line: Line, *, out: Path | None, as_json: bool) -> None:
         write_atomic(out, FILES[out.suffix](peer, read, origin))
     if as_json:
         shown = {"file": str(out)} if out is not None else {"items": [_item_json(item) for item in own]}
-        print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot, "count": len(own), **shown})
+        print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot.name, "count": len(own), **shown})
     elif out is not None:
         tell(f"{out}: the {len(own)} items that {peer} holds")
     else:
@@ -118,7 +119,7 @@ def clear_mission(line: Line, *, state: Path | None, while_running: bool, as_jso
         had = clear(peer, while_running=while_running, tell=say)
         forget(book)
     if as_json:
-        print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot, "had": had})
+        print_json({"vehicle": peer.who.system, "autopilot": peer.autopilot.name, "had": had})
     else:
         tell(f"{peer} holds no mission (it had {had} items)")
 
@@ -147,7 +148,7 @@ def _peer(line: Line) -> Iterator[tuple[Url, Peer]]:
         _choice("--autopilot", line.autopilot, tuple(AUTOPILOTS))
     url, key = read_line(line.url, line.signing_key, insecure=line.insecure)
     with reached(url, vehicle=line.vehicle, signing_key=key, timeout_s=line.timeout_s) as peer:
-        peer.autopilot = line.autopilot or peer.autopilot
+        peer.autopilot = autopilot_named(line.autopilot) if line.autopilot else peer.autopilot
         yield url, peer
 
 
@@ -184,12 +185,12 @@ def _check_suffix(out: Path) -> None:
 
 
 def _json_file(peer: Peer, read: tuple[Item, ...], origin: Origin | None) -> bytes:
-    home_first = autopilot_named(peer.autopilot).home_first
+    home_first = peer.autopilot.home_first
     document = {
         "schema": "stopgo/items",
         "version": 1,
         "vehicle": peer.who.system,
-        "autopilot": peer.autopilot,
+        "autopilot": peer.autopilot.name,
         "origin": _origin_json(origin),
         "home": _item_json(read[0]) if home_first and read else None,
         "items": [_item_json(item) for item in own_items(peer, read)],
@@ -205,7 +206,7 @@ def _plan_file(peer: Peer, read: tuple[Item, ...], origin: Origin | None) -> byt
     home, own = _home(peer, read, origin), own_items(peer, read)
     speeds = [item.params[1] for item in own if item.command == Command.DO_CHANGE_SPEED]
     place = (home.x / STEPS_PER_DEGREE, home.y / STEPS_PER_DEGREE, home.z)
-    return qgc_plan.listed(own, peer.autopilot, home=place, speed=(*speeds, 1.0)[0])
+    return qgc_plan.listed(own, peer.autopilot.name, home=place, speed=(*speeds, 1.0)[0])
 
 
 FILES = {".json": _json_file, ".waypoints": _waypoints_file, ".plan": _plan_file}
@@ -214,7 +215,7 @@ FILES = {".json": _json_file, ".waypoints": _waypoints_file, ".plan": _plan_file
 
 def _home(peer: Peer, read: tuple[Item, ...], origin: Origin | None) -> Item:
     """The vehicle's home where it is among its items, else its origin, else the first place."""
-    if autopilot_named(peer.autopilot).home_first and read:
+    if peer.autopilot.home_first and read:
         return read[0]
     if origin is not None:
         return home_item(SiteOrigin(lat=origin.lat, lon=origin.lon, alt=origin.alt, heading_deg=0.0))
@@ -241,7 +242,7 @@ def _item_json(item: Item) -> dict[str, Any]:
 
 
 def _page(peer: Peer, own: tuple[Item, ...]) -> str:
-    sequence = autopilot_named(peer.autopilot).sequence
+    sequence = peer.autopilot.sequence
     rows = [
         (str(sequence(index)), item.name, *(f"{param:g}" for param in item.params), str(item.x), str(item.y))
         for index, item in enumerate(own)

@@ -6,9 +6,10 @@ commander's lease would count. To stop a vehicle must always be possible.
 
 from __future__ import annotations
 
-from bridge.mavlink.gateway.driving import DRIVING, Driving
-from bridge.mavlink.line.peer import autopilot_of, enum_name
+from bridge.mavlink.line.peer import enum_name
 from bridge.mavlink.line.wire import Message, dialect
+from mission.mavlink.autopilots import autopilot_of
+from mission.mavlink.autopilots.kind import Autopilot, Modes
 
 LOOKS = frozenset({
     "HEARTBEAT", "PING", "TIMESYNC", "SYSTEM_TIME", "COMMAND_CANCEL",
@@ -31,12 +32,12 @@ class Harmless:
     """Judges what goes to the vehicle by what it knows of it: its kind, from the heartbeats that pass."""
 
     def __init__(self) -> None:
-        self._kinds: dict[int, str] = {}
+        self._kinds: dict[int, Autopilot] = {}
 
     def sees(self, message: Message) -> None:
         """Look at a message that comes from the vehicle's side."""
         if message.get_type() == "HEARTBEAT" and message.get_srcComponent() == dialect.MAV_COMP_ID_AUTOPILOT1:
-            self._kinds[message.get_srcSystem()] = autopilot_of(message)
+            self._kinds[message.get_srcSystem()] = autopilot_of(message.autopilot)
 
     def lets_through(self, message: Message) -> bool:
         """Whether a message only looks, or stops."""
@@ -59,18 +60,16 @@ class Harmless:
         if message.command != dialect.MAV_CMD_DO_SET_MODE:
             return False
         meant = self._meant(message.target_system)
-        return bool(meant) and all(
-            driving.hold.main == main and driving.hold.sub in (0, sub) for driving in meant
-        )
+        return bool(meant) and all(modes.hold.main == main and modes.hold.sub in (0, sub) for modes in meant)
 
     def _holds(self, system: int, custom_mode: int) -> bool:
         meant = self._meant(system)
-        return bool(meant) and all(driving.mode_of(custom_mode) == driving.hold for driving in meant)
+        return bool(meant) and all(modes.of(custom_mode) == modes.hold for modes in meant)
 
-    def _meant(self, system: int) -> list[Driving]:
-        """How the vehicle is driven, or, for 0, all that were heard; empty if one is of an unknown kind."""
+    def _meant(self, system: int) -> list[Modes]:
+        """The vehicle's modes, or, for 0, all heard vehicles'; empty if one is of an unknown kind."""
         kinds = [kind for known, kind in self._kinds.items() if system in (0, known)]
-        return [DRIVING[kind] for kind in kinds] if all(kind in DRIVING for kind in kinds) else []
+        return [kind.modes for kind in kinds] if all(kind.drivable for kind in kinds) else []
 
 
 def described(message: Message) -> str:

@@ -16,8 +16,8 @@ from urllib.parse import parse_qsl
 from mission.document import Stop
 from mission.events import Pose
 from mission.geodesy import heading_of
-from mission.mavlink.autopilots import point_at
 from mission.mavlink.items import ItemList
+from mission.mavlink.read_back import point_at
 from mission.run.scans import ScanFailed, ScanResult, missing_in
 
 NEAR_M = 0.5

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from mission.document import SiteOrigin
-from mission.mavlink.autopilots import Autopilot
+from mission.mavlink.autopilots.kind import Autopilot
 
 Trigger = Literal["auto", "script", "camera", "none"]
 ScanWait = Literal["delay", "script_time"]

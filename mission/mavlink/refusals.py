@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from mission.document import Mission, SiteOrigin, Stop
 from mission.errors import AnswerIsNo, InputError
-from mission.mavlink.autopilots import Autopilot
+from mission.mavlink.autopilots.kind import Autopilot
+from mission.mavlink.fields import as_sent
 from mission.mavlink.items import Command, Placed
-from mission.mavlink.keeping import as_sent
 from mission.mavlink.manner import Manner
 from mission.run.scans import needs_heading
 from mission.sense import problems_of
@@ -18,8 +18,6 @@ LONGEST_SCRIPT_S = 255
 """NAV_SCRIPT_TIME keeps its timeout in a uint8."""
 LARGEST_SCRIPT_NUMBER = 32_767
 """NAV_SCRIPT_TIME keeps the stop's number in an int16."""
-LONGEST_HOLD_S = 32_767
-"""More is kept by ArduPilot and runs as 0 (measured)."""
 LATITUDE_LIMIT = 89.0
 """Degrees beyond which the autopilots' own rules of longitude no longer hold."""
 
@@ -118,15 +116,15 @@ def _check_waits(mission: Mission, stop: Stop, manner: Manner) -> None:
                 f"{mission.name}: stop {stop.id}: {field} is {seconds:g}, longer than the {longest:.0f} s "
                 f"that {manner.vehicle.name} waits; shorten it"
             )
-    if manner.settle == "hold" and not _can_be_held(stop.settle_s):
+    if manner.settle == "hold" and not _can_be_held(stop.settle_s, manner.vehicle):
         raise AnswerIsNo(
             f"{mission.name}: stop {stop.id}: settle_s is {stop.settle_s:g}, a hold is whole seconds up to "
-            f"{LONGEST_HOLD_S}; round it or settle by delay"
+            f"{manner.vehicle.longest_hold_s:.0f}; round it or settle by delay"
         )
 
 
-def _can_be_held(seconds: float) -> bool:
-    return seconds == round(seconds) and seconds <= LONGEST_HOLD_S
+def _can_be_held(seconds: float, vehicle: Autopilot) -> bool:
+    return seconds == round(seconds) and seconds <= vehicle.longest_hold_s
 
 
 def _check_handshake(mission: Mission, stop: Stop, number: int, manner: Manner) -> None:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from mission.document import Point, SiteOrigin
 from mission.errors import InputError
 from mission.geodesy import from_geodetic, from_steps, heading_of
-from mission.mavlink.autopilots import Autopilot, autopilot_named
+from mission.mavlink.autopilots import autopilot_named
+from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.back import number_carried
 from mission.mavlink.items import Command, Item, Placed
 

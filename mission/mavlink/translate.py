@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from mission.document import Mission, Stop
-from mission.mavlink.autopilots import Autopilot, autopilot_named
+from mission.mavlink.autopilots import autopilot_named
+from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.corners import corners
 from mission.mavlink.items import Command, Item, ItemList, Placed
 from mission.mavlink.manner import Manner, ScanWait, Settle, Trigger

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mission.document import Point, Stop
-from mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic
+from mission.geodesy import bearing_deg, to_geodetic, to_steps
 from mission.mavlink.items import NAN, Command, Frame, Item
 from mission.mavlink.manner import Manner
 
@@ -69,11 +69,11 @@ def capture(number: int) -> Item:
 
 
 def _waypoint(point: Point, manner: Manner, *, hold: float, yaw: float = 0.0, radius: float = 0.0) -> Item:
-    place = to_geodetic(manner.origin, point, manner.vehicle.rule)
+    x, y = to_steps(to_geodetic(manner.origin, point, manner.vehicle.rule))
     return Item(
         Command.NAV_WAYPOINT,
         manner.vehicle.frame,
         params=(float(hold), radius, 0.0, yaw),
-        x=round(place.lat * STEPS_PER_DEGREE),
-        y=round(place.lon * STEPS_PER_DEGREE),
+        x=x,
+        y=y,
     )

@@ -23,7 +23,6 @@ from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.hands import Hands
 from bridge.mavlink.desk.logbook import Logbook, logbook
 from bridge.mavlink.desk.lookout import TOLD, Lookout
-from bridge.mavlink.desk.modes import modes_of
 from bridge.mavlink.desk.orders import Consent, Orders
 from bridge.mavlink.desk.progress import held_by_vehicle
 from bridge.mavlink.line.peer import Peer, found
@@ -117,9 +116,8 @@ class Desk:
         self._peer = peer
         self._book = book
         self._wall: Clock = WallClock()
-        modes = modes_of(peer)
-        self._lookout = Lookout(modes, book.clock)
-        self._hands = Hands(peer, modes, self._lookout, book.clock)
+        self._lookout = Lookout(peer.autopilot, book.clock)
+        self._hands = Hands(peer, self._lookout, book.clock)
         self._orders = Orders(book, peer, self._lookout, self._hands, self._wall, options.consent)
         self._follower = Follower(book, peer, self._lookout, self._hands, looks_only=options.looks_only)
         self._link: MemoryLink = self.board.link()

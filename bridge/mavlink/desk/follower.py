@@ -12,7 +12,6 @@ from bridge.mavlink.desk import progress
 from bridge.mavlink.desk.hands import Denied, Hands
 from bridge.mavlink.desk.logbook import Logbook, Ordered, Owed
 from bridge.mavlink.desk.lookout import CLOCKS, Lookout
-from bridge.mavlink.desk.modes import AUTO
 from bridge.mavlink.desk.progress import SOMEBODY, Sight, steps, tried_again
 from bridge.mavlink.desk.visits import Course
 from bridge.mavlink.line.peer import Peer
@@ -20,7 +19,8 @@ from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.transfer.download import download
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.events import Arrived
-from mission.mavlink.autopilots import differences
+from mission.mavlink.autopilots.kind import AUTO
+from mission.mavlink.read_back import differences
 from mission.mavlink.telemetry import began_again
 from mission.run import states as runs
 from mission.run.states import Change, Run

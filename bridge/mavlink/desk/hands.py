@@ -8,10 +8,10 @@ from contextlib import suppress
 
 from bridge.clock import Clock
 from bridge.mavlink.desk.lookout import Lookout
-from bridge.mavlink.desk.modes import AUTO, HOLD, Modes
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.wire import dialect
 from mission.errors import OutcomeUnknown
+from mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
 from mission.run.orders import Refused
 
 SHOWS_S = 5.0
@@ -43,12 +43,11 @@ class Hands:
     `news` is notified whenever the lookout has taken a message.
     """
 
-    def __init__(self, peer: Peer, modes: Modes, lookout: Lookout, clock: Clock) -> None:
+    def __init__(self, peer: Peer, lookout: Lookout, clock: Clock) -> None:
         self.news = threading.Condition()
         self.working: Callable[[], None] = lambda: None
         """Called before each command."""
         self._peer = peer
-        self._modes = modes
         self._lookout = lookout
         self._clock = clock
         self._asked_ns = 0
@@ -79,11 +78,11 @@ class Hands:
 
     def hold(self) -> None:
         """Let it stand where it is."""
-        self._mode(HOLD)
+        self._mode(HOLD, self._peer.autopilot.modes.hold)
 
     def auto(self) -> None:
         """Let it follow its mission."""
-        self._mode(AUTO)
+        self._mode(AUTO, self._peer.autopilot.modes.auto)
 
     def jump(self, sequence: int, *, anew: bool = False) -> None:
         """Make an item the one it works on; a command that is no NAV command is passed at once.
@@ -111,9 +110,9 @@ class Hands:
         with suppress(OutcomeUnknown):
             self._peer.command(dialect.MAV_CMD_DO_CHANGE_SPEED, 1.0, metres_per_s, -1.0)
 
-    def _mode(self, name: str) -> None:
+    def _mode(self, name: str, mode: Mode) -> None:
         asked_ns = self._clock.now_ns()
-        self._order(dialect.MAV_CMD_DO_SET_MODE, *self._modes.params(name), what=f"mode {name}")
+        self._order(dialect.MAV_CMD_DO_SET_MODE, *mode.params, what=f"mode {name}")
         self._shown(
             lambda: self._lookout.mode == name and self._lookout.mode_ns > asked_ns, f"changing to {name}"
         )

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bridge.clock import Clock
-from bridge.mavlink.desk.modes import Modes
 from bridge.mavlink.desk.progress import Sight
 from bridge.mavlink.desk.visits import Course
 from bridge.mavlink.gateway.local import LocalFrame, local_frame
@@ -16,9 +15,11 @@ from bridge.mavlink.line.peer import Origin, origin_of
 from bridge.mavlink.line.wire import Message, dialect
 from mission.events import Arrived, Pose
 from mission.geodesy import heading_of
-from mission.mavlink.autopilots import autopilot_named, point_at
+from mission.mavlink.autopilots import autopilot_named
+from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.captures import Capture, Picture, capture_of
 from mission.mavlink.origin import is_elsewhere
+from mission.mavlink.read_back import point_at
 from mission.mavlink.telemetry import charge_of, is_lost, stands_still
 from mission.run.states import Run
 
@@ -52,8 +53,8 @@ class Fix:
 class Lookout:
     """Takes messages one after another; asked, it says what they come to."""
 
-    def __init__(self, modes: Modes, clock: Clock) -> None:
-        self._modes = modes
+    def __init__(self, autopilot: Autopilot, clock: Clock) -> None:
+        self._autopilot = autopilot
         self._clock = clock
         self._newest: dict[str, Seen] = {}
         self._captures: deque[Capture] = deque(maxlen=CAPTURES_KEPT)
@@ -125,7 +126,7 @@ class Lookout:
     def mode(self) -> str:
         """AUTO, HOLD or another; empty before a heartbeat."""
         seen = self._newest.get("HEARTBEAT")
-        return "" if seen is None else self._modes.name(seen.message)
+        return "" if seen is None else self._autopilot.mode_name(seen.message)
 
     @property
     def mode_ns(self) -> int:

@@ -9,7 +9,7 @@ from bridge.mavlink.desk.progress import Sight, passed_by
 from bridge.mavlink.desk.visits import Course
 from mission.document import Point
 from mission.events import Pose
-from mission.mavlink.autopilots import point_at
+from mission.mavlink.read_back import point_at
 from mission.run.states import Run
 
 PASSED = frozenset({"corner", "stop", "return"})

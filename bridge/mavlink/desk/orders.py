@@ -19,7 +19,6 @@ from bridge.mavlink.desk import progress
 from bridge.mavlink.desk.hands import Denied, Hands
 from bridge.mavlink.desk.logbook import Logbook, Ordered
 from bridge.mavlink.desk.lookout import Lookout
-from bridge.mavlink.desk.modes import AUTO, HOLD, why_unfit
 from bridge.mavlink.desk.onward import ON_WAY_M, onward, way
 from bridge.mavlink.desk.progress import Sight
 from bridge.mavlink.desk.visits import Course
@@ -28,7 +27,8 @@ from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.transfer.download import download
 from mission.document import Mission
 from mission.events import Pose
-from mission.mavlink.autopilots import differences
+from mission.mavlink.autopilots.kind import AUTO, HOLD, why_no_rover
+from mission.mavlink.read_back import differences
 from mission.run import states as runs
 from mission.run.decision import Decision, Situation, decide, handed_over
 from mission.run.lease import Lease
@@ -237,7 +237,7 @@ class Orders:
 
         In AUTO it would drive off as soon as it is armed, and a mode that is on is not begun anew.
         """
-        unfit = why_unfit(self._peer)
+        unfit = why_no_rover(self._peer.heartbeat.type)
         if unfit:
             raise Denied(Refused("unsupported", unfit))
         self._check_mission(course)

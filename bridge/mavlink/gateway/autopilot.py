@@ -12,12 +12,13 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from bridge.mavlink.gateway.driving import Driving, Mode, driving_of
 from bridge.mavlink.line.peer import Origin, Peer, found, origin_of
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import Box, Message, Who, dialect, wire
 from mission.document import Point
-from mission.errors import OutcomeUnknown, RobotUnreachable
+from mission.errors import InputError, OutcomeUnknown, RobotUnreachable
+from mission.mavlink.autopilots import AUTOPILOTS
+from mission.mavlink.autopilots.kind import Mode, why_no_rover
 from mission.mavlink.telemetry import charge_of, is_lost, stands_still
 
 ON_BOARD = Who(253, dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
@@ -89,7 +90,8 @@ def on_board(
         found(opened, vehicle, timeout_s=timeout_s, beat=on_board_beat) as peer,
         opened.filling(Heard(peer.who)) as heard,
     ):
-        autopilot = Autopilot(peer, heard, driving_of(peer.autopilot, peer.heartbeat.type))
+        _check_drivable(peer)
+        autopilot = Autopilot(peer, heard)
         try:
             autopilot.await_pose(timeout_s)
             with suppress(RobotUnreachable):
@@ -97,6 +99,17 @@ def on_board(
             yield autopilot
         finally:
             autopilot.close()
+
+
+def _check_drivable(peer: Peer) -> None:
+    if not peer.autopilot.drivable:
+        known = " and ".join(name for name, kind in AUTOPILOTS.items() if kind.drivable)
+        raise InputError(
+            f"--controller: an autopilot of kind {peer.autopilot.name!r} cannot be driven; {known} can"
+        )
+    no_rover = why_no_rover(peer.heartbeat.type)
+    if no_rover:
+        raise InputError(f"--controller: {no_rover}")
 
 
 def on_board_beat() -> Message:
@@ -109,9 +122,10 @@ def on_board_beat() -> Message:
 class Autopilot:
     """A vehicle that was found. Places are metres north and east of its origin, yaws clockwise from north."""
 
-    def __init__(self, peer: Peer, heard: Heard, driving: Driving) -> None:
+    def __init__(self, peer: Peer, heard: Heard) -> None:
         self.peer = peer
-        self.driving = driving
+        self.kind = peer.autopilot
+        self.modes = peer.autopilot.modes
         self.left: Mode | None = None
         """The mode in which we know it: any other was chosen by somebody else."""
         self._heard = heard
@@ -182,7 +196,7 @@ class Autopilot:
         return None if told is None else origin_of(told)
 
     def mode(self) -> Mode:
-        return self.driving.mode_of(self.peer.heartbeat.custom_mode)
+        return self.kind.mode_of(self.peer.heartbeat)
 
     def out_of_reach(self) -> str:
         """Why nobody knows where it is or what it does; empty if all is well."""
@@ -195,18 +209,18 @@ class Autopilot:
     def in_other_hands(self) -> str:
         """Who has it, if it is in a mode that is neither ours nor to hold; empty if it is not."""
         mode = self.mode()
-        if mode in (self.driving.guided, self.driving.hold):
+        if mode in (self.modes.guided, self.modes.hold):
             return ""
-        name = self.driving.name_of(mode)
+        name = self.modes.name(mode)
         return f"the autopilot is in {name}: somebody else drives it; to hand it over, switch it to HOLD"
 
     def changed_hands(self) -> str:
         """What somebody else has switched it to since we left or drove it; empty if nobody did."""
         mode = self.mode()
-        ours = self._stop_owed.is_set() and mode == self.driving.hold
+        ours = self._stop_owed.is_set() and mode == self.modes.hold
         if ours or self.left in (None, mode):
             return ""
-        return f"somebody switched the autopilot to {self.driving.name_of(mode)}"
+        return f"somebody switched the autopilot to {self.modes.name(mode)}"
 
     def leave(self) -> None:
         """Take the mode it is in for the one we know: whoever orders to go on knows of it.
@@ -255,8 +269,8 @@ class Autopilot:
         with self._turns:
             self._stop_owed.clear()
             self._guide_asked_s = time.monotonic()
-        self.left = guided = self.driving.guided
-        name = self.driving.name_of(guided)
+        self.left = guided = self.modes.guided
+        name = self.modes.name(guided)
         return self.order(dialect.MAV_CMD_DO_SET_MODE, *guided.params, what=f"the mode {name}")
 
     def is_guided(self) -> bool:
@@ -265,7 +279,7 @@ class Autopilot:
         if beat is None:
             self._say(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT)
             return False
-        return self.driving.mode_of(beat.custom_mode) == self.driving.guided
+        return self.kind.mode_of(beat) == self.modes.guided
 
     def stop(self) -> None:
         """Order to hold, and wait a moment to see it obeyed; it is ordered on until it is.
@@ -286,11 +300,11 @@ class Autopilot:
                 return
             beat = self._heard.since("HEARTBEAT", self._stop_asked_s + IN_FLIGHT_S)
             mode = self.mode()
-            if beat is not None and mode != self.driving.guided:
+            if beat is not None and mode != self.modes.guided:
                 self.leave()
                 self._stop_owed.clear()
-            elif mode in (self.driving.guided, self.driving.hold):
-                self._say(dialect.MAV_CMD_DO_SET_MODE, *self.driving.hold.params)
+            elif mode in (self.modes.guided, self.modes.hold):
+                self._say(dialect.MAV_CMD_DO_SET_MODE, *self.modes.hold.params)
         self._say(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT)
 
     def _keep(self) -> None:

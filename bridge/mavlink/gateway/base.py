@@ -84,13 +84,12 @@ class MavlinkBase:
 
     def unfit(self, mission: Mission) -> str:
         site, origin = mission.georeference, self.autopilot.origin()
-        driving = self.autopilot.driving
         if site is None:
             return "the mission has no georeference; plan it with --origin LAT,LON,ALT,HEADING"
-        if needs_heading(mission.scanner) and not driving.turns:
+        if needs_heading(mission.scanner) and not self.autopilot.kind.driving.turns:
             return (
                 f"the scanner sees {mission.scanner.fov_deg:g}°, so its stops need their headings,"
-                f" and {self.autopilot.peer.autopilot} turns to none by order"
+                f" and {self.autopilot.kind.name} turns to none by order"
             )
         return "" if origin is None else apart(site, origin)
 
@@ -121,13 +120,13 @@ class MavlinkBase:
             self._engage(limits, interrupt)
             for point in path:
                 self._drive(point, limits, interrupt)
-            if heading is not None and self.autopilot.driving.turns:
+            if heading is not None and self.autopilot.kind.driving.turns:
                 self._turn(heading, interrupt)
         except Ended as end:
             self._blocked_by = end.why
             self._leave_off()
             return end.outcome
-        if self.autopilot.driving.streams:
+        if self.autopilot.kind.driving.streams:
             self.autopilot.stop()
         return "arrived"
 
@@ -142,7 +141,7 @@ class MavlinkBase:
         if not autopilot.peer.armed:
             _must(autopilot.arm())
         here = autopilot.place()
-        if autopilot.driving.streams:
+        if autopilot.kind.driving.streams:
             self._aim_for(here, WARM_UP_S, interrupt)
         _must(autopilot.guide())
         began_s = self._now_s()
@@ -163,7 +162,7 @@ class MavlinkBase:
     def _limit_speed(self, here: Point, speed: float, interrupt: Event) -> None:
         """A speed counts only for a vehicle that has a place to go to, so it is told where it stands."""
         trouble = ""
-        for _ in range(3 if self.autopilot.driving.takes_speed else 0):
+        for _ in range(3 if self.autopilot.kind.driving.takes_speed else 0):
             self.autopilot.aim(here)
             self._tick(interrupt)
             trouble = self.autopilot.limit_speed(speed)
@@ -179,7 +178,7 @@ class MavlinkBase:
         while True:
             self._tick(interrupt)
             lost = self.autopilot.still() and self._now_s() - told_s >= AGAIN_S
-            if lost or self.autopilot.driving.streams:
+            if lost or self.autopilot.kind.driving.streams:
                 self.autopilot.aim(target)
                 told_s = self._now_s()
             here = self.pose()
@@ -256,7 +255,7 @@ class MavlinkBase:
         return self._local
 
     def _framed(self, site: SiteOrigin | None, origin: Origin | None) -> LocalFrame:
-        rule = self.autopilot.driving.rule
+        rule = self.autopilot.kind.rule
         if site is None:
             return UNPLACED
         if origin is None or apart(site, origin):

@@ -19,6 +19,8 @@ from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import SIGNATURE, Box, Message, Who, Wire, dialect, sender, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from mission.geodesy import STEPS_PER_DEGREE, Geodetic
+from mission.mavlink.autopilots import autopilot_of
+from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.telemetry import began_again
 
 PATIENCE_S = 5.0
@@ -32,19 +34,6 @@ KNOCK_S = 0.3
 CLOCKS = (dialect.MAVLINK_MSG_ID_SYSTEM_TIME, dialect.MAVLINK_MSG_ID_ATTITUDE)
 UNSET_ANSWERS = 8
 """So often a vehicle takes the question and sends nothing before that means there is nothing to send."""
-AUTOPILOTS = {dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot", dialect.MAV_AUTOPILOT_PX4: "px4"}
-"""Names by which `mission.mavlink.autopilots` knows them; all others are `generic`."""
-ARDUPILOT_AUTO = {
-    dialect.MAV_TYPE_FIXED_WING: 10,
-    dialect.MAV_TYPE_GROUND_ROVER: 10,
-    dialect.MAV_TYPE_SURFACE_BOAT: 10,
-}
-"""custom_mode of AUTO by type of vehicle; copters and submarines have 3."""
-PX4_AUTO_MISSION = 4 << 16 | 4 << 24
-"""Main mode AUTO, sub-mode MISSION."""
-PX4_AUTO_LOITER = 4 << 16 | 3 << 24
-"""Main mode AUTO, in which PX4 holds as well; others that number their modes so do the same."""
-
 UNSAID: tuple[float, ...] = (0.0,) * 7
 
 
@@ -129,12 +118,14 @@ class Newest(Box):
 class Peer:
     """A vehicle that was found on a wire."""
 
-    def __init__(self, wire: Wire, newest: Newest, autopilot: str, patience_s: float = PATIENCE_S) -> None:
+    def __init__(
+        self, wire: Wire, newest: Newest, autopilot: Autopilot, patience_s: float = PATIENCE_S
+    ) -> None:
         assert newest.of is not None
         self.wire = wire
         self.who = newest.of
         self.autopilot = autopilot
-        """"ardupilot", "px4" or "generic"."""
+        """Its kind."""
         self.patience_s = patience_s
         self.round_trips = RoundTrips()
         self.in_order = False
@@ -143,7 +134,7 @@ class Peer:
         self._ordering = threading.Lock()
 
     def __str__(self) -> str:
-        return f"vehicle {self.who.system} ({self.autopilot})"
+        return f"vehicle {self.who.system} ({self.autopilot.name})"
 
     @property
     def heartbeat(self) -> Message:
@@ -157,7 +148,7 @@ class Peer:
     @property
     def in_auto(self) -> bool:
         """Whether it is in the mode in which it follows the mission it holds."""
-        return in_auto(self.heartbeat, self.autopilot)
+        return self.autopilot.in_auto(self.heartbeat)
 
     @property
     def silent_s(self) -> float:
@@ -408,7 +399,7 @@ def found(
     newest = Newest(sender(heartbeat))
     newest.put(heartbeat)
     with wire.filling(newest):
-        yield Peer(wire, newest, autopilot_of(heartbeat), timeout_s)
+        yield Peer(wire, newest, autopilot_of(heartbeat.autopilot), timeout_s)
 
 
 def station_beat() -> Message:
@@ -416,20 +407,6 @@ def station_beat() -> Message:
     return dialect.MAVLink_heartbeat_message(
         dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
     )
-
-
-def autopilot_of(heartbeat: Message) -> str:
-    return AUTOPILOTS.get(heartbeat.autopilot, "generic")
-
-
-def in_auto(heartbeat: Message, autopilot: str) -> bool:
-    """Whether a vehicle is in the mode in which it follows the mission it holds."""
-    if autopilot == "ardupilot":
-        return heartbeat.custom_mode == ARDUPILOT_AUTO.get(heartbeat.type, 3)
-    if autopilot == "px4":
-        return heartbeat.custom_mode == PX4_AUTO_MISSION
-    holds = heartbeat.custom_mode == PX4_AUTO_LOITER
-    return not holds and bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_AUTO_ENABLED)
 
 
 def enum_name(enum: str, number: int) -> str:
@@ -480,7 +457,7 @@ def _meant(wire: Wire, heard: dict[int, Message], vehicle: int | None, timeout_s
         return next(iter(heard.values()))
     if vehicle in heard:
         return heard[vehicle]
-    names = ", ".join(f"{system} ({autopilot_of(heard[system])})" for system in sorted(heard))
+    names = ", ".join(f"{system} ({autopilot_of(heard[system].autopilot).name})" for system in sorted(heard))
     if vehicle is None and heard:
         raise InputError(f"{wire.name}: several vehicles: {names}; name one with --vehicle ID")
     whom = "no vehicle" if vehicle is None else f"no vehicle {vehicle}"

@@ -9,8 +9,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.mavlink.line.wire import Message, Who
 from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.fields import PLACED
 from mission.mavlink.items import Item
-from mission.mavlink.keeping import PLACED
 
 STEPPED = PLACED | frozenset(range(5000, 5005)) | {5100}
 """Commands whose x and y are degrees."""

@@ -13,20 +13,19 @@ from typing import Literal
 
 from bridge.mavlink.simulated.camera import Camera
 from bridge.mavlink.simulated.faults import Mishaps
-from bridge.mavlink.simulated.profile import Profile
 from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.store import Items, Store
 from mission.document import Point
+from mission.mavlink import back as recognised
+from mission.mavlink.autopilots.kind import Autopilot
+from mission.mavlink.back import TRIGGERS, WAITS
 from mission.mavlink.items import Command, Item
 
-PLACES = frozenset({Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME, 17})
-NAV = PLACES | {Command.NAV_DELAY, Command.NAV_SCRIPT_TIME, 20}
+STAYS, HOMES = 17, 20
+"""NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH."""
+PLACES = recognised.PLACES | {STAYS}
+NAV = PLACES | WAITS | {HOMES}
 """Commands that take time; every other one is done at once or skipped."""
-TRIGGERS = frozenset(
-    {Command.DO_SEND_SCRIPT_MESSAGE, Command.IMAGE_START_CAPTURE, Command.DO_DIGICAM_CONTROL}
-)
-LONGEST_HOLD_S = 32_767
-"""ArduPilot takes a longer hold for none (measured)."""
 State = Literal["idle", "active", "complete"]
 Phase = Literal["driving", "holding", "waiting", "script", "lost", "rebooting"]
 
@@ -49,16 +48,16 @@ class Course:
 
     def __init__(
         self,
-        profile: Profile,
+        autopilot: Autopilot,
         store: Store,
         rover: Rover,
         camera: Camera,
         mishaps: Mishaps,
         tells: Tells,
     ) -> None:
-        self._profile, self._store, self._rover = profile, store, rover
+        self._autopilot, self._store, self._rover = autopilot, store, rover
         self._camera, self._mishaps, self._tells = camera, mishaps, tells
-        self._first = 1 if profile.autopilot.home_first else 0
+        self._first = 1 if autopilot.home_first else 0
         self._phase: Phase = "lost"
         self._item: Item | None = None
         self.state: State = "idle"
@@ -99,7 +98,7 @@ class Course:
 
     def replaced(self, marked: int | None, now_ns: int) -> None:
         """Another list has come, or none."""
-        keeps = self._profile.restarts_item and self.current < len(self._store.kept.mission)
+        keeps = self._autopilot.habits.restarts_item and self.current < len(self._store.kept.mission)
         number = self.current if keeps else (marked or 0)
         active, self.state = self.state == "active", "idle"
         self.current = number
@@ -117,7 +116,7 @@ class Course:
             self._tells.reboot()
         elif self._phase == "driving" and (hold_s := self._hold_s()) > 0:
             self._phase, self.due_ns = "holding", now_ns + _ns(hold_s)
-        elif self._phase == "driving" and self._item and self._item.command == 17:
+        elif self._phase == "driving" and self._item and self._item.command == STAYS:
             return  # stays there until told otherwise
         else:
             self._tells.reached(self.current)
@@ -151,7 +150,7 @@ class Course:
             self._tells.trigger(*_scan_of(items, number), now_ns)
 
     def _begin(self, item: Item, now_ns: int) -> None:
-        if item.command in PLACES or item.command == 20:
+        if item.command in PLACES or item.command == HOMES:
             self._drive(item, now_ns)
         elif item.command == Command.NAV_DELAY:
             self._phase, self.due_ns = "waiting", now_ns + _ns(item.params[0])
@@ -185,7 +184,7 @@ class Course:
     def _heading(self, item: Item) -> float | None:
         """Counter-clockwise from east, if the vehicle turns to it and the item says it."""
         yaw = item.params[3]
-        turns = self._profile.autopilot.turns and item.command == Command.NAV_WAYPOINT
+        turns = self._autopilot.turns and item.command == Command.NAV_WAYPOINT
         return math.pi / 2 - math.radians(yaw) if turns and math.isfinite(yaw) else None
 
     def _hold_s(self) -> float:
@@ -195,7 +194,7 @@ class Course:
         if self._mishaps.due("finish", self.current):
             return 0.0
         hold = item.params[0]
-        return 0.0 if self._profile.name == "ardupilot" and hold > LONGEST_HOLD_S else hold
+        return 0.0 if hold > self._autopilot.longest_hold_s else hold
 
 
 def _scan_of(items: Items, number: int) -> tuple[int, float]:

@@ -10,11 +10,12 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.mavlink.line.wire import Message, Who
 from bridge.mavlink.simulated import telemetry
-from bridge.mavlink.simulated.profile import CUSTOM, ModeName
 from bridge.mavlink.simulated.rover import FAR_M
 from bridge.mavlink.simulated.vehicle import Handlers, Vehicle
 from mission.document import SiteOrigin
 from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.autopilots.kind import Mode, ModeName
+from mission.mavlink.enums import ModeFlag
 from mission.mavlink.items import Command
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
@@ -101,7 +102,7 @@ def _reboot(vehicle: Vehicle, who: Who, order: Order) -> None:
 
 def _no(vehicle: Vehicle) -> int:
     """How the autopilot says no to what it could do at other times."""
-    return int(FAILED if vehicle.profile.name == "ardupilot" else DENIED)
+    return int(vehicle.autopilot.habits.says_no)
 
 
 def _arm(vehicle: Vehicle, order: Order) -> int:
@@ -114,8 +115,7 @@ def _arm(vehicle: Vehicle, order: Order) -> int:
 
 def _set_mode(vehicle: Vehicle, order: Order) -> int:
     main, sub = order.whole(1), order.whole(2)
-    custom = main if vehicle.profile.name == "ardupilot" else sub << 24 | main << 16
-    return _change_mode(vehicle, order.whole(0, 0), custom)
+    return _change_mode(vehicle, order.whole(0, 0), vehicle.autopilot.modes.custom(Mode(main, sub)))
 
 
 def _change_mode(vehicle: Vehicle, flags: int, custom: int) -> int:
@@ -127,19 +127,19 @@ def _change_mode(vehicle: Vehicle, flags: int, custom: int) -> int:
 
 def _mode_of(vehicle: Vehicle, flags: int, custom: int) -> ModeName | None:
     """By its custom number; without one by the flags alone, which only the specification's vehicle knows."""
-    if flags & CUSTOM:
-        modes = vehicle.profile.modes.items()
-        return next((name for name, mode in modes if mode.custom == custom), None)
-    if vehicle.profile.name != "strict":
+    modes = vehicle.autopilot.modes
+    if flags & ModeFlag.CUSTOM_MODE_ENABLED:
+        return next((name for name, mode in modes.numbers.items() if modes.custom(mode) == custom), None)
+    if not vehicle.autopilot.habits.modes_by_flags:
         return None
-    if flags & dialect.MAV_MODE_FLAG_AUTO_ENABLED:
+    if flags & ModeFlag.AUTO_ENABLED:
         return "auto"
-    return "guided" if flags & dialect.MAV_MODE_FLAG_GUIDED_ENABLED else "manual"
+    return "guided" if flags & ModeFlag.GUIDED_ENABLED else "manual"
 
 
 def _set_mode_message(vehicle: Vehicle, who: Who, message: Message) -> None:
     result = _change_mode(vehicle, message.base_mode, message.custom_mode)
-    if vehicle.profile.name == "ardupilot":
+    if vehicle.autopilot.habits.acknowledges_set_mode:
         _acknowledge(vehicle, who, dialect.MAVLINK_MSG_ID_SET_MODE, result)
 
 
@@ -157,19 +157,18 @@ def _set_current_message(vehicle: Vehicle, message: Message) -> None:
 
 
 def _start(vehicle: Vehicle, order: Order) -> int:
-    """ArduPilot takes no first item; PX4 arms as well (source)."""
-    first = order.whole(0, 0)
-    if first > 0 and (vehicle.profile.name == "ardupilot" or not vehicle.course.jump(first, vehicle.now_ns)):
+    first, habits = order.whole(0, 0), vehicle.autopilot.habits
+    if first > 0 and not (habits.start_takes_item and vehicle.course.jump(first, vehicle.now_ns)):
         return int(DENIED)
     if not vehicle.set_mode("auto"):
         return _no(vehicle)
-    if vehicle.profile.name == "px4":
+    if habits.start_arms:
         vehicle.arm()
     return int(ACCEPTED)
 
 
 def _pause(vehicle: Vehicle, order: Order) -> int:
-    if vehicle.profile.name != "strict":
+    if not vehicle.autopilot.habits.pauses_by_command:
         return int(UNSUPPORTED)
     return int(ACCEPTED) if vehicle.set_mode("auto" if order.params[0] == 1 else "hold") else int(DENIED)
 
@@ -178,7 +177,7 @@ def _reposition(vehicle: Vehicle, order: Order) -> int:
     """param1 is a speed (-1: as it is), param2 1 allows the change of mode, param4 is radians from north."""
     if not order.exact:
         return int(dialect.MAV_RESULT_COMMAND_INT_ONLY)
-    point, mode = vehicle.rover.point(order.x, order.y), vehicle.profile.reposition_mode
+    point, mode = vehicle.rover.point(order.x, order.y), vehicle.autopilot.driving.reposition_mode
     allowed = vehicle.mode == mode or order.whole(1, 0) & CHANGE_MODE
     if point is None or not vehicle.armed or not allowed:
         return int(DENIED)
@@ -190,14 +189,13 @@ def _reposition(vehicle: Vehicle, order: Order) -> int:
 
 def _heading(vehicle: Vehicle, yaw: float) -> float | None:
     """Counter-clockwise from east, of radians from north; None if it is none, or none that it turns to."""
-    turns = vehicle.profile.autopilot.turns and math.isfinite(yaw) and abs(yaw) < 100
+    turns = vehicle.autopilot.turns and math.isfinite(yaw) and abs(yaw) < 100
     return math.pi / 2 - yaw if turns else None
 
 
 def _change_speed(vehicle: Vehicle, order: Order) -> int:
-    """ArduPilot takes a speed only while it goes somewhere (source)."""
     drives = vehicle.course.state == "active" or vehicle.lead.goes_somewhere
-    if vehicle.profile.name == "ardupilot" and not drives:
+    if vehicle.autopilot.habits.speed_while_driving and not drives:
         return int(FAILED)
     if not vehicle.rover.set_speed(order.params[1]):
         return int(DENIED)
@@ -238,7 +236,7 @@ def _capture(vehicle: Vehicle, order: Order) -> int:
 
 def _script_message(vehicle: Vehicle, order: Order) -> int:
     """DO_SEND_SCRIPT_MESSAGE: param2 is the number, param3 the seconds."""
-    if vehicle.profile.name != "ardupilot":
+    if Command.DO_SEND_SCRIPT_MESSAGE not in vehicle.autopilot.commands:
         return int(UNSUPPORTED)
     return _scan(vehicle, order, order.whole(1, 0), order.params[2])
 
@@ -307,7 +305,7 @@ def _target_global(vehicle: Vehicle, message: Message) -> None:
 
 def _turn(vehicle: Vehicle, message: Message) -> None:
     """To a yaw without a place. Speeds and accelerations, which may come instead, are not followed."""
-    leads = vehicle.mode == "guided" and vehicle.armed and vehicle.profile.yaw_alone
+    leads = vehicle.mode == "guided" and vehicle.armed and vehicle.autopilot.driving.turns
     if leads and not message.type_mask & IGNORE_YAW and math.isfinite(message.yaw) and abs(message.yaw) < 100:
         vehicle.lead.turn(math.pi / 2 - message.yaw, vehicle.now_ns)
 

@@ -9,20 +9,24 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.mavlink.line.wire import Message, Who
 from bridge.mavlink.simulated.scanner import DEFAULT_S, LONGEST_S
+from mission.mavlink.autopilots.kind import Habits
 
 SCAN_TIME = "SIM_SCAN_TIME"
 """Seconds that a scan takes if its trigger does not say."""
-SPEED = {"ardupilot": "WP_SPEED", "px4": "GND_SPEED_TRIM", "strict": "SPEED"}
-SYSTEM = {"ardupilot": "SYSID_THISMAV", "px4": "MAV_SYS_ID", "strict": "SYSTEM_ID"}
 REAL32 = dialect.MAV_PARAM_TYPE_REAL32
 
 
 class Parameters:
     """Named numbers, float32 on the wire."""
 
-    def __init__(self, profile: str, *, speed: float, set_speed: Callable[[float], bool]) -> None:
-        self._speed, self._set_speed = SPEED[profile], set_speed
-        self._values = {SYSTEM[profile]: 1.0, self._speed: speed, "WP_RADIUS": 0.1, SCAN_TIME: DEFAULT_S}
+    def __init__(self, habits: Habits, *, speed: float, set_speed: Callable[[float], bool]) -> None:
+        self._speed, self._set_speed = habits.speed_parameter, set_speed
+        self._values = {
+            habits.system_parameter: 1.0,
+            self._speed: speed,
+            "WP_RADIUS": 0.1,
+            SCAN_TIME: DEFAULT_S,
+        }
 
     @property
     def scan_s(self) -> float:

@@ -122,7 +122,7 @@ def setting_of(options: VehicleOptions) -> Setting:
         None if origin is None else SiteOrigin(lat=origin.lat, lon=origin.lon, alt=origin.alt, heading_deg=0)
     )
     return Setting(
-        profile=profile_named(options.profile),
+        autopilot=profile_named(options.profile),
         state=options.state,
         origin=level,
         at=None if options.at is None else to_east(options.at, heading),

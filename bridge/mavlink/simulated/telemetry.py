@@ -7,9 +7,9 @@ import math
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.mavlink.line.wire import Message
-from bridge.mavlink.simulated.profile import ARMED, CUSTOM
 from bridge.mavlink.simulated.rover import bearing
 from bridge.mavlink.simulated.vehicle import BATTERY_NS, Maker, Vehicle
+from mission.mavlink.enums import ModeFlag
 
 CAPABILITIES = (
     dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
@@ -25,12 +25,12 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
 def heartbeat(vehicle: Vehicle) -> Message:
-    mode = vehicle.profile.modes[vehicle.mode]
-    flags = mode.flags | (ARMED if vehicle.armed else 0)
+    modes = vehicle.autopilot.modes
+    flags = modes.flags[vehicle.mode] | (ModeFlag.SAFETY_ARMED if vehicle.armed else 0)
     status = dialect.MAV_STATE_ACTIVE if vehicle.armed else dialect.MAV_STATE_STANDBY
     rover = dialect.MAV_TYPE_GROUND_ROVER
     return dialect.MAVLink_heartbeat_message(
-        rover, vehicle.profile.firmware, flags | CUSTOM, mode.custom, status, 3
+        rover, vehicle.autopilot.firmware, flags, modes.custom(modes.numbers[vehicle.mode]), status, 3
     )
 
 
@@ -134,7 +134,7 @@ def mission_state(vehicle: Vehicle) -> int:
         return int(dialect.MISSION_STATE_ACTIVE)
     if course.state == "complete":
         return int(dialect.MISSION_STATE_COMPLETE)
-    paused = vehicle.profile.pauses and course.current > 0
+    paused = vehicle.autopilot.habits.pauses and course.current > 0
     return int(dialect.MISSION_STATE_PAUSED if paused else dialect.MISSION_STATE_NOT_STARTED)
 
 

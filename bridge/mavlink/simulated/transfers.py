@@ -1,4 +1,4 @@
-"""The vehicle's end of the mission protocol: lists of items that come and go, by its profile's habits."""
+"""The vehicle's end of the mission protocol: lists of items that come and go, by the habits of its kind."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from bridge.clock import Clock
 from bridge.mavlink.line.wire import Message, Who
 from bridge.mavlink.simulated.carried import float_message, int_message, item_of
 from bridge.mavlink.simulated.faults import Mishaps
-from bridge.mavlink.simulated.profile import Profile
 from bridge.mavlink.simulated.store import ALL, FENCE, MISSION, RALLY, Items, Store
 from bridge.mavlink.simulated.validate import ACCEPTED, verdict
+from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.items import Item
 
 KINDS = (MISSION, FENCE, RALLY)
@@ -59,7 +59,7 @@ class Transfers:
 
     def __init__(
         self,
-        profile: Profile,
+        autopilot: Autopilot,
         store: Store,
         clock: Clock,
         *,
@@ -71,7 +71,9 @@ class Transfers:
         event: Callable[[int], bool],
         mishaps: Mishaps,
     ) -> None:
-        self._profile, self._store, self._clock = profile, store, clock
+        self._autopilot, self._habits = autopilot, autopilot.habits
+        self._one_by_one = autopilot.gives_items == "in order"
+        self._store, self._clock = store, clock
         self._say, self._text, self._home, self._stored = say, text, home, stored
         self._running, self._event, self._mishaps = running, event, mishaps
         self._upload: Upload | None = None
@@ -98,36 +100,36 @@ class Transfers:
 
     def tick(self) -> None:
         """Ask again, or give up."""
-        now, up, down, profile = self._clock.now_ns(), self._upload, self._download, self._profile
-        if up and now - up.heard_ns > profile.give_up_s * 1e9:
+        now, up, down, habits = self._clock.now_ns(), self._upload, self._download, self._habits
+        if up and now - up.heard_ns > habits.give_up_s * 1e9:
             self._upload = None
-            if profile.tells_giving_up:
+            if habits.tells_giving_up:
                 self._ack(up.station, dialect.MAV_MISSION_OPERATION_CANCELLED, up.kind)
-        elif up and now - up.asked_ns >= profile.ask_again_s * 1e9:
+        elif up and now - up.asked_ns >= habits.ask_again_s * 1e9:
             self._ask(up)
-        if down and now - down.heard_ns > profile.give_up_s * 1e9:
+        if down and now - down.heard_ns > habits.give_up_s * 1e9:
             self._download = None
 
     def items(self, kind: int) -> Items:
         """The list as stations read it: with the vehicle's own home in front where it has one."""
         items = self._store.items(kind)
-        if kind == MISSION and self._profile.autopilot.home_first and items:
+        if kind == MISSION and self._autopilot.home_first and items:
             return (self._home(), *items[1:])
         return items
 
     # What comes
 
     def _count(self, who: Who, message: Message) -> None:
-        up, profile, kind = self._upload, self._profile, message.mission_type
+        up, habits, kind = self._upload, self._habits, message.mission_type
         if kind not in KINDS:
             return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
         if up and up.station != who:
-            return self._ack(who, profile.stranger, kind)
-        if up and up.items and not profile.begins_again:
+            return self._ack(who, habits.other_station, kind)
+        if up and up.items and not habits.begins_again:
             return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
-        if self._download and profile.in_order:
+        if self._download and self._one_by_one:
             return self._ack(who, dialect.MAV_MISSION_ERROR, kind)  # source: busy, until it is acknowledged
-        if message.count > profile.autopilot.max_items:
+        if message.count > self._autopilot.max_items:
             return self._ack(who, dialect.MAV_MISSION_NO_SPACE, kind)
         self._begin(who, kind, message.count)
 
@@ -136,7 +138,7 @@ class Transfers:
         if count == 0:
             self._replace(kind, (), None)
             return self._ack(who, ACCEPTED, kind)
-        if not self._profile.atomic:
+        if not self._habits.atomic:
             self._store.put(kind, self._store.items(kind)[:count])
         self._upload = Upload(who, kind, count, heard_ns=self._clock.now_ns())
         self._ask(self._upload)
@@ -166,14 +168,14 @@ class Transfers:
         fault = self._mishaps.once("nack", number)
         if fault:
             return int(fault.amount) or int(dialect.MAV_MISSION_ERROR)
-        return verdict(self._profile, up.kind, item)
+        return verdict(self._autopilot, up.kind, item)
 
     def _take(self, up: Upload, item: Item, *, marked: bool) -> None:
         number = len(up.items)
-        up.items.append(self._profile.autopilot.kept(item))
+        up.items.append(self._autopilot.kept(item))
         if marked:
             up.marked = number
-        if not self._profile.atomic:
+        if not self._habits.atomic:
             old = self._store.items(up.kind)
             self._store.put(up.kind, (*old[:number], up.items[-1], *old[number + 1 :]))
         if len(up.items) < up.count:
@@ -186,20 +188,20 @@ class Transfers:
 
     def _stray(self, up: Upload) -> None:
         """An item that was not asked for; the station is alive, though ArduPilot does not count it."""
-        if self._profile.strays != "tell":
+        if self._habits.strays != "tell":
             up.heard_ns = self._clock.now_ns()
-        if self._profile.strays == "tell":
+        if self._habits.strays == "tell":
             self._ack(up.station, dialect.MAV_MISSION_INVALID_SEQUENCE, up.kind)
-        elif self._profile.strays == "ask":
+        elif self._habits.strays == "ask":
             self._ask(up)
 
     def _no_upload(self, who: Who, message: Message) -> None:
         """An item without an upload: a late copy of one that is over, or nonsense."""
         kind, done = message.mission_type, self._done
         if (who, kind, message.seq) == done:
-            return self._ack(who, self._profile.last_again, kind)
+            return self._ack(who, self._habits.last_again, kind)
         late = done is not None and (who, kind) == done[:2] and message.seq < done[2]
-        if not (late and self._profile.name == "strict"):
+        if not (late and self._habits.forgives_late):
             self._ack(who, dialect.MAV_MISSION_ERROR, kind)
 
     def _request_list(self, who: Who, message: Message) -> None:
@@ -208,7 +210,7 @@ class Transfers:
             return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
         if self._upload:
             return self._busy(who, kind)
-        if self._profile.in_order:
+        if self._one_by_one:
             if self._download and (self._download.station, self._download.kind) != (who, kind):
                 return self._busy(who, kind)
             self._download = Download(who, kind, heard_ns=self._clock.now_ns())
@@ -220,15 +222,15 @@ class Transfers:
             return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
         if self._upload:
             return self._busy(who, kind)
-        if self._profile.in_order and not self._in_order(who, kind, number):
+        if self._one_by_one and not self._in_order(who, kind, number):
             return
         items = self.items(kind)
-        if kind == MISSION and self._profile.autopilot.home_first and not items:
+        if kind == MISSION and self._autopilot.home_first and not items:
             items = (self._home(),)  # source: home can always be read
         if number < len(items):
             whole = message.get_type() == "MISSION_REQUEST_INT"
             return self._say((int_message if whole else float_message)(who, kind, number, items[number]))
-        if self._profile.name == "ardupilot":
+        if self._habits.counts_again:
             self._say_count(who, kind)
             return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
         self._ack(who, dialect.MAV_MISSION_INVALID_SEQUENCE, kind)
@@ -249,10 +251,10 @@ class Transfers:
         kind = message.mission_type
         if kind not in (*KINDS, ALL):
             return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
-        if (self._upload or self._download) and self._profile.in_order:
+        if (self._upload or self._download) and self._one_by_one:
             return self._busy(who, kind)
         drives = kind in (MISSION, ALL) and self._running()
-        if self._upload or (drives and not self._profile.clears_in_auto):
+        if self._upload or (drives and not self._habits.clears_in_auto):
             return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
         for one in KINDS if kind == ALL else (kind,):
             self._replace(one, (), None)
@@ -262,16 +264,16 @@ class Transfers:
         up, down = self._upload, self._download
         if down and (down.station, down.kind) == (who, message.mission_type):
             self._download = None
-        ends = message.type == dialect.MAV_MISSION_OPERATION_CANCELLED and self._profile.cancels
+        ends = message.type == dialect.MAV_MISSION_OPERATION_CANCELLED and self._habits.cancels
         if up and ends and (up.station, up.kind) == (who, message.mission_type):
             self._upload = None
 
     def _busy(self, who: Who, kind: int) -> None:
         """Somebody's upload is under way: PX4 says so to people only (source)."""
-        if self._profile.name == "px4":
+        if self._habits.busy_in_words:
             self._text("Busy with a mission transfer")
         else:
-            self._ack(who, self._profile.stranger, kind)
+            self._ack(who, self._habits.other_station, kind)
 
     def _partial(self, who: Who, message: Message) -> None:
         self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
@@ -282,14 +284,14 @@ class Transfers:
         """The same list again changes nothing on PX4 (source: it compares a checksum)."""
         same = _same(self._store.items(kind), items)
         self._store.put(kind, items)
-        if not (same and self._profile.name == "px4"):
+        if not (same and self._habits.same_is_nothing):
             self._stored(kind, marked)
 
     def _ask(self, up: Upload) -> None:
         up.asked_ns = self._clock.now_ns()
         asking = (
             dialect.MAVLink_mission_request_int_message
-            if self._profile.asks_int
+            if self._habits.asks_int
             else dialect.MAVLink_mission_request_message
         )
         self._say(asking(up.station.system, up.station.component, len(up.items), up.kind))

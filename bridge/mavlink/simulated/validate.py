@@ -6,17 +6,15 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from bridge.mavlink.simulated.profile import Profile
 from bridge.mavlink.simulated.store import FENCE, MISSION
 from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.autopilots.kind import Autopilot
+from mission.mavlink.fields import PLACED
 from mission.mavlink.items import Frame, Item
-from mission.mavlink.keeping import PLACED
 
 ACCEPTED = dialect.MAV_MISSION_ACCEPTED
 FENCE_COMMANDS = range(5000, 5005)
 RALLY_COMMANDS = range(5100, 5101)
-ARDUPILOT_HIGHEST_M = 83_000
-"""Source: LOCATION_ALT_MAX_M."""
 GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})
 PX4_FRAMES = frozenset({0, 3, 5, 6})
 INVALID_PARAM = (
@@ -27,24 +25,24 @@ MAY_BE_NAN = {16: (3,), 17: (3,), 19: (3,), 21: (3,), 22: (3,), 2000: (1, 2, 3),
 """Params that may be NaN, "not said", in a mission's item; nowhere else."""
 
 
-def verdict(profile: Profile, kind: int, item: Item) -> int:
+def verdict(autopilot: Autopilot, kind: int, item: Item) -> int:
     """The MAV_MISSION_RESULT for one item of a mission, fence or rally list."""
     if kind != MISSION:
         return _of_area(kind, item)
-    if item.command not in profile.commands:
+    if item.command not in autopilot.habits.takes:
         return dialect.MAV_MISSION_UNSUPPORTED
     placed = item.command in PLACED
-    if profile.name == "px4":
-        return _of_px4(item, placed)
+    if autopilot.habits.checks_frame_first:
+        return _frame_first(item, placed)
     if placed and item.frame not in GLOBAL_FRAMES | {Frame.MISSION}:
         return dialect.MAV_MISSION_UNSUPPORTED_FRAME
-    if placed and profile.name == "ardupilot" and abs(item.z) >= ARDUPILOT_HIGHEST_M:
+    if placed and abs(item.z) >= autopilot.habits.highest_m:
         return dialect.MAV_MISSION_INVALID_PARAM7
     return _of_numbers(item, MAY_BE_NAN.get(item.command, ())) or (_of_place(item) if placed else ACCEPTED)
 
 
-def _of_px4(item: Item, placed: bool) -> int:
-    """PX4 looks at the frame first, and hardly at numbers (source); places off the earth are refused here."""
+def _frame_first(item: Item, placed: bool) -> int:
+    """The frame is looked at first, and numbers hardly; places off the earth are refused here."""
     if item.frame not in PX4_FRAMES | {Frame.MISSION}:
         return dialect.MAV_MISSION_UNSUPPORTED_FRAME
     if placed != (item.frame in PX4_FRAMES):

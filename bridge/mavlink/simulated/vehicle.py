@@ -16,15 +16,15 @@ from bridge.mavlink.simulated.course import Course, Tells
 from bridge.mavlink.simulated.faults import NO_FAULTS, Mishaps, VehicleFaults
 from bridge.mavlink.simulated.lead import Lead
 from bridge.mavlink.simulated.parameters import Parameters
-from bridge.mavlink.simulated.profile import ModeName, Profile
 from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.store import MISSION, Store
 from bridge.mavlink.simulated.streams import Streams
 from bridge.mavlink.simulated.transfers import Transfers
 from mission.document import SiteOrigin
 from mission.events import Pose
-from mission.mavlink.autopilots import home_item
+from mission.mavlink.autopilots.kind import Autopilot, ModeName
 from mission.mavlink.items import Command, Frame, Item
+from mission.mavlink.read_back import home_item
 
 BOOT_NS = KEEP_NS = 1_000_000_000
 FOREVER_NS = 2**63
@@ -43,7 +43,7 @@ Handlers = dict[str, Callable[[Who, Message], None]]
 class Setting:
     """How a vehicle is set up."""
 
-    profile: Profile
+    autopilot: Autopilot
     state: Path | None = None
     origin: SiteOrigin | None = None
     """Its global origin from the start; else none until a station sets it."""
@@ -73,7 +73,7 @@ class Vehicle:
         self, setting: Setting, *, clock: Clock, wall: Clock, say: Callable[[Message], None],
         makers: Mapping[int, Maker], orders: Callable[[Vehicle], Handlers],
     ) -> None:  # fmt: skip
-        self.profile = setting.profile
+        self.autopilot = setting.autopilot
         self._setting, self._clock, self._wall, self._say_out = setting, clock, wall, say
         self._makers = makers
         self._mishaps = Mishaps(setting.faults)
@@ -89,21 +89,21 @@ class Vehicle:
         self.reached: int | None = None
         """The item reached last."""
         self.store = Store(setting.state)
-        rule = self.profile.autopilot.rule
+        rule = self.autopilot.rule
         self.rover = Rover(self.store, rule=rule, origin=setting.origin, at=setting.at)
         self.lead = Lead(self.rover, wall)
         self.parameters = Parameters(
-            self.profile.name, speed=self.rover.speed, set_speed=self.rover.set_speed
+            self.autopilot.habits, speed=self.rover.speed, set_speed=self.rover.set_speed
         )
         self.camera = Camera(self.store, self.rover, self._mishaps, default_s=lambda: self.parameters.scan_s)
         tells = Tells(
             current=self._went_on, reached=self._reach, trigger=self._triggered, finished=self._finish,
             reboot=self.reboot, text=self.text,
         )  # fmt: skip
-        self.course = Course(self.profile, self.store, self.rover, self.camera, self._mishaps, tells)
+        self.course = Course(self.autopilot, self.store, self.rover, self.camera, self._mishaps, tells)
         self.streams = Streams(wall, makers)
         self.transfers = Transfers(
-            self.profile, self.store, wall, say=self.say, text=self.text, home=self._home,
+            self.autopilot, self.store, wall, say=self.say, text=self.text, home=self._home,
             stored=self._stored, running=lambda: self.course.state == "active", event=self._item_came,
             mishaps=self._mishaps,
         )  # fmt: skip
@@ -135,7 +135,7 @@ class Vehicle:
         self._keep()
         if self._quiet():
             return
-        if self.mode == "guided" and self.profile.streams and not self.lead.fresh:
+        if self.mode == "guided" and self.autopilot.driving.streams and not self.lead.fresh:
             self.text("Offboard: setpoints lost")
             self.set_mode("hold")
         self.transfers.tick()
@@ -187,7 +187,7 @@ class Vehicle:
             return False
         if mode == self.mode:
             return True
-        if mode == "guided" and self.profile.streams and not self.lead.fresh:
+        if mode == "guided" and self.autopilot.driving.streams and not self.lead.fresh:
             self.text("Offboard: no setpoints")
             return False
         self.mode = mode
@@ -216,7 +216,7 @@ class Vehicle:
 
     def set_origin(self, origin: SiteOrigin) -> None:
         """Take a global origin; ArduPilot takes one per boot, and says nothing about others."""
-        if self.rover.origin is not None and not self.profile.origin_again:
+        if self.rover.origin is not None and not self.autopilot.habits.origin_again:
             return
         self.rover.origin = origin
         self.tell(dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
@@ -282,8 +282,8 @@ class Vehicle:
     def _finish(self, now_ns: int) -> None:
         self.text("Mission Complete")
         self.tell(dialect.MAVLINK_MSG_ID_MISSION_CURRENT)
-        if self.profile.done_mode != self.mode:
-            self.mode = self.profile.done_mode
+        if self.autopilot.habits.done_mode != self.mode:
+            self.mode = self.autopilot.habits.done_mode
             self.tell(dialect.MAVLINK_MSG_ID_HEARTBEAT)
 
     def _scanned(self) -> None:

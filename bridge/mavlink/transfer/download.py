@@ -25,10 +25,6 @@ from mission.mavlink.items import Item
 Progress = Callable[[int, int], None]
 """Called with what is done and what there is to do."""
 
-ONE_BY_ONE = frozenset({"px4"})
-"""Source: PX4 ends a transfer when an item is asked for that is neither the next nor the last."""
-ANY_ORDER = frozenset({"ardupilot"})
-"""Measured: it gives whatever item is asked for."""
 STUCK = 12
 """After so many tries without an item others are asked one by one, in order: MAVSDK's vehicle wants it so."""
 REFUSALS = 3
@@ -49,7 +45,7 @@ def download(
     AnswerIsNo
         If it refuses, which it does while another station uploads.
     """
-    window = 1 if peer.in_order or peer.autopilot in ONE_BY_ONE else window_for(peer)
+    window = 1 if peer.in_order or peer.autopilot.gives_items == "in order" else window_for(peer)
     reading = _Reading(peer, window, patience_s or peer.patience_s, progress)
     refused = reading.run()
     if refused is not None and window > 1:
@@ -114,7 +110,7 @@ class _Reading:
     @property
     def _may_want_order(self) -> bool:
         several = self._pace.window > 1 and self._count is not None
-        return several and self._peer.autopilot not in ANY_ORDER
+        return several and self._peer.autopilot.gives_items != "any order"
 
     def _take(self, message: Message) -> None:
         name = message.get_type()

@@ -12,7 +12,6 @@ from bridge.mavlink.transfer.messages import MISSION, ack_message
 from bridge.mavlink.transfer.pace import window_for
 from bridge.mavlink.transfer.sending import send_items
 from mission.errors import AnswerIsNo, RobotUnreachable
-from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import Item
 
 CANCELS = 3
@@ -31,7 +30,7 @@ class Left:
 
 def left_on(peer: Peer, before: Sequence[Item]) -> Left:
     """See what a failed upload left, and make good what is neither the mission before nor none."""
-    if not autopilot_named(peer.autopilot).home_first:  # then, by its source, it keeps an upload apart
+    if peer.autopilot.habits.atomic:
         try:
             held = download(peer)
         except (AnswerIsNo, RobotUnreachable):
@@ -73,7 +72,7 @@ def unknown(peer: Peer) -> Left:
 
 def own_items(peer: Peer, read: Sequence[Item]) -> tuple[Item, ...]:
     """What was read without the vehicle's home."""
-    return tuple(read[1:] if autopilot_named(peer.autopilot).home_first else read)
+    return tuple(read[1:] if peer.autopilot.home_first else read)
 
 
 def cancel(peer: Peer) -> None:

@@ -19,8 +19,9 @@ from bridge.mavlink.transfer.messages import result_name
 from bridge.mavlink.transfer.pace import window_for
 from bridge.mavlink.transfer.sending import Ended, send_items
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
-from mission.mavlink.autopilots import autopilot_named, differences, upload_of
+from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import Item, ItemList
+from mission.mavlink.read_back import differences, upload_of
 
 ATTEMPTS = 4
 """Whole transfers, where the vehicle ended one or the read-back was not what was sent."""

@@ -13,8 +13,8 @@ from mission.files.exports.format import Supplements
 from mission.files.imports import qgc_plan
 from mission.files.imports.track import Given
 from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.fields import PLACED
 from mission.mavlink.items import Command, Frame, Item, ItemList
-from mission.mavlink.keeping import PLACED
 from mission.mavlink.translate import translate
 
 FIRMWARE = {"generic": 0, "ardupilot": 3, "px4": 12}

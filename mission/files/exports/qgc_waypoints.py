@@ -11,8 +11,8 @@ from mission.files.exports.qgc_plan import FILE_FRAMES, items_of, place
 from mission.files.imports import qgc_waypoints
 from mission.files.imports.qgc_waypoints import HEAD
 from mission.files.imports.track import Given
-from mission.mavlink.autopilots import home_item
 from mission.mavlink.items import Item
+from mission.mavlink.read_back import home_item
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:

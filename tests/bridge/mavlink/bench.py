@@ -57,7 +57,7 @@ class Bench:
         made = tuple(read_vehicle_fault(text) for text in faults)
         setting = Setting(PROFILES[profile], state, origin, at, VehicleFaults(made))
         self.vehicle = complete_vehicle(setting, clock=self.clock, wall=self.wall, say=self._hear)
-        self.first = 1 if self.vehicle.profile.autopilot.home_first else 0
+        self.first = 1 if self.vehicle.autopilot.home_first else 0
         self._wires = {who: dialect.MAVLink(None, *vars(who).values()) for who in (STATION, OTHER)}
         self._own = dialect.MAVLink(None, 1, 1)
 
@@ -129,7 +129,7 @@ class Bench:
         return [item_of(message) for message in self.download()][self.first :]
 
     def kept(self, items: Sequence[Item]) -> list[Item]:
-        return [self.vehicle.profile.autopilot.kept(item) for item in items]
+        return [self.vehicle.autopilot.kept(item) for item in items]
 
     # Orders
 
@@ -142,10 +142,8 @@ class Bench:
         return self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
     def mode(self, name: str) -> int:
-        custom = self.vehicle.profile.modes[name].custom  # type: ignore[index]
-        if self.vehicle.profile.name == "ardupilot":
-            return self.command(dialect.MAV_CMD_DO_SET_MODE, 1, custom)
-        return self.command(dialect.MAV_CMD_DO_SET_MODE, 1, custom >> 16 & 0xFF, custom >> 24)
+        mode = self.vehicle.autopilot.modes.numbers[name]  # type: ignore[index]
+        return self.command(dialect.MAV_CMD_DO_SET_MODE, *mode.params)
 
     def start(self) -> None:
         assert (self.arm(), self.mode("auto")) == (OBEYED, OBEYED)

@@ -13,7 +13,6 @@ import msgspec
 from bridge.bodies import AutopilotBody
 from bridge.follow import Report
 from bridge.link import Switchboard
-from bridge.mavlink.gateway.driving import DRIVING, Mode
 from bridge.mavlink.line.peer import Peer, reached
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import dialect
@@ -34,7 +33,6 @@ SITE = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=30.0)
 """+y bears 30°, so +x, along the corridor, bears 120°."""
 FAST = 10.0
 """How much faster the vehicle's time runs than ours."""
-MANUAL = {"ardupilot": Mode(0), "px4": Mode(1)}
 ON_HOLD = dialect.MAVLINK_MSG_ID_HEARTBEAT
 
 
@@ -63,10 +61,10 @@ class Rover:
         self.profile = profile
         self.url = Url("udpout", "127.0.0.1", free_udp_port())
         self._first = Setting(
-            profile=profile_named(profile), state=state, origin=level, faults=faults,
+            autopilot=profile_named(profile), state=state, origin=level, faults=faults,
             at=to_east(pose_of(start), SITE.heading_deg),
         )  # fmt: skip
-        self._again = Setting(profile=profile_named(profile), state=state, origin=level)
+        self._again = Setting(autopilot=profile_named(profile), state=state, origin=level)
         self._life = ExitStack()
         self.on(self._first)
 
@@ -91,14 +89,13 @@ class Operator:
 
     def __init__(self, peer: Peer, profile: str) -> None:
         self.peer = peer
-        self.driving = DRIVING[profile]
-        self._manual = MANUAL[profile]
+        self.autopilot = profile_named(profile)
 
     def hold(self) -> None:
-        self.peer.order(dialect.MAV_CMD_DO_SET_MODE, *self.driving.hold.params)
+        self.peer.order(dialect.MAV_CMD_DO_SET_MODE, *self.autopilot.modes.hold.params)
 
     def manual(self) -> None:
-        self.peer.order(dialect.MAV_CMD_DO_SET_MODE, *self._manual.params)
+        self.peer.order(dialect.MAV_CMD_DO_SET_MODE, *self.autopilot.modes.numbers["manual"].params)
 
     def disarm(self) -> None:
         self.peer.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
@@ -107,7 +104,7 @@ class Operator:
         """The mode that the vehicle is in now."""
         beat = self.peer.ask(dialect.MAVLINK_MSG_ID_HEARTBEAT)
         assert beat is not None
-        return self.driving.name_of(self.driving.mode_of(beat.custom_mode))
+        return self.autopilot.modes.name(self.autopilot.mode_of(beat))
 
     def place(self) -> tuple[float, float]:
         """Metres north and east of its origin."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from bridge.mavlink.line.wire import Message
 from bridge.mavlink.transfer.messages import item_message
 from mission.document import SiteOrigin
-from mission.mavlink.autopilots import autopilot_named, upload_of
+from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import Command, Frame, Item, ItemList, Placed
+from mission.mavlink.read_back import upload_of
 from tests.bridge.mavlink.scripted import VEHICLE
 
 SITE = SiteOrigin(lat=47.0, lon=8.0, alt=0.0, heading_deg=0.0)

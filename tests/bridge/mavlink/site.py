@@ -25,8 +25,9 @@ from bridge.mavlink.simulated.vehicle import Setting
 from bridge.station import Station
 from mission.document import Mission, Scan, SiteOrigin, Stop
 from mission.events import AnyEvent, Pose
-from mission.mavlink.autopilots import autopilot_named, upload_of
+from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import ItemList
+from mission.mavlink.read_back import upload_of
 from mission.mavlink.translate import translate
 from mission.run.states import Run
 from tests.bridge.mavlink.scripted import free_udp_port

@@ -7,15 +7,13 @@ from bridge.journal import memory_journal
 from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.logbook import Logbook, remember
 from bridge.mavlink.desk.lookout import Lookout
-from bridge.mavlink.desk.modes import AUTOS, Modes
-from bridge.mavlink.gateway.driving import DRIVING
 from bridge.mavlink.line.wire import Message, dialect
 from mission.events import Paused
+from mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from mission.mavlink.translate import translate
 from mission.run.states import started
 from tests.bridge.mavlink.site import tour
 
-ROVER = DRIVING["ardupilot"]
 MANUAL = 0
 
 
@@ -35,7 +33,7 @@ def told_at_first_look(boot_ms: int) -> list[str]:
     book.booted(clock.now_ns())
     book.move(lambda run: (started(run, run_id="r", now_ns=clock.now_ns(), by="me"),))
     clock.wait(60.0)
-    lookout = Lookout(Modes(AUTOS["ardupilot"], ROVER.hold, ROVER), clock)
+    lookout = Lookout(ARDUPILOT, clock)
     follower = Follower(book, None, lookout, NoHands())  # type: ignore[arg-type]
     for message in found_in_manual(boot_ms):
         clock.wait(0.1)

@@ -8,11 +8,10 @@ import pytest
 
 from bridge.clock import SimulatedClock
 from bridge.mavlink.desk.lookout import Lookout
-from bridge.mavlink.desk.modes import AUTOS, Modes
 from bridge.mavlink.desk.visits import Course, course_of
-from bridge.mavlink.gateway.driving import DRIVING
 from bridge.mavlink.line.wire import dialect
 from mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic
+from mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from mission.mavlink.translate import translate
 from mission.run.scans import ScanFailed, ScanResult
 from mission.run.states import Run
@@ -30,8 +29,7 @@ class Telling:
         mission = tour()
         self.course: Course = course_of(mission, translate(mission, "ardupilot"))
         self.clock = SimulatedClock()
-        rover = DRIVING["ardupilot"]
-        self.lookout = Lookout(Modes(AUTOS["ardupilot"], rover.hold, rover), self.clock)
+        self.lookout = Lookout(ARDUPILOT, self.clock)
         self.site = self.course.sent.origin
         self.tell(dialect.MAVLink_heartbeat_message(10, 3, 128, 10, 4, 3))
 

@@ -13,8 +13,8 @@ from bridge.mavlink.line.peer import reached
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.transfer.download import download
 from bridge.mavlink.transfer.upload import Uploaded, clear, upload
-from mission.mavlink.autopilots import differences
 from mission.mavlink.items import Item
+from mission.mavlink.read_back import differences
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.bridge.mavlink.scripted import free_udp_port
@@ -50,7 +50,7 @@ def item_of(read: Any) -> Item:
 
 def test_mavsdk_is_given_every_item_and_reads_it_back() -> None:
     with vehicle() as (url, given), reached(url, vehicle=1) as peer:
-        assert peer.autopilot == "generic"
+        assert peer.autopilot.name == "generic"
         assert upload(peer, SENT) == Uploaded(items=100, already=False)
         result, plan = given.get(timeout=WAIT_S)
         assert result == 1  # success

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.mavlink.line.peer import Origin, found, in_auto, reached, station_beat
+from bridge.mavlink.line.peer import Origin, found, reached, station_beat
 from bridge.mavlink.line.url import read_url
 from bridge.mavlink.line.wire import Message, Who, dialect, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from mission.mavlink.autopilots.generic import GENERIC
 from tests.bridge.mavlink.scripted import Scripted, free_udp_port
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -21,7 +22,7 @@ class ArduPilot(Scripted):
 
 def test_a_vehicle_is_found_by_its_heartbeat() -> None:
     with ArduPilot() as vehicle, reached(vehicle.url, vehicle=1) as peer:
-        assert (peer.who, peer.autopilot) == (Who(1, 1), "ardupilot")
+        assert (peer.who, peer.autopilot.name) == (Who(1, 1), "ardupilot")
         assert not peer.armed and not peer.in_auto
 
 
@@ -39,7 +40,7 @@ def test_a_vehicle_on_hold_does_not_follow_its_mission(custom_mode: int, follows
     """PX4 sets the flag of AUTO on hold too, and so do those that number their modes as it does."""
     flags = dialect.MAV_MODE_FLAG_AUTO_ENABLED | dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     heartbeat = dialect.MAVLink_heartbeat_message(10, 0, flags, custom_mode, 4, 3)
-    assert in_auto(heartbeat, "generic") is follows
+    assert GENERIC.in_auto(heartbeat) is follows
 
 
 def test_where_nobody_is_nothing_was_sent() -> None:

@@ -15,11 +15,10 @@ from bridge.journal import memory_journal
 from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.logbook import Logbook, remember
 from bridge.mavlink.desk.lookout import Lookout
-from bridge.mavlink.desk.modes import AUTOS, Modes
-from bridge.mavlink.gateway.driving import DRIVING
 from bridge.mavlink.line.wire import dialect
 from mission.document import Mission, SiteOrigin
 from mission.events import AnyEvent, Arrived, Failed
+from mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from mission.mavlink.back import recognise
 from mission.mavlink.items import Command, Item, ItemList
 from mission.run.states import started
@@ -87,8 +86,7 @@ def followed(log: list[Any], tour: Mission) -> tuple[AnyEvent, ...]:
     placed = recognise(items_of(log), mission=tour)
     remember(book, tour, ItemList("ardupilot", ORIGIN, placed))
     book.move(lambda run: (started(run, run_id="r", now_ns=clock.now_ns(), by="log"),))
-    rover = DRIVING["ardupilot"]
-    lookout = Lookout(Modes(AUTOS["ardupilot"], rover.hold, rover), clock)
+    lookout = Lookout(ARDUPILOT, clock)
     follower = Follower(book, None, lookout, NoHands())  # type: ignore[arg-type]
     follower.looking = True
     armed_in_auto = dialect.MAVLink_heartbeat_message(10, 3, 128 | 1, 10, 4, 3)

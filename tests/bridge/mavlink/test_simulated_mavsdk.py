@@ -84,7 +84,7 @@ def test_mavsdk_uploads_reads_back_starts_and_follows_to_the_end(profile: str) -
         missions, action = MissionRaw(system), Action(system)
         missions.upload_mission(raw(items))
         read = [item_of(item) for item in missions.download_mission()]
-        kept = PROFILES[profile].autopilot.kept
+        kept = PROFILES[profile].kept
         assert read[first:] == [kept(item) for item in items[first:]]
 
         ended, seen = threading.Event(), []

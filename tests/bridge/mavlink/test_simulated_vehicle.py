@@ -65,7 +65,7 @@ def test_a_mission_is_driven_to_its_end(make: Make) -> None:
     assert bench.at() == pytest.approx((4.0, 3.0), abs=CLOSE_M if bench.first else 0.05)
     assert captures(bench) == [(0, 1)]
     assert bench.last("MISSION_CURRENT").mission_state == d.MISSION_STATE_COMPLETE
-    assert bench.vehicle.mode == bench.vehicle.profile.done_mode
+    assert bench.vehicle.mode == bench.vehicle.autopilot.habits.done_mode
 
 
 def test_a_trigger_fires_when_the_wait_before_it_is_over_and_not_before(make: Make) -> None:
@@ -121,7 +121,7 @@ def test_pause_keeps_the_item_and_resume_goes_on_with_it(make: Make) -> None:
     assert bench.at() == stood
     assert 1.0 < stood[0] < 8.0
     assert bench.last("MISSION_CURRENT").seq == 1 + bench.first
-    paused = d.MISSION_STATE_PAUSED if bench.vehicle.profile.pauses else d.MISSION_STATE_NOT_STARTED
+    paused = d.MISSION_STATE_PAUSED if bench.vehicle.autopilot.habits.pauses else d.MISSION_STATE_NOT_STARTED
     assert bench.last("MISSION_CURRENT").mission_state == paused
     assert bench.mode("auto") == OBEYED
     bench.pass_time(40.0)
@@ -191,7 +191,7 @@ def test_an_upload_while_the_mission_runs(make: Make) -> None:
     bench.start()
     bench.pass_time(7.0)
     bench.upload([delay(50.0), delay(60.0), delay(70.0)])
-    restarts = bench.vehicle.profile.restarts_item
+    restarts = bench.vehicle.autopilot.habits.restarts_item
     assert bench.vehicle.course.current == (1 if restarts else 0) + bench.first
     assert bench.vehicle.course.state == "active"
     bench.pass_time(49.0)
@@ -263,7 +263,7 @@ def test_a_rover_turns_to_a_heading_as_its_autopilot_does(make: Make) -> None:
     bench.start()
     bench.pass_time(20.0)
     bench.say(request_message(d.MAVLINK_MSG_ID_ATTITUDE))
-    east = math.pi / 2 if bench.vehicle.profile.autopilot.turns else 0.0
+    east = math.pi / 2 if bench.vehicle.autopilot.turns else 0.0
     assert bench.last("ATTITUDE").yaw == pytest.approx(east, abs=1e-6)
 
 
@@ -390,7 +390,7 @@ def test_a_yaw_alone_turns_on_the_spot_where_the_autopilot_does(make: Make) -> N
     bench.mode("guided")
     lead(bench, setpoint(0.0, 0.0, mask=YAW_ONLY, yaw=-1.0), 5.0)
     bench.say(request_message(d.MAVLINK_MSG_ID_ATTITUDE))
-    turned = -1.0 if bench.vehicle.profile.yaw_alone else 0.0
+    turned = -1.0 if bench.vehicle.autopilot.driving.turns else 0.0
     assert bench.last("ATTITUDE").yaw == pytest.approx(turned)
     assert bench.at() == (0.0, 0.0)
 
@@ -400,7 +400,7 @@ def test_a_speed_is_taken_on_the_way(make: Make) -> None:
     bench = make()
     bench.arm()
     idle = bench.command(Command.DO_CHANGE_SPEED, 1, 0.5)
-    assert (idle == OBEYED) == (bench.vehicle.profile.name != "ardupilot")
+    assert (idle == OBEYED) == (bench.vehicle.autopilot.name != "ardupilot")
     bench.say(setpoint(8.0, 0.0))
     bench.mode("guided")
     bench.say(setpoint(8.0, 0.0))
@@ -440,13 +440,13 @@ def test_reposition_changes_the_mode_only_if_allowed(make: Make) -> None:
     assert reposition(1) == OBEYED
     bench.pass_time(10.0)
     assert bench.at() == pytest.approx((2.0, 0.0), abs=0.05)
-    assert bench.vehicle.mode == bench.vehicle.profile.reposition_mode
+    assert bench.vehicle.mode == bench.vehicle.autopilot.driving.reposition_mode
 
 
 def test_mission_start(make: Make) -> None:
     bench = make()
     bench.upload([delay(1.0), delay(1.0)])
-    name = bench.vehicle.profile.name
+    name = bench.vehicle.autopilot.name
     assert (bench.command(d.MAV_CMD_MISSION_START, 1) == OBEYED) == (name != "ardupilot")
     bench.vehicle.set_mode("hold")
     assert bench.command(d.MAV_CMD_MISSION_START) == OBEYED
@@ -459,8 +459,8 @@ def test_mission_start(make: Make) -> None:
 def test_a_mode_by_message(make: Make) -> None:
     bench = make()
     bench.upload([delay(1.0)])
-    modes = bench.vehicle.profile.modes
-    said = bench.say(d.MAVLink_set_mode_message(1, 1, modes["auto"].custom))
+    modes = bench.vehicle.autopilot.modes
+    said = bench.say(d.MAVLink_set_mode_message(1, 1, modes.custom(modes.auto)))
     assert bench.vehicle.mode == "auto"
     assert [m.command for m in said if m.get_type() == "COMMAND_ACK"] == ([11] if bench.first else [])
     bench.say(d.MAVLink_set_mode_message(1, 1, 4_000_000_000))
@@ -593,7 +593,7 @@ def test_a_scan_that_is_broken_off_has_no_result(make: Make) -> None:
 def test_a_scan_by_message_to_a_script(make: Make) -> None:
     bench = make()
     result = bench.command(Command.DO_SEND_SCRIPT_MESSAGE, 100, 5, 2.0, 60.0)
-    assert (result == OBEYED) == (bench.vehicle.profile.name == "ardupilot")
+    assert (result == OBEYED) == (bench.vehicle.autopilot.name == "ardupilot")
     bench.pass_time(3.0)
     assert len(captures(bench)) == (1 if result == OBEYED else 0)
 
@@ -655,9 +655,9 @@ def test_heartbeats_say_who_it_is(make: Make) -> None:
     bench = make()
     bench.pass_time(2.0)
     beat = bench.last("HEARTBEAT")
-    assert (beat.type, beat.autopilot) == (d.MAV_TYPE_GROUND_ROVER, bench.vehicle.profile.firmware)
+    assert (beat.type, beat.autopilot) == (d.MAV_TYPE_GROUND_ROVER, bench.vehicle.autopilot.firmware)
     bench.arm()
     bench.mode("hold")
     beat = bench.last("HEARTBEAT")
     assert beat.base_mode & d.MAV_MODE_FLAG_SAFETY_ARMED
-    assert beat.custom_mode == {"ardupilot": 4}.get(bench.vehicle.profile.name, 3 << 24 | 4 << 16)
+    assert beat.custom_mode == {"ardupilot": 4}.get(bench.vehicle.autopilot.name, 3 << 24 | 4 << 16)

@@ -222,7 +222,7 @@ def test_without_raw_orders_arming_is_refused_in_words_and_hold_passes(tmp_path:
                 told = box.get(5)
             assert told is not None
             assert told.text == "tunnel refused COMPONENT_ARM_DISARM (COMMAND_LONG)"
-            assert peer.command(dialect.MAV_CMD_DO_SET_MODE, *operator.driving.hold.params).accepted
+            assert peer.command(dialect.MAV_CMD_DO_SET_MODE, *operator.autopilot.modes.hold.params).accepted
         assert operator.mode() == "HOLD"
         assert not operator.peer.armed
 
@@ -268,14 +268,14 @@ def test_the_tunnel_joins_the_robots_own_end_and_comes_back_after_a_kill(tmp_pat
         program = Url("udpout", "127.0.0.1", port)
         with process(*own) as first:
             with reached(program, vehicle=1, timeout_s=20) as peer:
-                assert peer.autopilot == "px4"
+                assert peer.autopilot.name == "px4"
             first.kill()
             first.wait()
         with pytest.raises(RobotUnreachable), reached(program, vehicle=1, timeout_s=1.5):
             pass
         with process(*own) as second:
             with reached(program, vehicle=1, timeout_s=20) as peer:
-                assert peer.autopilot == "px4"
+                assert peer.autopilot.name == "px4"
             second.terminate()
             assert second.wait(10) == 0
 

@@ -16,8 +16,9 @@ from mission.errors import AnswerIsNo
 from mission.files.exports import exported
 from mission.files.exports.format import Supplements
 from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
-from mission.mavlink.autopilots import AUTOPILOTS, home_item
+from mission.mavlink.autopilots import AUTOPILOTS
 from mission.mavlink.items import Command
+from mission.mavlink.read_back import home_item
 from mission.mavlink.translate import translate
 from tests.mission.exports.worlds import laboratory
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from mission.document import SiteOrigin
+from mission.mavlink.autopilots.ardupilot import keeps as ardupilot_keeps
 from mission.mavlink.back import recognise
 from mission.mavlink.items import Command, Frame, Item
-from mission.mavlink.keeping import ardupilot_keeps
 from mission.mavlink.rounds import round_of
 
 LOG = Path(__file__).parents[3].parent / "shared" / "data" / "logs" / "rover-stop-and-go.BIN"

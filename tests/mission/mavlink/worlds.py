@@ -7,8 +7,9 @@ from dataclasses import replace
 import msgspec
 
 from mission.document import Mission, ScannerSpec
-from mission.mavlink.autopilots import AUTOPILOTS, upload_of
+from mission.mavlink.autopilots import AUTOPILOTS
 from mission.mavlink.items import Item, ItemList
+from mission.mavlink.read_back import upload_of
 from tests.mission.worlds import mission_of, square_tour, stop
 
 NAMES = list(AUTOPILOTS)

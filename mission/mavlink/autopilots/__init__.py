@@ -1,0 +1,29 @@
+"""The kinds of autopilot: one module holds all that is known of one, `kind` says what there is to know."""
+
+from __future__ import annotations
+
+from mission.errors import InputError
+from mission.mavlink.autopilots.ardupilot import ARDUPILOT
+from mission.mavlink.autopilots.generic import GENERIC
+from mission.mavlink.autopilots.kind import Autopilot
+from mission.mavlink.autopilots.px4 import PX4
+
+AUTOPILOTS: dict[str, Autopilot] = {kind.name: kind for kind in (ARDUPILOT, PX4, GENERIC)}
+
+
+def autopilot_named(name: str) -> Autopilot:
+    """One of `AUTOPILOTS`.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name not in AUTOPILOTS:
+        raise InputError(f"autopilot {name!r} is not known; it is one of {', '.join(AUTOPILOTS)}")
+    return AUTOPILOTS[name]
+
+
+def autopilot_of(firmware: int) -> Autopilot:
+    """The kind that a heartbeat's MAV_AUTOPILOT tells; `generic` for one that is not known."""
+    return next((kind for kind in AUTOPILOTS.values() if kind.firmware == firmware), GENERIC)

@@ -1,0 +1,47 @@
+"""An autopilot that keeps to the letter of the specification: everything is kept, degrees are WGS84.
+
+It has PX4's mode numbers, for the specification has none.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mission.mavlink.autopilots import px4
+from mission.mavlink.autopilots.kind import EVERYWHERE, Autopilot, Driving, Habits, Heartbeat
+from mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag
+from mission.mavlink.fields import as_sent
+from mission.mavlink.items import Command, Frame
+
+UINT16_MAX = 65_535
+
+
+def in_auto(heartbeat: Heartbeat) -> bool:
+    """By its flags; others that number their modes as PX4 does have them set on hold too."""
+    holds = px4.MODES.of(heartbeat.custom_mode) == px4.MODES.hold
+    return not holds and bool(heartbeat.base_mode & ModeFlag.AUTO_ENABLED)
+
+
+HABITS = Habits(
+    asks_int=True, ask_again_s=0.25, give_up_s=1.5, tells_giving_up=True, atomic=True, strays="ask",
+    last_again=MissionResult.ACCEPTED, forgives_late=True, other_station=MissionResult.DENIED,
+    busy_in_words=False, begins_again=True, cancels=True, clears_in_auto=True, counts_again=False,
+    restarts_item=False, same_is_nothing=False, checks_frame_first=False, highest_m=math.inf,
+    takes=EVERYWHERE | {177, 183, 187, 189, 195, 197, 211, 530},
+    done_mode="hold", pauses=True, origin_again=True, says_no=CommandResult.DENIED, modes_by_flags=True,
+    acknowledges_set_mode=False, start_takes_item=True, start_arms=False, pauses_by_command=True,
+    speed_while_driving=False, speed_parameter="SPEED", system_parameter="SYSTEM_ID",
+)  # fmt: skip
+
+GENERIC = Autopilot(
+    name="generic", firmware=Firmware.GENERIC, rule="wgs84",
+    frame=Frame.GLOBAL_RELATIVE_ALT_INT, max_items=UINT16_MAX, home_first=False,
+    commands=frozenset({
+        Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.IMAGE_START_CAPTURE,
+    }),
+    keep=as_sent, brake_hold_s=0, longest_hold_s=32_767, max_delay_s=4_294_967.0, keeps_arrival=True,
+    reached="within the acceptance radius that is sent", turns=True, gives_items="either",
+    modes=px4.MODES, in_auto=in_auto,
+    driving=Driving(streams=False, takes_speed=True, turns=True, reposition_mode="hold"), drivable=False,
+    habits=HABITS,
+)  # fmt: skip

@@ -1,0 +1,79 @@
+"""The numbers of MAVLink's enumerations that are used here, from the common dialect and ArduPilot's."""
+
+from __future__ import annotations
+
+from enum import IntEnum, IntFlag
+
+
+class Firmware(IntEnum):
+    """MAV_AUTOPILOT."""
+
+    GENERIC = 0
+    ARDUPILOTMEGA = 3
+    INVALID = 8
+    PX4 = 12
+
+
+class VehicleType(IntEnum):
+    """MAV_TYPE."""
+
+    FIXED_WING = 1
+    GCS = 6
+    GROUND_ROVER = 10
+    SURFACE_BOAT = 11
+    ONBOARD_CONTROLLER = 18
+
+
+class ModeFlag(IntFlag):
+    """MAV_MODE_FLAG."""
+
+    CUSTOM_MODE_ENABLED = 1
+    AUTO_ENABLED = 4
+    GUIDED_ENABLED = 8
+    STABILIZE_ENABLED = 16
+    MANUAL_INPUT_ENABLED = 64
+    SAFETY_ARMED = 128
+
+
+class MissionResult(IntEnum):
+    """MAV_MISSION_RESULT: how a message of the mission protocol is answered."""
+
+    ACCEPTED = 0
+    ERROR = 1
+    UNSUPPORTED_FRAME = 2
+    UNSUPPORTED = 3
+    NO_SPACE = 4
+    INVALID = 5
+    INVALID_PARAM1 = 6
+    INVALID_PARAM2 = 7
+    INVALID_PARAM3 = 8
+    INVALID_PARAM4 = 9
+    INVALID_PARAM5_X = 10
+    INVALID_PARAM6_Y = 11
+    INVALID_PARAM7 = 12
+    INVALID_SEQUENCE = 13
+    DENIED = 14
+    OPERATION_CANCELLED = 15
+
+
+class CommandResult(IntEnum):
+    """MAV_RESULT: how a command is answered."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+    IN_PROGRESS = 5
+    COMMAND_INT_ONLY = 8
+
+
+class MissionState(IntEnum):
+    """MISSION_STATE, as MISSION_CURRENT tells it."""
+
+    UNKNOWN = 0
+    NO_MISSION = 1
+    NOT_STARTED = 2
+    ACTIVE = 3
+    PAUSED = 4
+    COMPLETE = 5

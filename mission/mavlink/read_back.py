@@ -1,0 +1,85 @@
+"""A list of items on a vehicle: how it goes there, and whether what was read back is what it should be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from mission.document import Point, SiteOrigin
+from mission.geodesy import Geodetic, from_geodetic, from_steps, to_steps
+from mission.mavlink.autopilots import autopilot_named
+from mission.mavlink.autopilots.kind import Autopilot
+from mission.mavlink.items import Command, Frame, Item, ItemList, Placed
+
+CLOSE = 1e-6
+"""Relative difference within which two float32 numbers are the same: some sixteen of their steps."""
+
+
+def point_at(sent: ItemList, lat: int, lon: int) -> Point:
+    """The point of the site that the vehicle of a list means by a place in steps of 1e-7 degrees."""
+    return from_geodetic(sent.origin, from_steps(lat, lon), autopilot_named(sent.autopilot).rule)
+
+
+def home_item(origin: SiteOrigin) -> Item:
+    """The item that stands for home: the site's origin, above the sea."""
+    lat, lon = to_steps(Geodetic(lat=origin.lat, lon=origin.lon))
+    return Item(Command.NAV_WAYPOINT, Frame.GLOBAL_INT, x=lat, y=lon, z=origin.alt)
+
+
+def upload_of(sent: ItemList) -> tuple[Item, ...]:
+    """The items as they go over the wire, numbered from 0: with home in front where the vehicle wants it."""
+    home = (home_item(sent.origin),) if autopilot_named(sent.autopilot).home_first else ()
+    return (*home, *sent.items)
+
+
+def placed_at(sent: ItemList, sequence: int) -> Placed | None:
+    """The item with a sequence number on the vehicle, as MISSION_CURRENT tells it; None for home."""
+    index = autopilot_named(sent.autopilot).index(sequence)
+    return sent.placed[index] if 0 <= index < len(sent.placed) else None
+
+
+def differences(sent: ItemList, read: Sequence[Item], autopilot: Autopilot | None = None) -> tuple[str, ...]:
+    """How what a vehicle holds differs from what it should hold, a line each; empty when it does not.
+
+    `read` is all that the vehicle gave, its home included; homes are not compared. Each field is compared
+    with what the autopilot (that of the list, unless another is given) keeps of it.
+    """
+    vehicle = autopilot or autopilot_named(sent.autopilot)
+    own = list(read[1:] if vehicle.home_first else read)
+    if len(own) != len(sent.placed):
+        return (f"the vehicle holds {len(own)} items, {len(sent.placed)} were sent",)
+    return tuple(
+        line
+        for index, (placed, item) in enumerate(zip(sent.placed, own, strict=True))
+        for line in _item_differences(vehicle, vehicle.sequence(index), placed, item)
+    )
+
+
+def _item_differences(vehicle: Autopilot, sequence: int, placed: Placed, read: Item) -> Iterator[str]:
+    sent, predicted = _fields(placed.item), _fields(vehicle.kept(placed.item))
+    what = placed.role if placed.stop is None else f"{placed.role} of {placed.stop}"
+    for field, value in _fields(read).items():
+        if not _equal(value, predicted[field]):
+            yield (
+                f"item {sequence} ({what}): {field} sent {sent[field]:.10g}, "
+                f"should be kept as {predicted[field]:.10g}, is {value:.10g}"
+            )
+
+
+def _fields(item: Item) -> dict[str, float]:
+    named = {f"param{number}": value for number, value in enumerate(item.params, start=1)}
+    return {
+        "command": item.command,
+        "frame": item.frame,
+        **named,
+        "x": item.x,
+        "y": item.y,
+        "z": item.z,
+        "autocontinue": int(item.autocontinue),
+    }
+
+
+def _equal(one: float, other: float) -> bool:
+    if isinstance(one, int) and isinstance(other, int):
+        return one == other
+    return (math.isnan(one) and math.isnan(other)) or math.isclose(one, other, rel_tol=CLOSE, abs_tol=CLOSE)
