@@ -38,6 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
     code = _heeding(sys.argv[1:], whole_process=True)
     try:
         sys.stdout.flush()
+        sys.stderr.flush()
     except OSError:  # and not once more at the very end
         drop_output()
     return code

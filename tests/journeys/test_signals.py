@@ -42,9 +42,11 @@ sys.exit(front.main())
 def process(body: str, **options: object) -> subprocess.CompletedProcess[str]:
     """A whole process of ours whose command has this body."""
     lines = "\n    ".join(body.strip().splitlines())
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     return subprocess.run(
         [sys.executable, "-c", RUN.format(body=lines)],
         **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "cwd": ROOT, "text": True, "timeout": 60}
+        | {"env": buffered}
         | options,
         check=False,
     )  # type: ignore[call-overload, no-any-return]
