@@ -21,9 +21,9 @@ lint: $(STAMP)
 types: $(STAMP)
 	$(BIN)/mypy
 
-# Most tests of links wait for something, so three files at a time are run even on two processors.
+# Most tests of links wait for something, so four files at a time are run even on two processors.
 test: lint types
-	$(BIN)/python -m pytest -n 3 --dist loadfile
+	$(BIN)/python -m pytest -n 4 --dist loadfile
 
 # The long forms: every fault at full size, and every table of figures.
 faults: $(STAMP)
