@@ -121,7 +121,7 @@ def check(mission: Mission, floor: str | Path | None = None) -> tuple[Problem, .
     problems = problems_of(mission)
     if floor is None:
         return problems
-    from planner.verdict import verdict
+    from planner.checking.verdict import verdict
 
     return (*problems, *verdict(mission, Path(floor), None).problems)
 

@@ -32,17 +32,17 @@ from mission.planning import (
     Visibility,
 )
 from mission.settings import Settings
-from planner import sight
 from planner.candidates import candidates
 from planner.floors import read_floor
-from planner.navigable import navigable
 from planner.routing import GRAPHS, ROUTERS, route
 from planner.selection import select
 from planner.selection.cover import cover_of
 from planner.selection.demands import demands_of
 from planner.selection.greedy import greedy as choose_greedily
+from planner.sight.sight import sight
+from planner.space.navigable import navigable
 from planner.visibility.bresenham import bresenham
-from planner.visibility.exact import exact
+from planner.visibility.exact_sight import exact
 from tests.planner.worlds import moved, turned
 
 FLOORS = Path(__file__).parents[2] / "shared" / "data" / "paper"

@@ -16,9 +16,9 @@ from mission.settings import Settings
 from planner import plan
 from planner.candidates import candidates
 from planner.floors import read_floor
-from planner.navigable import navigable
 from planner.refine import refined
 from planner.selection import select
+from planner.space.navigable import navigable
 from planner.visibility import visibility
 
 HOME = Path(__file__).parents[1]
@@ -105,7 +105,7 @@ def plan_rows(name: str, path: Path, options: dict[str, float]) -> Iterator[list
 
 def _by_length(selection: Selection, figures: Figures) -> Figures:
     """The figures of a selection by length, whatever rule it was made by."""
-    from planner.appraisal import shares_of
+    from planner.appraisal.figures_of_route import shares_of
 
     space = selection.visibility.candidates.space
     by_length = replace(space, settings=msgspec.structs.replace(space.settings, coverage_rule="length"))

@@ -23,13 +23,13 @@ from benchmarks.table import put, table, versions
 from mission.geometry import FloatArray, IntArray
 from mission.planning import NavigableSpace
 from mission.settings import Settings
-from planner.navigable import navigable
 from planner.routing.colony import ant_colony
 from planner.routing.grid_graph import RESOLUTIONS, ways_on_grids
 from planner.routing.proof import Proof, proved
 from planner.routing.roadmap import ways_between
 from planner.routing.tour import length_of, nanometres, searched, shortest_tour, trials
 from planner.routing.ways import Ways
+from planner.space.navigable import navigable
 
 SIDE = 100.0
 """Points lie in a square of this many metres."""

@@ -16,13 +16,13 @@ from benchmarks.floors import office
 from benchmarks.table import median_seconds, put, table, versions
 from mission.floor import FloorPlan
 from mission.settings import Settings
-from planner import sight as sight_module
 from planner.candidates import candidates
 from planner.floors import read_floor
-from planner.navigable import navigable
 from planner.shapes import local_origin, to_grid, to_shape
-from planner.sight import Scene, scene_of, sight
-from planner.visibility.exact import open_space
+from planner.sight.sight import Scene, scene_of, sight
+from planner.sight.sight import sight as sight_module
+from planner.space.navigable import navigable
+from planner.visibility.exact_sight import open_space
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 PAPER = ("case1_structural", "case2_structural", "case1_rooms", "case2_rooms")

@@ -113,7 +113,7 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
     claims = None if coverage is None else read_coverage(coverage, mission)
     other = _other_floor(mission, floor)
     try:
-        from planner.verdict import verdict
+        from planner.checking.verdict import verdict
 
         if sys.stderr.isatty():
             typer.echo(f"holding the mission against {floor} …", err=True)

@@ -34,7 +34,7 @@ def plan(
     """
     from mission.plan import Plan
     from planner.candidates import candidates
-    from planner.navigable import navigable
+    from planner.space.navigable import navigable
 
     observe(floor)
     space = navigable(floor, settings)
@@ -47,7 +47,7 @@ def plan(
 def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
     """Plan from candidates on; `planned` are all parts of the floor that the plan enters."""
     from mission.plan import PartPlan
-    from planner.appraisal import figures_of
+    from planner.appraisal.figures_of_route import figures_of
     from planner.assemble import assemble
     from planner.refine import refined
     from planner.routing import route

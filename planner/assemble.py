@@ -33,9 +33,9 @@ from mission.specs import (
     scanner_of,
     site_origin_of,
 )
-from planner.gaps import Walls, keeps_clear
-from planner.reach import walls_of
 from planner.shapes import local_origin
+from planner.space.gaps import Walls, keeps_clear
+from planner.space.reach import walls_of
 
 CLEAR_SLACK = 2e-6
 """What rounding to DECIMALS may cost in clearance."""

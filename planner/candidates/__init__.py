@@ -31,8 +31,8 @@ from planner.candidates.grid import grid
 from planner.candidates.place import Place
 from planner.candidates.proposals import Proposals, in_order, joined
 from planner.candidates.triangulation import triangulation
-from planner.reach import Reach, reach_of
 from planner.shapes import local_origin
+from planner.space.reach import Reach, reach_of
 
 Strategy = Callable[[NavigableSpace], tuple[FloatArray, IntArray] | tuple[FloatArray, IntArray, IntArray]]
 STRATEGIES: dict[str, Strategy] = {"grid": grid, "triangulation": triangulation}

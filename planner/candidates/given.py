@@ -10,8 +10,8 @@ from mission.geometry import FloatArray
 from mission.planning import DROP_REASONS, KEPT, NavigableSpace, OpeningState
 from planner.candidates.place import Place
 from planner.candidates.proposals import Proposals
-from planner.openings import widest_clear
 from planner.shapes import local_origin, to_shape
+from planner.space.opening_joins import widest_clear
 
 
 def doorways(space: NavigableSpace) -> Proposals:

@@ -14,8 +14,8 @@ from ezdxf.document import Drawing
 
 from mission.floor import Finding, FloorPlan
 from planner.floors.drawing import metres_per_unit, open_drawing
+from planner.floors.drawn_shapes import Shape, shapes_of
 from planner.floors.parts import in_order, parts_of
-from planner.floors.shapes import Shape, shapes_of
 from planner.floors.strokes import sketch, strokes_of
 
 

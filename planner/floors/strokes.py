@@ -16,8 +16,8 @@ from mission.geometry import FloatArray, frozen, ring_area
 from mission.kinds import KINDS
 from planner.floors.curves import LARGEST, Curve, Fineness, curves_of
 from planner.floors.drawing import BROKEN_INPUT, legible
+from planner.floors.drawn_shapes import Shape
 from planner.floors.rings import depths
-from planner.floors.shapes import Shape
 
 SAGITTA = 0.001
 """Greatest distance in metres between a curve and its chords."""

@@ -16,7 +16,6 @@ import numpy as np
 from mission.errors import AnswerIsNo, InputError
 from mission.geometry import FloatArray, IntArray, frozen, polyline_length
 from mission.planning import NavigableSpace, Route, Selection
-from planner.reach import reach_of
 from planner.routing.colony import ant_colony
 from planner.routing.grid_graph import grid_ways
 from planner.routing.proof import proved
@@ -24,6 +23,7 @@ from planner.routing.roadmap import ways_between
 from planner.routing.tour import NANOMETRES, nanometres, shortest_tour
 from planner.routing.ways import Ways
 from planner.shapes import local_origin
+from planner.space.reach import reach_of
 
 Router = Callable[..., IntArray]
 ROUTERS: dict[str, Router] = {"default": shortest_tour, "aco": ant_colony}

@@ -28,10 +28,10 @@ from mission.geometry import FloatArray, IntArray
 from mission.planning import NavigableSpace
 from mission.settings import Settings
 from planner.candidates.grid import main_axes, room_grid
-from planner.openings import middle_and_normal
 from planner.routing.roadmap import anchors_of, on_crossings, outward_corners
 from planner.routing.ways import Ways, shortest_ways
 from planner.shapes import GRID, local_origin, to_shape
+from planner.space.opening_joins import middle_and_normal
 
 RESOLUTIONS = (1.0, 0.5, 0.25, 0.125, 0.0625)
 """Greatest spacings in metres: the paper's first one, then ours."""

@@ -15,11 +15,11 @@ from shapely.geometry.base import BaseGeometry
 
 from mission.geometry import FloatArray, IntArray
 from mission.planning import NavigableSpace
-from planner.mesh import mesh_of
-from planner.reach import reach_of
 from planner.routing.ways import Ways, shortest_ways
 from planner.shapes import GRID, local_origin, polygon_parts, snapped, to_grid, to_shape, whole_steps
-from planner.sight import scene_of, sight
+from planner.sight.mesh import mesh_of
+from planner.sight.sight import scene_of, sight
+from planner.space.reach import reach_of
 
 PAIRS = 1_000_000
 """Pairs of nodes held at a time, about 200 bytes each."""

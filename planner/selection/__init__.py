@@ -17,7 +17,7 @@ from mission.settings import Settings
 from planner.selection.bound import lower_bound
 from planner.selection.cover import Cover, cover_of
 from planner.selection.demands import demands_of
-from planner.selection.exact import exact
+from planner.selection.exact_cover import exact
 from planner.selection.greedy import greedy, in_greedy_order
 from planner.selection.improve import improved
 

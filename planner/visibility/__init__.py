@@ -10,7 +10,7 @@ from collections.abc import Callable
 from mission.errors import AnswerIsNo, InputError
 from mission.planning import Candidates, Visibility
 from planner.visibility.bresenham import bresenham
-from planner.visibility.exact import exact
+from planner.visibility.exact_sight import exact
 from planner.visibility.headings import with_headings
 
 Method = Callable[[Candidates], Visibility]

@@ -18,7 +18,7 @@ from mission.sense import problems_of
 from mission.settings import Settings
 from planner.routing.roadmap import ways_between
 from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
-from planner.targets import face_segments
+from planner.space.targets import face_segments
 from tests.planner.oracle import visible_pairs
 
 TOLERANCE = 1e-5

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
-import planner.sight
+import planner.sight.sight
 from planner.shapes import GRID
 from tests.planner.test_sight import World
 
@@ -32,7 +32,7 @@ def told(seed: int, *, reach: float, places: int, monkeypatch: pytest.MonkeyPatc
     truth = world.by_force(reach)
     wrong = []
     for above in (-1, math.inf):
-        monkeypatch.setattr(planner.sight, "COMPILE_ABOVE", above)
+        monkeypatch.setattr(planner.sight.sight, "COMPILE_ABOVE", above)
         wrong.append(int((world.by_kernel(reach) != truth).sum()))
     return Told(_looked_at(world, reach), *wrong)
 

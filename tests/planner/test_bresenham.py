@@ -11,10 +11,10 @@ from mission.planning import Candidates, Visibility
 from mission.settings import Settings
 from planner.candidates import candidates
 from planner.compiling import compiled
-from planner.navigable import navigable
+from planner.space.navigable import navigable
 from planner.visibility import visibility
 from planner.visibility.bresenham import bresenham, clear_line, clear_lines
-from planner.visibility.exact import exact
+from planner.visibility.exact_sight import exact
 from planner.visibility.raster import crossed_by, inside_of, raster_of
 from tests.planner.worlds import box, column, element, floor_of, hall, moved, shell, turned, two_rooms
 

@@ -20,8 +20,8 @@ from mission.files.mission_json import read, write
 from mission.floor import FloorPlan
 from mission.planning import NavigableSpace, Route, Selection
 from mission.settings import Settings
-from planner.claims import Recount, overclaims, recount
-from planner.sight import sight
+from planner.checking.claims import Recount, overclaims, recount
+from planner.sight.sight import sight
 from tests.journeys.test_base import without_extras
 from tests.planner.test_command import drawn
 from tests.planner.worlds import (
@@ -84,7 +84,7 @@ def test_sight_that_reaches_too_far_is_found_out(monkeypatch: pytest.MonkeyPatch
     def far(*given: Any, reach: float, **others: Any) -> Any:
         return sight(*given, reach=1.2 * reach, **others)
 
-    monkeypatch.setattr(sys.modules["planner.visibility.exact"], "sight", far)
+    monkeypatch.setattr(sys.modules["planner.visibility.exact_sight"], "sight", far)
     mission, nouns = planned(HALL, Settings(range=2.0))
     found, problems = counted(mission, nouns)
     assert found.share is not None and found.share < 0.9

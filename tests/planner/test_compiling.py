@@ -16,7 +16,7 @@ from planner.compiling import anew_if_not_kept
 ROOT = Path(__file__).parents[2]
 NO_FILE_GROWS = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
 CALL = """
-import planner.compiling, planner.sight_kernel as kernel
+import planner.compiling, planner.sight.kernel as kernel
 tell = planner.compiling.compiled(kernel.within_reach)
 print(planner.compiling.__file__, tell(3, 4, 3, 4, 1, 2, 5), tell(3, 4, 3, 4, 1, 2, 4))
 """

@@ -12,11 +12,11 @@ import shapely
 from mission.errors import StopgoError
 from mission.floor import FloorPlan
 from mission.geometry import Polygon
-from planner.mesh import mesh_of
 from planner.shapes import GRID, local_origin, polygon_parts, segments_of, snapped, snapped_union, whole_steps
-from planner.sight import scene_of
-from planner.targets import occluders_of, without_cracks
-from planner.visibility.exact import open_space
+from planner.sight.mesh import mesh_of
+from planner.sight.sight import scene_of
+from planner.space.targets import occluders_of, without_cracks
+from planner.visibility.exact_sight import open_space
 from tests.planner.test_visibility import at, by_force, rows_of, shared
 from tests.planner.worlds import LAYERED, PAPER, box, floor_of, moved, turned, wall
 

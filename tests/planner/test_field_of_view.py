@@ -12,7 +12,7 @@ from mission.floor import FloorPlan
 from mission.planning import KEPT, Candidates, Route, Visibility
 from mission.settings import Settings, check_settings
 from planner.candidates import candidates
-from planner.navigable import navigable
+from planner.space.navigable import navigable
 from planner.visibility import visibility
 from planner.visibility.headings import headings_of
 from tests.planner.worlds import column, hall, mirrored, moved, planned, turned, two_rooms

@@ -14,7 +14,7 @@ from mission.document import Mission, Point, Stop
 from mission.files.mission_json import read, write
 from mission.floor import FloorPlan
 from mission.settings import Settings
-from planner.fit import misfits_on
+from planner.checking.fit import misfits_on
 from tests.planner.test_command import drawn
 from tests.planner.worlds import (
     box,

@@ -11,10 +11,10 @@ from mission.floor import FloorPlan
 from mission.geometry import Polygon
 from mission.settings import Settings
 from planner.assemble import check_legs
-from planner.navigable import navigable
 from planner.routing import route
 from planner.routing.grid_graph import RESOLUTIONS, grid_ways, ways_on_grids
 from planner.routing.roadmap import ways_between
+from planner.space.navigable import navigable
 from tests.planner.checks import obstacles_of
 from tests.planner.test_routing import floor_with_things, free_points, selection_at
 from tests.planner.worlds import box, column, door, floor_of, hall, room, shell, two_rooms, wall

@@ -10,8 +10,8 @@ import pytest
 from mission.errors import InputError
 from planner.compiling import compiled
 from planner.shapes import GRID, to_grid
-from planner.sight import scene_of, sight
-from planner.sight_kernel import FARTHEST, MOST_UNITS, not_negative, within_reach
+from planner.sight.kernel import FARTHEST, MOST_UNITS, not_negative, within_reach
+from planner.sight.sight import scene_of, sight
 from tests.planner.long_walls import RANGES, told
 from tests.planner.test_sight import World
 

@@ -12,9 +12,9 @@ from mission.floor import Element, FloorPlan
 from mission.geometry import Polygon
 from mission.planning import NavigableSpace, OpeningState
 from mission.settings import Settings
-from planner.gaps import Site
-from planner.navigable import navigable
 from planner.routing.roadmap import ways_between
+from planner.space.gaps import Site
+from planner.space.navigable import navigable
 from tests.planner.worlds import (
     box,
     column,

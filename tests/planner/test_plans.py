@@ -17,10 +17,10 @@ from mission.geometry import polyline_length
 from mission.planning import Candidates, NavigableSpace, Selection
 from mission.settings import Settings
 from planner import plan
+from planner.appraisal.unreached import unreached
 from planner.candidates import candidates
 from planner.floors import read_floor
-from planner.navigable import navigable
-from planner.unreached import unreached
+from planner.space.navigable import navigable
 from tests.planner.checks import check_plan, check_rooms_are_joined
 from tests.planner.worlds import FLOORS, SHARED, changed, moved, planned, shifted, turned
 

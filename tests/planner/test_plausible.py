@@ -14,7 +14,7 @@ from mission.figures import Figures, percent
 from mission.floor import FloorPlan, IgnoredLine, Rank
 from mission.geometry import frozen
 from mission.settings import Settings
-from planner.appraisal import ranked
+from planner.appraisal.figures_of_route import ranked
 from tests.planner.worlds import (
     box,
     column,

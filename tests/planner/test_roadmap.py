@@ -14,11 +14,11 @@ from mission.geometry import Polygon
 from mission.planning import NavigableSpace
 from mission.settings import Settings
 from planner.floors import read_floor
-from planner.navigable import navigable
 from planner.routing import roadmap
 from planner.routing.roadmap import outward_corners, ways_between
 from planner.routing.ways import Ways
 from planner.shapes import local_origin, snapped, to_shape
+from planner.space.navigable import navigable
 from tests.planner.worlds import PAPER, SHARED, box, column, element, hall, two_rooms, wall
 
 SETTINGS = Settings(robot_radius=0.3, edge=0.3)

@@ -14,10 +14,10 @@ from mission.floor import FloorPlan
 from mission.geometry import frozen
 from mission.planning import KEPT, Candidates, Route, Selection
 from mission.settings import Settings
-from planner.navigable import navigable
 from planner.routing import ROUTERS, route
 from planner.routing.roadmap import ways_between
-from planner.visibility.exact import exact
+from planner.space.navigable import navigable
+from planner.visibility.exact_sight import exact
 from tests.planner.checks import obstacles_of, shape_of
 from tests.planner.worlds import box, column, element, hall, planned, two_rooms, wall
 

@@ -14,7 +14,7 @@ from mission.floor import Element, FloorPlan
 from mission.geometry import Polygon
 from mission.planning import NavigableSpace, Selection, weights_of
 from mission.settings import Settings, read_settings
-from planner.navigable import navigable
+from planner.space.navigable import navigable
 from tests.planner.worlds import (
     box,
     column,

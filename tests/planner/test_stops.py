@@ -14,11 +14,11 @@ from mission.floor import Element, FloorPlan
 from mission.geometry import Polygon
 from mission.planning import DROP_REASONS, KEPT, Candidates
 from mission.settings import Settings
+from planner.appraisal.unreached import unreached
 from planner.candidates import STRATEGIES, candidates
 from planner.candidates.place import Place
-from planner.navigable import navigable
 from planner.routing.roadmap import ways_between
-from planner.unreached import unreached
+from planner.space.navigable import navigable
 from tests.planner.worlds import (
     box,
     column,

@@ -9,7 +9,6 @@ import pytest
 
 from mission.errors import InputError
 from planner.routing import Ends, far_edge, tour_matrix
-from planner.routing.bound import one_tree, one_tree_bound, useful_edges
 from planner.routing.cuts import violated_cuts
 from planner.routing.proof import proved
 from planner.routing.subsets import best_of_all
@@ -21,6 +20,7 @@ from planner.routing.tour import (
     shortest_tour,
     trials,
 )
+from planner.routing.tour_bound import one_tree, one_tree_bound, useful_edges
 
 
 def scattered(n: int, seed: int) -> np.ndarray:

@@ -27,8 +27,8 @@ from planner.candidates.triangulation import (
     triangulated,
     voronoi_points,
 )
-from planner.navigable import navigable
 from planner.shapes import segments_of
+from planner.space.navigable import navigable
 from tests.planner.worlds import (
     SHARED,
     box,

@@ -17,11 +17,11 @@ from mission.planning import KEPT, Candidates, Visibility
 from mission.settings import Settings
 from planner.candidates import candidates
 from planner.floors import read_floor
-from planner.navigable import navigable
 from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
-from planner.targets import face_segments
+from planner.space.navigable import navigable
+from planner.space.targets import face_segments
 from planner.visibility import visibility
-from planner.visibility.exact import exact
+from planner.visibility.exact_sight import exact
 from tests.planner.oracle import visible_pairs
 from tests.planner.worlds import (
     PAPER,

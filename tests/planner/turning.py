@@ -18,12 +18,12 @@ from mission.geometry import BoolArray, FloatArray, frozen
 from mission.planning import KEPT, Candidates, NavigableSpace
 from mission.settings import Settings
 from planner.candidates import candidates
-from planner.connected import parts_of
 from planner.floors.dxf import floor_in
-from planner.navigable import navigable
 from planner.shapes import GRID, local_origin, to_grid, to_shape
-from planner.sight import Scene, scene_of, sight
-from planner.visibility.exact import open_space
+from planner.sight.sight import Scene, scene_of, sight
+from planner.space.connected import parts_of
+from planner.space.navigable import navigable
+from planner.visibility.exact_sight import open_space
 
 POSITIONS = 24
 """Scan positions that look on every floor."""

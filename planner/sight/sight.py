@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from mission.errors import InputError, StopgoError
 from mission.geometry import BoolArray, FloatArray, IntArray
 from planner.compiling import compiled
-from planner.mesh import Mesh, containing, place_of, rim_of
 from planner.shapes import GRID, to_grid
-from planner.sight_kernel import FARTHEST, HELPERS, MOST_UNITS, look_all, not_negative
+from planner.sight.kernel import FARTHEST, HELPERS, MOST_UNITS, look_all, not_negative
+from planner.sight.mesh import Mesh, containing, place_of, rim_of
 
 COMPILE_ABOVE = 2_000_000
 """Viewpoints × mesh triangles above which loading the compiled kernel pays for itself."""

@@ -12,8 +12,6 @@ from mission.errors import InputError
 from mission.floor import FloorPlan
 from mission.geometry import FloatArray
 from mission.settings import Settings
-from planner.gaps import Walls, crossings_through, tight_gaps
-from planner.openings import Crossing, barrier, crossings_of, threshold
 from planner.shapes import (
     GRID,
     GROWTH,
@@ -28,7 +26,9 @@ from planner.shapes import (
     union,
     widened,
 )
-from planner.targets import solid_of
+from planner.space.gaps import Walls, crossings_through, tight_gaps
+from planner.space.opening_joins import Crossing, barrier, crossings_of, threshold
+from planner.space.targets import solid_of
 
 
 @dataclass(frozen=True, eq=False)

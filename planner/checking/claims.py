@@ -23,10 +23,10 @@ from mission.geometry import BoolArray, IntArray
 from mission.planning import Candidates, NavigableSpace, weights_of
 from mission.sense import Problem
 from planner.candidates import STRATEGIES, candidates
-from planner.reach import reach_of
 from planner.shapes import local_origin
-from planner.sightlines import SightLines
-from planner.visibility.exact import sides_of_door, viewpoints_of
+from planner.sight.sightlines import SightLines
+from planner.space.reach import reach_of
+from planner.visibility.exact_sight import sides_of_door, viewpoints_of
 from planner.visibility.headings import in_view, with_headings
 from planner.visibility.runs import visibility_of
 

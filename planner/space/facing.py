@@ -9,8 +9,8 @@ import shapely
 
 from mission.geometry import FloatArray, IntArray, frozen
 from mission.planning import RoomSpace, Targets
-from planner.ground import Ground
 from planner.shapes import to_shape
+from planner.space.ground import Ground
 
 AHEAD = (0.02, 0.1, 0.25)
 """Distances (m) in front of a face at which its room is looked for: rooms often begin a little off it."""

@@ -16,12 +16,12 @@ from mission.floor import Finding
 from mission.geometry import FloatArray
 from mission.planning import OpeningState
 from mission.settings import Settings
-from planner.connected import Parts, parts_of
-from planner.gaps import Gap, gaps_between
-from planner.ground import Ground
-from planner.openings import Crossing, middle_and_normal
 from planner.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
-from planner.targets import LINE_WALL, solid_of
+from planner.space.connected import Parts, parts_of
+from planner.space.gaps import Gap, gaps_between
+from planner.space.ground import Ground
+from planner.space.opening_joins import Crossing, middle_and_normal
+from planner.space.targets import LINE_WALL, solid_of
 
 NEAR_OPENING = 1.6
 """How far from an opening (m) the obstacle that blocks it is looked for."""

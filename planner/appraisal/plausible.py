@@ -14,7 +14,7 @@ from mission.floor import Finding, FloorPlan
 from mission.geometry import FloatArray
 from mission.planning import NavigableSpace, Route
 from planner.shapes import HAIRLINE, local_origin, to_shape, union
-from planner.targets import solid_of
+from planner.space.targets import solid_of
 
 BESIDE_WALL = 0.35
 """A room's outline this close (m) to an element has a wall there."""

@@ -1,6 +1,6 @@
 """What a place sees, told line by line: every sight line is held against every edge that may block it.
 
-Slow and plain: it shares nothing with the triangular expansion of `planner.sight`, so that each proves
+Slow and plain: it shares nothing with the triangular expansion of `planner.sight.sight`, so that each proves
 the other. The rule for lines through a vertex is the same: a midpoint is seen if a ray turned to one
 side by an arbitrarily small angle reaches it.
 
@@ -19,7 +19,7 @@ import shapely
 from mission.geometry import BoolArray, FloatArray, IntArray
 from mission.planning import NavigableSpace
 from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
-from planner.targets import face_segments
+from planner.space.targets import face_segments
 
 SPLIT = 27
 LOW = (1 << SPLIT) - 1

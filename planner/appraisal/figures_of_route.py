@@ -11,10 +11,10 @@ from mission.floor import Finding, Rank
 from mission.geometry import BoolArray, FloatArray
 from mission.planning import Candidates, Route, Selection, weights_of
 from mission.seen import seen_units
-from planner.plausible import doubts_of, near_legs
-from planner.reach import reach_of
+from planner.appraisal.plausible import doubts_of, near_legs
+from planner.appraisal.unreached import unreached
 from planner.shapes import local_origin, to_shape
-from planner.unreached import unreached
+from planner.space.reach import reach_of
 
 
 def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figures:

@@ -13,9 +13,9 @@ import shapely
 
 from mission.geometry import BoolArray, FloatArray, IntArray
 from mission.planning import NavigableSpace
-from planner.connected import Parts, parts_of
-from planner.gaps import Site, Walls
 from planner.shapes import GRID, boundary_lines, local_origin, segments_of, to_shape
+from planner.space.connected import Parts, parts_of
+from planner.space.gaps import Site, Walls
 
 INSIDE = 3 * GRID
 """Points nearer than this (m) to the drive area's edge are anchored, since the mesh is snapped."""

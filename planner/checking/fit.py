@@ -21,12 +21,12 @@ from mission.floor import Element, FloorPlan
 from mission.geometry import FloatArray
 from mission.sense import Problem
 from mission.settings import Settings
+from planner.appraisal.plausible import over_ignored
 from planner.assemble import CLEAR_SLACK
-from planner.gaps import Walls
-from planner.ground import Ground
-from planner.plausible import over_ignored
 from planner.shapes import HAIRLINE, SLACK, holds, segments_of
-from planner.targets import solid_of
+from planner.space.gaps import Walls
+from planner.space.ground import Ground
+from planner.space.targets import solid_of
 
 ALLOWED = SLACK + CLEAR_SLACK
 """What a clearance may fall short by, in metres: as in planning, and rounded as in missions."""

@@ -10,10 +10,10 @@ from mission.errors import AnswerIsNo, InputError
 from mission.files.coverage_json import Coverage
 from mission.sense import Problem
 from mission.settings import read_settings
-from planner.claims import Recount, overclaims, recount
-from planner.fit import misfits_on, other_machine
+from planner.checking.claims import Recount, overclaims, recount
+from planner.checking.fit import misfits_on, other_machine
 from planner.floors import read_floor
-from planner.navigable import navigable
+from planner.space.navigable import navigable
 
 
 @dataclass(frozen=True, eq=False)

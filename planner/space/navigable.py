@@ -10,13 +10,13 @@ from mission.geodesy import out_of_reach
 from mission.geometry import FloatArray, frozen
 from mission.planning import NavigableSpace
 from mission.settings import Settings
-from planner.facing import faced_rooms
-from planner.ground import Ground, drivable
-from planner.openings import Crossing, barrier
-from planner.passable import opening_states
-from planner.rooms import room_spaces
 from planner.shapes import local_origin, to_polygons
-from planner.targets import occluders_of, targets_of
+from planner.space.facing import faced_rooms
+from planner.space.ground import Ground, drivable
+from planner.space.opening_joins import Crossing, barrier
+from planner.space.passable import opening_states
+from planner.space.room_spaces import room_spaces
+from planner.space.targets import occluders_of, targets_of
 
 
 def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:

@@ -13,8 +13,8 @@ from shapely.geometry.base import BaseGeometry
 
 from mission.geometry import BoolArray, FloatArray, IntArray
 from mission.planning import NavigableSpace
-from planner.reach import INSIDE, reach_of
 from planner.shapes import SLACK, local_origin, polygon_parts, segments_of, to_shape
+from planner.space.reach import INSIDE, reach_of
 
 APART = 0.1
 """Floor edges are asked every so many metres what lies across."""

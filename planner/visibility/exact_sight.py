@@ -7,10 +7,10 @@ import shapely
 
 from mission.geometry import FloatArray, IntArray, bounds, frozen
 from mission.planning import Candidates, NavigableSpace, Visibility
-from planner.mesh import Mesh, mesh_of
 from planner.shapes import local_origin, to_grid, whole_steps_of
-from planner.sight import scene_of, sight
-from planner.targets import LINE_WALL
+from planner.sight.mesh import Mesh, mesh_of
+from planner.sight.sight import scene_of, sight
+from planner.space.targets import LINE_WALL
 
 BESIDE = 2 * LINE_WALL
 """Distance in metres from a closed door's line at which a scanner in its doorway looks."""
@@ -19,7 +19,7 @@ MARGIN = 1.0
 
 
 def exact(candidates: Candidates) -> Visibility:
-    """Units within range whose midpoint is in sight; `planner.sight_kernel` has the rule for corners."""
+    """Units within range whose midpoint is in sight; `planner.sight.kernel` has the rule for corners."""
     space, targets = candidates.space, candidates.space.targets
     origin = local_origin(space.floor)
     places, row = viewpoints_of(candidates)

@@ -10,10 +10,10 @@ import shapely
 
 from mission.planning import AT_EDGE, IN_HOLE, OTHER_PART, TOO_CLOSE, UNREACHABLE, Candidates, Unreached
 from planner.candidates.place import Place
-from planner.floor_gaps import gap_before
-from planner.openings import PROBES
-from planner.reach import reach_of
 from planner.shapes import local_origin, to_shape
+from planner.space.floor_gaps import gap_before
+from planner.space.opening_joins import PROBES
+from planner.space.reach import reach_of
 
 LEAST_AREA = 0.01
 """Rooms smaller than this (m²) are not told of."""

@@ -1,0 +1,1 @@
+"""Lines of sight: what a point sees of a floor, exactly."""
