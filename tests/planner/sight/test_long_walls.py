@@ -13,7 +13,7 @@ from planner.shapes import GRID, to_grid
 from planner.sight.kernel import FARTHEST, MOST_UNITS, not_negative, within_reach
 from planner.sight.sight import scene_of, sight
 from tests.planner.long_walls import RANGES, told
-from tests.planner.test_sight import World
+from tests.planner.sight.test_sight import World
 
 COORDINATE = 2**29
 

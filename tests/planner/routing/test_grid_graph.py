@@ -16,7 +16,7 @@ from planner.routing.grid_graph import RESOLUTIONS, grid_ways, ways_on_grids
 from planner.routing.roadmap import ways_between
 from planner.space.navigable import navigable
 from tests.planner.checks import obstacles_of
-from tests.planner.test_routing import floor_with_things, free_points, selection_at
+from tests.planner.routing.test_routing import floor_with_things, free_points, selection_at
 from tests.planner.worlds import box, column, door, floor_of, hall, room, shell, two_rooms, wall
 
 GRID = Settings(graph="grid")

@@ -9,7 +9,7 @@ from planner.routing import Ends, tour_matrix
 from planner.routing.colony import ant_colony
 from planner.routing.subsets import best_of_all
 from planner.routing.tour import length_of, nanometres
-from tests.planner.test_tour import any_lengths, scattered
+from tests.planner.routing.test_tour import any_lengths, scattered
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 7, 60])
