@@ -141,6 +141,30 @@ def test_no_siblings_import_each_other_in_a_circle(parent: str) -> None:
     assert not circles(siblings(parent))
 
 
+PURE = ("mission.run", "mission.mavlink")
+
+
+@pytest.mark.parametrize("name", [name for name in MODULES if name.startswith(PURE)])
+def test_what_a_run_is_knows_no_clock_no_disk_and_no_line(name: str) -> None:
+    """So that what replays a log stands on what follows a robot."""
+    outer = {
+        "datetime",
+        "os",
+        "pathlib",
+        "pymavlink",
+        "random",
+        "socket",
+        "sqlite3",
+        "threading",
+        "time",
+        "zenoh",
+    }
+    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
+    named = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    named |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    assert not {one.partition(".")[0] for one in named} & outer
+
+
 @pytest.mark.parametrize("statement", ["import mission, bridge", "import planner, recordings"])
 def test_importing_a_folder_loads_nothing_slow(statement: str) -> None:
     slow = {"shapely", "scipy", "rerun", "numba", "ezdxf", "networkx", "highspy", "pyarrow", "pyproj"}

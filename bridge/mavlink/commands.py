@@ -14,7 +14,7 @@ from bridge.console import Bar, print_json, say, tell
 from bridge.mavlink.desk.logbook import forget, logbook, remember
 from bridge.mavlink.desk.standing import check_run_over
 from bridge.mavlink.line.origin import check_origin
-from bridge.mavlink.line.peer import Origin, Peer, reached
+from bridge.mavlink.line.peer import Peer, reached
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import read_line
 from bridge.mavlink.transfer.download import download
@@ -28,6 +28,7 @@ from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.autopilots import AUTOPILOTS, autopilot_named
 from mission.mavlink.fields import PLACED
 from mission.mavlink.items import Command, Frame, Item, ItemList
+from mission.mavlink.local_frame import VehicleOrigin
 from mission.mavlink.manner import ScanWait, Settle, Trigger
 from mission.mavlink.read_back import home_item
 from mission.mavlink.translate import translate
@@ -157,12 +158,12 @@ def _note_down(
 ) -> None:
     """Whoever follows the run must know what was sent; a run of the same mission is left as it is."""
     with logbook(url, peer.who.system, state) as book:
-        if not (done.already and book.course is not None and book.course.sent == sent):
+        if not (done.already and book.listed is not None and book.listed.sent == sent):
             remember(book, mission, sent)
 
 
 def _report_push(
-    peer: Peer, mission: Mission, sent: ItemList, done: Uploaded, origin: Origin | None, as_json: bool
+    peer: Peer, mission: Mission, sent: ItemList, done: Uploaded, origin: VehicleOrigin | None, as_json: bool
 ) -> None:
     if as_json:
         print_json({
@@ -184,7 +185,7 @@ def _check_suffix(out: Path) -> None:
         raise InputError(f"{out}: what a vehicle holds is written to one of *{', *'.join(FILES)}")
 
 
-def _json_file(peer: Peer, read: tuple[Item, ...], origin: Origin | None) -> bytes:
+def _json_file(peer: Peer, read: tuple[Item, ...], origin: VehicleOrigin | None) -> bytes:
     home_first = peer.autopilot.home_first
     document = {
         "schema": "stopgo/items",
@@ -198,11 +199,11 @@ def _json_file(peer: Peer, read: tuple[Item, ...], origin: Origin | None) -> byt
     return (json.dumps(document, indent=1) + "\n").encode()
 
 
-def _waypoints_file(peer: Peer, read: tuple[Item, ...], origin: Origin | None) -> bytes:
+def _waypoints_file(peer: Peer, read: tuple[Item, ...], origin: VehicleOrigin | None) -> bytes:
     return qgc_waypoints.listed([_home(peer, read, origin), *own_items(peer, read)])
 
 
-def _plan_file(peer: Peer, read: tuple[Item, ...], origin: Origin | None) -> bytes:
+def _plan_file(peer: Peer, read: tuple[Item, ...], origin: VehicleOrigin | None) -> bytes:
     home, own = _home(peer, read, origin), own_items(peer, read)
     speeds = [item.params[1] for item in own if item.command == Command.DO_CHANGE_SPEED]
     place = (home.x / STEPS_PER_DEGREE, home.y / STEPS_PER_DEGREE, home.z)
@@ -213,7 +214,7 @@ FILES = {".json": _json_file, ".waypoints": _waypoints_file, ".plan": _plan_file
 """What a vehicle holds, as a file of each suffix."""
 
 
-def _home(peer: Peer, read: tuple[Item, ...], origin: Origin | None) -> Item:
+def _home(peer: Peer, read: tuple[Item, ...], origin: VehicleOrigin | None) -> Item:
     """The vehicle's home where it is among its items, else its origin, else the first place."""
     if peer.autopilot.home_first and read:
         return read[0]
@@ -223,7 +224,7 @@ def _home(peer: Peer, read: tuple[Item, ...], origin: Origin | None) -> Item:
     return Item(Command.NAV_WAYPOINT, Frame.GLOBAL, x=first.x, y=first.y)
 
 
-def _origin_json(origin: Origin | None) -> dict[str, float] | None:
+def _origin_json(origin: VehicleOrigin | None) -> dict[str, float] | None:
     return None if origin is None else {"lat": origin.lat, "lon": origin.lon, "alt": origin.alt}
 
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from mission.document import Point
+from mission.run.way import foot
 
 THIN = 0.05
 """Share of the allowance that is spent on leaving out points of nearly straight pieces, for speed."""
@@ -113,17 +114,7 @@ def _straight_on(
 
 def _away(points: Sequence[Point], a: Point, b: Point) -> float:
     """Metres by which the farthest of some points lies from the segment from `a` to `b`."""
-    return max((_distance(point, a, b) for point in points), default=0.0)
-
-
-def _distance(point: Point, a: Point, b: Point) -> float:
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    length = dx * dx + dy * dy
-    if length == 0:
-        return math.dist(point, a)
-    along = ((point[0] - a[0]) * dx + (point[1] - a[1]) * dy) / length
-    along = min(1.0, max(0.0, along))
-    return math.dist(point, (a[0] + along * dx, a[1] + along * dy))
+    return max((math.dist(point, foot(a, b, point)) for point in points), default=0.0)
 
 
 def _direction(a: Point, b: Point) -> Point:

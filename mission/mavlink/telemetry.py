@@ -1,6 +1,15 @@
-"""What a vehicle's telemetry comes to: whether it stands still, and whether it is still heard."""
+"""What a vehicle's telemetry comes to: whether it stands still, whether it is still heard, where it is.
+
+Here end the units of MAVLink's messages: steps of 1e-7 degrees, millimetres, centimetres a second, percent.
+"""
 
 from __future__ import annotations
+
+import math
+from typing import Any
+
+from mission.geodesy import Geodetic, from_steps
+from mission.mavlink.local_frame import VehicleOrigin
 
 STILL_M_S = 0.03
 STILL_RAD_S = 0.03
@@ -29,3 +38,24 @@ def began_again(before_ms: int, now_ms: int) -> bool:
 def charge_of(remaining: int) -> float | None:
     """A battery_remaining (percent) as 0 to 1; `None` where the vehicle does not know it (-1)."""
     return remaining / 100 if 0 <= remaining <= 100 else None
+
+
+def place_of(message: Any) -> Geodetic | None:
+    """The `lat` and `lon` of a message; 0, 0 is no place."""
+    return None if (message.lat, message.lon) == (0, 0) else from_steps(message.lat, message.lon)
+
+
+def local_speed(message: Any) -> float:
+    """Metres per second that a LOCAL_POSITION_NED tells."""
+    return math.hypot(message.vx, message.vy)
+
+
+def global_speed(message: Any) -> float:
+    """Metres per second that a GLOBAL_POSITION_INT tells."""
+    return math.hypot(message.vx, message.vy) / 100
+
+
+def origin_of(message: Any) -> VehicleOrigin:
+    """What a GPS_GLOBAL_ORIGIN tells."""
+    place = from_steps(message.latitude, message.longitude)
+    return VehicleOrigin(lat=place.lat, lon=place.lon, alt=message.altitude / 1000)

@@ -34,7 +34,7 @@ def nearest(leg: Sequence[Point], pose: Pose) -> Place:
     here = (pose.x, pose.y)
     places = [Place(leg[0], 0, math.dist(leg[0], here))]
     for segment, (a, b) in enumerate(pairwise(leg)):
-        point = _foot(a, b, here)
+        point = foot(a, b, here)
         places.append(Place(point, segment, math.dist(point, here)))
     return min(reversed(places), key=lambda place: place.distance)
 
@@ -56,8 +56,8 @@ def nearest_leg(mission: Mission, pose: Pose) -> tuple[int, Place]:
     return leg, places[leg]
 
 
-def _foot(a: Point, b: Point, p: Point) -> Point:
-    """The point of segment ab nearest to p."""
+def foot(a: Point, b: Point, p: Point) -> Point:
+    """The point of the segment from `a` to `b` that is nearest to `p`."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     square = dx * dx + dy * dy
     share = 0.0 if square == 0 else ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / square

@@ -22,9 +22,7 @@ from bridge.link import MemoryLink, Request, Switchboard
 from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.hands import Hands
 from bridge.mavlink.desk.logbook import Logbook, logbook
-from bridge.mavlink.desk.lookout import TOLD, Lookout
 from bridge.mavlink.desk.orders import Consent, Orders
-from bridge.mavlink.desk.progress import held_by_vehicle
 from bridge.mavlink.line.peer import Peer, found
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import GROUND_STATION, Box, Who, dialect, wire
@@ -45,6 +43,8 @@ from bridge.station import Station, whoami
 from mission import __version__
 from mission.errors import RobotUnreachable
 from mission.events import PoseReport, StateReport
+from mission.mavlink.following.observer import TOLD, Observer
+from mission.mavlink.following.steps import held_by_vehicle
 from mission.mavlink.telemetry import is_lost
 from mission.run import states as runs
 from mission.run.lease import Lease
@@ -116,10 +116,10 @@ class Desk:
         self._peer = peer
         self._book = book
         self._wall: Clock = WallClock()
-        self._lookout = Lookout(peer.autopilot, book.clock)
-        self._hands = Hands(peer, self._lookout, book.clock)
-        self._orders = Orders(book, peer, self._lookout, self._hands, self._wall, options.consent)
-        self._follower = Follower(book, peer, self._lookout, self._hands, looks_only=options.looks_only)
+        self._observer = Observer(peer.autopilot)
+        self._hands = Hands(peer, self._observer, book.clock)
+        self._orders = Orders(book, peer, self._observer, self._hands, self._wall, options.consent)
+        self._follower = Follower(book, peer, self._observer, self._hands, looks_only=options.looks_only)
         self._link: MemoryLink = self.board.link()
         self._poses: deque[PoseReport] = deque(maxlen=POSES_KEPT)
         self._boot_id = ""
@@ -141,7 +141,7 @@ class Desk:
         self._tell_event = link.publisher(keys.event)
         self._tell_pose = link.publisher(keys.pose)
         link.announce(keys.alive)
-        self._lookout.take(self._peer.heartbeat, self._book.course)
+        self._observer.take(self._peer.heartbeat, self._book.listed, self._book.clock.now_ns())
         for work in (self._look, self._follower.act):
             thread = threading.Thread(target=self._watched, args=(work,), name=work.__name__, daemon=True)
             self._threads.append(thread)
@@ -171,9 +171,9 @@ class Desk:
             If it does not tell.
         """
         with self._hands.news:
-            course = self._book.course
-            self._hands.news.wait_for(lambda: self._lookout.complete(course), timeout_s)
-        if self._lookout.sequence is None and self._book.course is not None:
+            listed = self._book.listed
+            self._hands.news.wait_for(lambda: self._observer.complete(listed), timeout_s)
+        if self._observer.sequence is None and self._book.listed is not None:
             raise RobotUnreachable(
                 f"{self._peer} does not tell which item it works on (MISSION_CURRENT) within {timeout_s:g} s;"
                 " nothing was sent"
@@ -187,11 +187,12 @@ class Desk:
     # What it hears, and tells
 
     def _look(self) -> None:
-        asked_s = -ASK_AGAIN_S
+        asked_ns = 0
         with self._peer.box(*TOLD) as box:
             while not self._closing.is_set():
-                if self._wall.now_ns() / 1e9 - asked_s > ASK_AGAIN_S and not self._lookout.fresh(ASK_AGAIN_S):
-                    asked_s = self._wall.now_ns() / 1e9
+                now_ns = self._book.clock.now_ns()
+                if now_ns > asked_ns + ASK_AGAIN_S * 1e9 and not self._observer.fresh(ASK_AGAIN_S, now_ns):
+                    asked_ns = now_ns
                     self._hands.ask_for_telemetry()
                 self._take_next(box)
 
@@ -201,7 +202,7 @@ class Desk:
         if message is None:
             return
         with self._hands.news:
-            name = self._lookout.take(message, self._book.course)
+            name = self._observer.take(message, self._book.listed, self._book.clock.now_ns())
             self._hands.news.notify_all()
         before = self._follower.run
         self._follower.look(name)
@@ -218,7 +219,7 @@ class Desk:
         self._tell_state(encode(self._state()))
 
     def _report_pose(self) -> None:
-        fix, run = self._lookout.fix, self._follower.run
+        fix, run = self._observer.fix, self._follower.run
         if fix is None or fix.ns <= (self._poses[-1].robot_ns if self._poses else 0):
             return
         if self._boot_id != self._book.boot_id:  # each boot counts its poses anew
@@ -235,15 +236,15 @@ class Desk:
 
     def _state(self) -> StateReport:
         self._seq += 1
-        course = self._book.course
-        run = held_by_vehicle(self._follower.run, self._lookout.items)
-        stop = runs.stop_of(run, None if course is None else course.mission)
+        listed = self._book.listed
+        run = held_by_vehicle(self._follower.run, self._observer.items)
+        stop = runs.stop_of(run, None if listed is None else listed.mission)
         return StateReport(
             robot=self.keys.robot, boot_id=self._book.boot_id, seq=self._seq,
             robot_ns=self._book.clock.now_ns(), state=run.state, run_id=run.run_id,
             mission_id=run.mission_id, revision=run.revision, stop=stop.id if stop else None,
             stop_state=run.stop_state if stop else None, done=run.done, skipped=run.skipped,
-            battery=self._lookout.battery, last_event=self._book.journal.newest,
+            battery=self._observer.battery, last_event=self._book.journal.newest,
         )  # fmt: skip
 
     # What it is asked

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from bridge.clock import Clock
-from bridge.mavlink.desk.lookout import Lookout
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.wire import dialect
 from mission.errors import OutcomeUnknown
 from mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
+from mission.mavlink.following.observer import Observer
 from mission.run.orders import Refused
 
 SHOWS_S = 5.0
@@ -38,17 +38,17 @@ class Denied(Exception):
 
 
 class Hands:
-    """Orders to one vehicle, by its commands; whether it obeys, the lookout sees.
+    """Orders to one vehicle, by its commands; whether it obeys, the observer tells.
 
-    `news` is notified whenever the lookout has taken a message.
+    `news` is notified whenever the observer has taken a message.
     """
 
-    def __init__(self, peer: Peer, lookout: Lookout, clock: Clock) -> None:
+    def __init__(self, peer: Peer, observer: Observer, clock: Clock) -> None:
         self.news = threading.Condition()
         self.working: Callable[[], None] = lambda: None
         """Called before each command."""
         self._peer = peer
-        self._lookout = lookout
+        self._observer = observer
         self._clock = clock
         self._asked_ns = 0
 
@@ -95,7 +95,7 @@ class Hands:
         )
         near = range(sequence, sequence + 3)
         self._shown(
-            lambda: self._lookout.current_ns > asked_ns and self._lookout.sequence in near,
+            lambda: self._observer.current_ns > asked_ns and self._observer.sequence in near,
             f"going to item {sequence}",
         )
 
@@ -103,7 +103,7 @@ class Hands:
         """Arm it, or disarm it."""
         what = "arming" if armed else "disarming"
         self._order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, float(armed), what=what)
-        self._shown(lambda: self._lookout.armed == armed, what)
+        self._shown(lambda: self._observer.armed == armed, what)
 
     def speed(self, metres_per_s: float) -> None:
         """Set the speed that the mission's first item sets; not every firmware takes it from elsewhere."""
@@ -114,7 +114,7 @@ class Hands:
         asked_ns = self._clock.now_ns()
         self._order(dialect.MAV_CMD_DO_SET_MODE, *mode.params, what=f"mode {name}")
         self._shown(
-            lambda: self._lookout.mode == name and self._lookout.mode_ns > asked_ns, f"changing to {name}"
+            lambda: self._observer.mode == name and self._observer.mode_ns > asked_ns, f"changing to {name}"
         )
 
     def _order(self, number: int, *params: float, what: str) -> None:

@@ -21,11 +21,11 @@ import msgspec
 
 from bridge.clock import Clock, WallClock
 from bridge.journal import Journal, shared_journal
-from bridge.mavlink.desk.visits import Course, course_of
 from bridge.mavlink.line.url import Url
 from bridge.protocol import CHUNK_BYTES, Manifest
 from mission.document import Mission
 from mission.events import Aborted
+from mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from mission.mavlink.items import ItemList
 from mission.mavlink.telemetry import BACK_MS
 from mission.run import states as runs
@@ -98,28 +98,28 @@ class Logbook:
         self.clock = clock
         self.boot_ms = 0
         """The vehicle's time since it was started, as last told."""
-        self._course: tuple[Sent, Course] | None = None
+        self._listed: tuple[Sent, ListedMission] | None = None
 
     @property
     def run(self) -> Run:
         return self.journal.fact("run", Run) or Run()
 
     @property
-    def course(self) -> Course | None:
+    def listed(self) -> ListedMission | None:
         """The mission that was sent last, and how; the same object until another was."""
         sent = self.journal.fact("sent", Sent)
         if sent is None:
             return None
-        if self._course is None or self._course[0] != sent:
-            self._course = (sent, self._read_course(sent))
-        return self._course[1]
+        if self._listed is None or self._listed[0] != sent:
+            self._listed = (sent, self._read_course(sent))
+        return self._listed[1]
 
-    def _read_course(self, sent: Sent) -> Course:
+    def _read_course(self, sent: Sent) -> ListedMission:
         stored = self.journal.mission(sent.mission_id, sent.revision)
         items = self.journal.fact("items", Items)
         assert stored is not None and items is not None
         mission = msgspec.json.decode(stored[1], type=Mission)
-        return course_of(mission, msgspec.msgpack.decode(items.packed, type=ItemList))
+        return listed_mission(mission, msgspec.msgpack.decode(items.packed, type=ItemList))
 
     @property
     def boot_id(self) -> str:
@@ -212,7 +212,7 @@ def remember(book: Logbook, mission: Mission, sent: ItemList) -> None:
     )  # fmt: skip
     packed = msgspec.msgpack.encode(sent)
     told = Sent(mission_id=mission.id, revision=mission.revision, sha256=hashlib.sha256(packed).hexdigest())
-    course_of(mission, sent)
+    listed_mission(mission, sent)
     with book.journal.transaction():
         book.journal.store_mission(manifest, document)
         book.move(lambda run: () if run.over else (_replaced(run, "a mission was pushed to the vehicle"),))

@@ -15,19 +15,19 @@ import msgspec
 
 from bridge.answers import answer_to, answered, remember_answer
 from bridge.clock import Clock
-from bridge.mavlink.desk import progress
 from bridge.mavlink.desk.hands import Denied, Hands
 from bridge.mavlink.desk.logbook import Logbook, Ordered
-from bridge.mavlink.desk.lookout import Lookout
-from bridge.mavlink.desk.onward import ON_WAY_M, onward, way
-from bridge.mavlink.desk.progress import Sight
-from bridge.mavlink.desk.visits import Course
-from bridge.mavlink.gateway.local import apart
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.transfer.download import download
 from mission.document import Mission
 from mission.events import Pose
 from mission.mavlink.autopilots.kind import AUTO, HOLD, why_no_rover
+from mission.mavlink.following import steps as progress
+from mission.mavlink.following.listed_mission import ListedMission
+from mission.mavlink.following.observer import Observer
+from mission.mavlink.following.resuming import ON_WAY_M, resume_place, way
+from mission.mavlink.following.steps import Observation
+from mission.mavlink.local_frame import apart
 from mission.mavlink.read_back import differences
 from mission.run import states as runs
 from mission.run.decision import Decision, Situation, decide, handed_over
@@ -63,11 +63,11 @@ class Orders:
     """Carries out orders to one vehicle."""
 
     def __init__(
-        self, book: Logbook, peer: Peer, lookout: Lookout, hands: Hands, wall: Clock, consent: Consent
+        self, book: Logbook, peer: Peer, observer: Observer, hands: Hands, wall: Clock, consent: Consent
     ) -> None:
         self._book = book
         self._peer = peer
-        self._lookout = lookout
+        self._observer = observer
         self._hands = hands
         self._wall = wall
         self._consent = consent
@@ -86,18 +86,18 @@ class Orders:
         decision = self._in_the_way(order) or self._decided(order)
         if isinstance(decision, Refused):
             return self._refused(order, decision)
-        course = self._book.course
-        assert course is not None  # without a mission nothing is decided
+        listed = self._book.listed
+        assert listed is not None  # without a mission nothing is decided
         with self._ordering(order):
             try:
-                change = VERBS[order.verb](self, order, course, decision)
+                change = VERBS[order.verb](self, order, listed, decision)
             except Denied as denied:
                 return self._stored(order, denied.refused, None)
             return self._stored(order, change, decision.lease)
 
     def _refused(self, order: Order, refused: Refused) -> Answer:
         """A pause that the run has no use for still stops a vehicle that drives, whoever started it."""
-        drives = self._lookout.mode == AUTO and self._lookout.armed
+        drives = self._observer.mode == AUTO and self._observer.armed
         if order.verb != "pause" or not drives or refused.reason not in ("wrong_state", "no_mission"):
             return self._stored(order, refused, None)
         with self._ordering(order):
@@ -114,7 +114,7 @@ class Orders:
             return None
         return Refused("wrong_state", f"{other.verb} by {other.by} is being carried out; wait for its end")
 
-    def _elsewhere(self, course: Course) -> Refused | None:
+    def _elsewhere(self, listed: ListedMission) -> Refused | None:
         """Where the vehicle stands means something only if it counts from the mission's origin."""
         if self._consent.any_origin:
             return None
@@ -125,24 +125,24 @@ class Orders:
                 "the vehicle has no origin (GPS_GLOBAL_ORIGIN), so its metres count from nowhere, or does not"
                 " tell it; set it to the mission's (stopgo push --set-origin)",
             )
-        wrong = apart(course.sent.origin, origin)
+        wrong = apart(listed.sent.origin, origin)
         satellites = "; or add --any-origin, if it finds its place by satellites"
         return Refused("wrong_origin", wrong + satellites) if wrong else None
 
     def _decided(self, order: Order) -> Decision | Refused:
-        course, run, here = self._book.course, self._book.run, self._lookout.pose
-        if course is None:
+        listed, run, here = self._book.listed, self._book.run, self._pose
+        if listed is None:
             return Refused("no_mission", UNREMEMBERED)
-        if order.verb in DRIVING and self._lookout.items == 0:
+        if order.verb in DRIVING and self._observer.items == 0:
             return Refused("no_mission", CLEARED)
-        elsewhere = self._elsewhere(course) if order.verb in DRIVING else None
+        elsewhere = self._elsewhere(listed) if order.verb in DRIVING else None
         if elsewhere is not None:
             return elsewhere
         if here is None and order.verb not in FREE_VERBS:
             return Refused("no_position", "the vehicle does not tell where it is; does its navigation run?")
         if here is not None and order.verb != "start":
-            here = on_way(run, course, here)
-        return decide(order, self._situation(run, course.mission, here or NOWHERE))
+            here = on_way(run, listed, here)
+        return decide(order, self._situation(run, listed.mission, here or NOWHERE))
 
     def _situation(self, run: Run, mission: Mission, pose: Pose) -> Situation:
         journal = self._book.journal
@@ -151,26 +151,26 @@ class Orders:
             has_run=journal.has_run(mission.id, mission.revision),
             pose=pose, now_ns=self._book.clock.now_ns(), command_ns=self._wall.now_ns(),
             new_run_id=uuid.uuid4().hex[:12], lease=journal.fact("lease", Lease),
-            battery=self._lookout.battery, endurance_s=None,
+            battery=self._observer.battery, endurance_s=None,
         )  # fmt: skip
 
     # What each verb does
 
-    def _start(self, order: Order, course: Course, decision: Decision) -> Change:
+    def _start(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
         run = decision.change.run
-        sight = self._sight(run, course)
-        self._ready(course)
-        first = 0 if run.at == 0 else onward(run, course, replace(sight, place=-1), self._here())
-        self._go(course, first, None)
+        observed = self._observe(run, listed)
+        self._ready(listed)
+        first = 0 if run.at == 0 else resume_place(run, listed, replace(observed, place=-1), self._here())
+        self._go(listed, first, None)
         return decision.change
 
-    def _resume(self, order: Order, course: Course, decision: Decision) -> Change:
+    def _resume(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
         run = self._book.run
-        sight = self._sight(run, course)
-        self._ready(course)
-        lost = run.stop_state == "SCANNING" and not self._keeps_scan(run, course, sight)
+        observed = self._observe(run, listed)
+        self._ready(listed)
+        lost = run.stop_state == "SCANNING" and not self._keeps_scan(run, listed, observed)
         run = runs.changed(run, stop_state="WAITING") if lost else run
-        self._go(course, onward(run, course, sight, self._here()), sight)
+        self._go(listed, resume_place(run, listed, observed, self._here()), observed)
         return self._resumed(run, order, decision)
 
     def _resumed(self, run: Run, order: Order, decision: Decision) -> Change:
@@ -179,60 +179,64 @@ class Orders:
         change = runs.resumed(run, order.commander)
         return Change(change.run, (*handed_over(before, decision.lease), *change.events))
 
-    def _keeps_scan(self, run: Run, course: Course, sight: Sight) -> bool:
-        visit = course.visits[run.at]
-        return visit.at < sight.place < visit.after
+    def _keeps_scan(self, run: Run, listed: ListedMission, observed: Observation) -> bool:
+        items = listed.stops[run.at]
+        return items.at < observed.place < items.after
 
-    def _retry(self, order: Order, course: Course, decision: Decision) -> Change:
+    def _retry(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
         """Once more to the stop; the vehicle stands on the way to it, or beside it."""
         run = runs.changed(self._book.run, stop_state="WAITING", approaches=0)
-        sight = self._sight(run, course)
-        self._ready(course)
-        self._go(course, onward(run, course, sight, self._here()), sight)
+        observed = self._observe(run, listed)
+        self._ready(listed)
+        self._go(listed, resume_place(run, listed, observed, self._here()), observed)
         return self._resumed(run, order, decision)
 
-    def _pause(self, order: Order, course: Course, decision: Decision) -> Change:
+    def _pause(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
         self._hands.hold()
         return runs.paused(self._book.run, f"pause by {order.commander}")
 
-    def _skip(self, order: Order, course: Course, decision: Decision) -> Change:
+    def _skip(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
         """The way to the stop is still driven; the vehicle is led past its waits once it is there."""
         before, after = self._book.run, decision.change.run
-        sight = self._sight(after, course)
-        beyond = progress.passed_by(after, course, sight)
+        observed = self._observe(after, listed)
+        beyond = progress.passed_by(after, listed, observed)
         if after.over:
             self._hands.hold()
         elif before.state == "HELD":
-            elsewhere = self._elsewhere(course)
+            elsewhere = self._elsewhere(listed)
             if elsewhere is not None:
                 raise Denied(elsewhere)
-            self._ready(course)
-            self._go(course, onward(after, course, sight, self._here()), sight)
+            self._ready(listed)
+            self._go(listed, resume_place(after, listed, observed, self._here()), observed)
         elif before.state == "RUNNING" and beyond is not None:
-            self._hands.jump(course.sequence(beyond))
+            self._hands.jump(listed.sequence(beyond))
         return decision.change
 
-    def _abort(self, order: Order, course: Course, decision: Decision) -> Change:
+    def _abort(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
         self._hands.hold()
         if self._consent.disarm:
             self._hands.arm(False)
         return decision.change
 
-    def _home(self, order: Order, course: Course, decision: Decision) -> Change:
+    def _home(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
         raise Denied(Refused("unsupported", HOMEWARD))
 
     # What several of them need
 
-    def _sight(self, run: Run, course: Course) -> Sight:
-        sight = self._lookout.sight(run, course)
-        if sight is None:
+    def _observe(self, run: Run, listed: ListedMission) -> Observation:
+        observed = self._observer.observe(run, listed)
+        if observed is None:
             raise Denied(Refused("no_position", "the vehicle does not tell which item it works on"))
-        return sight
+        return observed
+
+    @property
+    def _pose(self) -> Pose | None:
+        return self._observer.pose(self._book.clock.now_ns())
 
     def _here(self) -> Pose:
-        return self._lookout.pose or NOWHERE
+        return self._pose or NOWHERE
 
-    def _ready(self, course: Course) -> None:
+    def _ready(self, listed: ListedMission) -> None:
         """Whether the vehicle may drive this mission: it holds it, and is armed.
 
         In AUTO it would drive off as soon as it is armed, and a mode that is on is not begun anew.
@@ -240,32 +244,32 @@ class Orders:
         unfit = why_no_rover(self._peer.heartbeat.type)
         if unfit:
             raise Denied(Refused("unsupported", unfit))
-        self._check_mission(course)
-        armed = self._lookout.armed
+        self._check_mission(listed)
+        armed = self._observer.armed
         if not armed and not self._consent.arm:
             raise Denied(Refused("not_armed", "the vehicle is disarmed; arm it, or add --arm"))
-        if self._lookout.mode == AUTO:
+        if self._observer.mode == AUTO:
             self._hands.hold()
         if not armed:
             self._hands.arm()
 
-    def _check_mission(self, course: Course) -> None:
-        found = differences(course.sent, download(self._peer))
+    def _check_mission(self, listed: ListedMission) -> None:
+        found = differences(listed.sent, download(self._peer))
         if found:
             more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
             raise Denied(
                 Refused("mission_differs", f"not what was pushed: {found[0]}{more}; push the mission again")
             )
 
-    def _go(self, course: Course, place: int, sight: Sight | None) -> None:
+    def _go(self, listed: ListedMission, place: int, observed: Observation | None) -> None:
         """AUTO, from an item on; where that leaves the first ones out, at the speed that they would set."""
-        anew = sight is None or sight.place >= course.end
-        jumps = anew or sight is None or place != sight.place
+        anew = observed is None or observed.place >= listed.end
+        jumps = anew or observed is None or place != observed.place
         if jumps:
-            self._hands.jump(course.sequence(place), anew=anew)
+            self._hands.jump(listed.sequence(place), anew=anew)
         self._hands.auto()
-        if jumps and place > 0 and course.speed is not None:
-            self._hands.speed(course.speed)
+        if jumps and place > 0 and listed.speed is not None:
+            self._hands.speed(listed.speed)
 
     # Storing
 
@@ -314,7 +318,7 @@ class _Ordering:
         self._book.journal.store_fact("ordered", msgspec.structs.replace(self._ordered, until_ns=until_ns))
 
 
-VERBS: dict[str, Callable[[Orders, Order, Course, Decision], Change]] = {
+VERBS: dict[str, Callable[[Orders, Order, ListedMission, Decision], Change]] = {
     "start": Orders._start,
     "pause": Orders._pause,
     "resume": Orders._resume,
@@ -325,10 +329,10 @@ VERBS: dict[str, Callable[[Orders, Order, Course, Decision], Change]] = {
 }
 
 
-def on_way(run: Run, course: Course, pose: Pose) -> Pose:
+def on_way(run: Run, listed: ListedMission, pose: Pose) -> Pose:
     """The pose, or the nearest point of the way if that is so near that the vehicle is on it."""
-    near = min(way(run, course), key=lambda piece: piece.away(pose), default=None)
+    near = min(way(run, listed), key=lambda piece: piece.away(pose), default=None)
     if near is None or near.away(pose) > ON_WAY_M:
         return pose
-    x, y = near.foot(pose)
+    x, y = near.nearest(pose)
     return Pose(x=x, y=y, heading=pose.heading)

@@ -16,10 +16,10 @@ def check_run_over(peer: Peer, url: Url, book: Logbook, what: str) -> None:
     AnswerIsNo
         If the run is not over; `what` is the deed that would end it, as in "a push".
     """
-    run, course = book.run, book.course
-    if run.over or course is None:
+    run, listed = book.run, book.listed
+    if run.over or listed is None:
         return
-    mission = course.mission
+    mission = listed.mission
     stops = f"{len(run.done)} of {len(mission.stops)} stops done"
     seen = ", unless stopgo watch sees that it has come to its end" if run.state == "RUNNING" else ""
     raise AnswerIsNo(

@@ -12,14 +12,15 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from bridge.mavlink.line.peer import Origin, Peer, found, origin_of
+from bridge.mavlink.line.peer import Peer, found
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import Box, Message, Who, dialect, wire
 from mission.document import Point
 from mission.errors import InputError, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots import AUTOPILOTS
 from mission.mavlink.autopilots.kind import Mode, why_no_rover
-from mission.mavlink.telemetry import charge_of, is_lost, stands_still
+from mission.mavlink.local_frame import VehicleOrigin
+from mission.mavlink.telemetry import charge_of, is_lost, origin_of, stands_still
 
 ON_BOARD = Who(253, dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
 """Ourselves: neither QGroundControl (255) nor a station of ours (254)."""
@@ -190,7 +191,7 @@ class Autopilot:
                 return charge
         return None
 
-    def origin(self) -> Origin | None:
+    def origin(self) -> VehicleOrigin | None:
         """What its metres count from; `None` if it has none, or not yet again since it was started."""
         told = self._heard.newest("GPS_GLOBAL_ORIGIN", ORIGIN_S)
         return None if told is None else origin_of(told)

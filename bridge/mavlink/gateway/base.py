@@ -13,11 +13,10 @@ from threading import Event
 from bridge.clock import Clock
 from bridge.mavlink.gateway.autopilot import ORDER_S, Autopilot
 from bridge.mavlink.gateway.course import NEAR_M, STALLED_S, Course, Patience
-from bridge.mavlink.gateway.local import UNPLACED, LocalFrame, apart, local_frame
-from bridge.mavlink.line.peer import Origin
 from bridge.robots import Outcome, Rest
 from mission.document import Mission, Point, RobotSpec, SiteOrigin
 from mission.events import Pose
+from mission.mavlink.local_frame import UNPLACED, LocalFrame, VehicleOrigin, apart, local_frame
 from mission.run.scans import needs_heading, turned_away
 
 TICK_S = 0.1
@@ -54,7 +53,7 @@ class MavlinkBase:
         self._patience = patience
         self._mission: Mission | None = None
         self._local = UNPLACED
-        self._local_for: tuple[SiteOrigin | None, Origin | None] = (None, None)
+        self._local_for: tuple[SiteOrigin | None, VehicleOrigin | None] = (None, None)
         self._boots = autopilot.peer.boots
         self._blocked_by = ""
 
@@ -254,7 +253,7 @@ class MavlinkBase:
             self._local, self._local_for = self._framed(*now), now
         return self._local
 
-    def _framed(self, site: SiteOrigin | None, origin: Origin | None) -> LocalFrame:
+    def _framed(self, site: SiteOrigin | None, origin: VehicleOrigin | None) -> LocalFrame:
         rule = self.autopilot.kind.rule
         if site is None:
             return UNPLACED

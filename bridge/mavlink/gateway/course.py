@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from mission.document import Point
+from mission.run.way import foot
 
 Verdict = Literal["going", "arrived", "blocked"]
 
@@ -68,7 +69,7 @@ class Course:
         return "blocked" if self.why else "going"
 
     def _wrong(self, here: Point, away: float, stalled_s: float, now_s: float) -> str:
-        beside = beside_m(self._start, self._end, here)
+        beside = math.dist(here, foot(self._start, self._end, here))
         if beside > STRAY_M:
             return f"the vehicle is {beside:.2f} m beside the way"
         if stalled_s >= self._patience.stalled_s:
@@ -76,12 +77,3 @@ class Course:
         if now_s - self._progress_s >= self._patience.astray_s:
             return f"the vehicle moves without getting nearer than {self._nearest:.2f} m"
         return ""
-
-
-def beside_m(start: Point, end: Point, here: Point) -> float:
-    """Distance of `here` from the straight between two points, metres."""
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    square = dx * dx + dy * dy
-    share = 0.0 if square == 0 else ((here[0] - start[0]) * dx + (here[1] - start[1]) * dy) / square
-    share = max(0.0, min(1.0, share))
-    return math.dist(here, (start[0] + share * dx, start[1] + share * dy))

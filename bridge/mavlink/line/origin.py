@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from bridge.mavlink.line.peer import Origin, Peer
+from bridge.mavlink.line.peer import Peer
 from mission.document import SiteOrigin
 from mission.errors import AnswerIsNo
-from mission.mavlink.origin import how_far_off
+from mission.mavlink.local_frame import VehicleOrigin, how_far_off
 
 
-def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> Origin:
+def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> VehicleOrigin:
     """The vehicle's origin, which is the site's; with `set_it` one that has none is given it.
 
     A vehicle takes one origin per boot and ignores a second silently; without one it accepts a mission,
@@ -20,7 +20,7 @@ def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> Origi
         If it has another one, or none, or does not tell.
     """
     held = peer.origin()
-    wanted = Origin(lat=site.lat, lon=site.lon, alt=site.alt)
+    wanted = VehicleOrigin(lat=site.lat, lon=site.lon, alt=site.alt)
     if held is None and set_it:
         held = peer.set_origin(wanted)
     if held is None:
@@ -41,5 +41,5 @@ def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> Origi
     return held
 
 
-def _told(origin: Origin) -> str:
+def _told(origin: VehicleOrigin) -> str:
     return f"{origin.lat:.7f}, {origin.lon:.7f}"

@@ -18,10 +18,11 @@ from bridge.mavlink.line.round_trips import RoundTrips
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import SIGNATURE, Box, Message, Who, Wire, dialect, sender, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
-from mission.geodesy import STEPS_PER_DEGREE, Geodetic
+from mission.geodesy import to_steps
 from mission.mavlink.autopilots import autopilot_of
 from mission.mavlink.autopilots.kind import Autopilot
-from mission.mavlink.telemetry import began_again
+from mission.mavlink.local_frame import VehicleOrigin
+from mission.mavlink.telemetry import began_again, origin_of
 
 PATIENCE_S = 5.0
 """Silence after which a vehicle is given up."""
@@ -54,25 +55,6 @@ class Ack:
     def name(self) -> str:
         """As in "DENIED"."""
         return enum_name("MAV_RESULT", self.result)
-
-
-@dataclass(frozen=True)
-class Origin:
-    """What a vehicle's local metres count from, degrees and metres above the sea."""
-
-    lat: float
-    lon: float
-    alt: float
-
-    @property
-    def place(self) -> Geodetic:
-        return Geodetic(lat=self.lat, lon=self.lon)
-
-
-def origin_of(message: Message) -> Origin:
-    """What a GPS_GLOBAL_ORIGIN tells."""
-    steps = STEPS_PER_DEGREE
-    return Origin(lat=message.latitude / steps, lon=message.longitude / steps, alt=message.altitude / 1000)
 
 
 class Newest(Box):
@@ -260,17 +242,16 @@ class Peer:
         """Ask for the message of this number, and wait for nothing; `newest` has it if it comes."""
         self.wire.send(self._request(number))
 
-    def origin(self, *, patience_s: float | None = None) -> Origin | None:
+    def origin(self, *, patience_s: float | None = None) -> VehicleOrigin | None:
         """What its metres count from (GPS_GLOBAL_ORIGIN); `None` if it is not set, or not told."""
         message = self.ask(dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, patience_s=patience_s)
         return None if message is None else origin_of(message)
 
-    def set_origin(self, origin: Origin, *, patience_s: float | None = None) -> Origin | None:
+    def set_origin(self, origin: VehicleOrigin, *, patience_s: float | None = None) -> VehicleOrigin | None:
         """Tell it what its metres count from, and the origin it then has: the old one if it had one."""
         message = dialect.MAVLink_set_gps_global_origin_message(
             self.who.system,
-            round(origin.lat * STEPS_PER_DEGREE),
-            round(origin.lon * STEPS_PER_DEGREE),
+            *to_steps(origin.place),
             round(origin.alt * 1000),
         )
         for _ in self._tries(0.0, patience_s):

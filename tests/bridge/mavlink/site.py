@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -10,8 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-
-import msgspec
 
 from bridge.mavlink.desk.desk import Options, connect
 from bridge.mavlink.desk.logbook import Logbook, logbook, remember
@@ -23,7 +20,7 @@ from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.store import Store
 from bridge.mavlink.simulated.vehicle import Setting
 from bridge.station import Station
-from mission.document import Mission, Scan, SiteOrigin, Stop
+from mission.document import Mission, SiteOrigin
 from mission.events import AnyEvent, Pose
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import ItemList
@@ -31,27 +28,12 @@ from mission.mavlink.read_back import upload_of
 from mission.mavlink.translate import translate
 from mission.run.states import Run
 from tests.bridge.mavlink.scripted import free_udp_port
-from tests.mission.worlds import mission_of, stop
+from tests.mission.mavlink.following.worlds import told, tour
 
 SPEED_UP = 5.0
 PATIENCE_S = 60.0
 KINDS = {"strict": "generic", "ardupilot": "ardupilot", "px4": "px4"}
 """The autopilot of each profile of the simulated vehicle."""
-
-
-def tour(**details: Any) -> Mission:
-    """Stops 1 m ahead, 1 m further and 1 m to the left by way of a corner, and 1 m back."""
-    made = (
-        stop("S1", (0.0, 0.0), (1.0, 0.0)),
-        stop("S2", (1.0, 0.0), (2.0, 0.0), (2.0, 1.0), heading=math.pi / 2),
-        stop("S3", (2.0, 1.0), (1.0, 1.0), heading=math.pi),
-    )
-    return mission_of(*(quick(one, **details) for one in made))
-
-
-def quick(one: Stop, **details: Any) -> Stop:
-    plain = {"settle_s": 1.0, "scan": Scan(profile="default", duration_s=2.0, timeout_s=20.0), "retries": 0}
-    return msgspec.structs.replace(one, **(plain | details))
 
 
 @dataclass
@@ -119,11 +101,6 @@ class Site:
     def events(self) -> tuple[AnyEvent, ...]:
         with self.book() as book:
             return book.journal.events()
-
-
-def told(events: Sequence[AnyEvent]) -> list[str]:
-    """The events as words, such as "Arrived S1"."""
-    return [f"{type(event).__name__} {getattr(event, 'stop', '')}".strip() for event in events]
 
 
 ALL = [

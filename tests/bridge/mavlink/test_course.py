@@ -2,16 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
-import pytest
-
-from bridge.mavlink.gateway.course import Course, Patience, beside_m
-from bridge.mavlink.gateway.local import LocalFrame, apart, local_frame
-from bridge.mavlink.line.peer import Origin
-from mission.document import SiteOrigin
-
-SITE = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=30.0)
+from bridge.mavlink.gateway.course import Course, Patience
 
 
 def course() -> Course:
@@ -64,41 +55,3 @@ def test_a_vehicle_that_circles_is_stopped_after_half_a_minute() -> None:
         *("going", "going", "blocked")
     ]
     assert drive.why == "the vehicle moves without getting nearer than 2.00 m"
-
-
-@pytest.mark.parametrize(("here", "metres"), [((2.0, 1.0), 1.0), ((-3.0, 4.0), 5.0), ((7.0, 4.0), 5.0)])
-def test_beside_a_straight_is_the_distance_from_it(here: tuple[float, float], metres: float) -> None:
-    assert beside_m((0.0, 0.0), (4.0, 0.0), here) == pytest.approx(metres)
-
-
-def test_a_site_that_bears_30_degrees_turns_north_and_east() -> None:
-    frame = LocalFrame(SITE)
-    pose = frame.pose(north=math.cos(math.radians(30)), east=math.sin(math.radians(30)), yaw=math.radians(30))
-    # One metre towards the site's +y, looking there.
-    assert (pose.x, pose.y) == pytest.approx((0.0, 1.0))
-    assert pose.heading == pytest.approx(math.pi / 2)
-    assert frame.north_east((pose.x, pose.y)) == pytest.approx(
-        (math.cos(math.radians(30)), math.sin(math.radians(30)))
-    )
-    assert frame.yaw(pose.heading) == pytest.approx(math.radians(30))
-
-
-def test_an_origin_two_centimetres_off_is_the_same_and_counted() -> None:
-    # 2e-7° of latitude are 2.2 cm north by ArduPilot's scale.
-    origin = Origin(lat=SITE.lat + 2e-7, lon=SITE.lon, alt=0.0)
-    assert apart(SITE, origin) == ""
-    frame = local_frame(SITE, origin, "ardupilot")
-    north = frame.pose(0.0, 0.0, 0.0)
-    assert math.hypot(north.x, north.y) == pytest.approx(0.02226, abs=1e-4)
-    assert frame.north_east((0.0, 0.0)) == pytest.approx((-0.02226, 0.0), abs=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("origin", "away"),
-    [
-        (Origin(lat=SITE.lat, lon=SITE.lon + 1e-6, alt=0.0), "0.08 m"),
-        (Origin(lat=0.0, lon=0.0, alt=0.0), "more than a kilometre"),
-    ],
-)
-def test_another_origin_is_told_with_its_distance(origin: Origin, away: str) -> None:
-    assert f"lies {away} from the mission's (47.4000000, 8.5000000)" in apart(SITE, origin)

@@ -6,13 +6,13 @@ from bridge.clock import SimulatedClock
 from bridge.journal import memory_journal
 from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.logbook import Logbook, remember
-from bridge.mavlink.desk.lookout import Lookout
 from bridge.mavlink.line.wire import Message, dialect
 from mission.events import Paused
 from mission.mavlink.autopilots.ardupilot import ARDUPILOT
+from mission.mavlink.following.observer import Observer
 from mission.mavlink.translate import translate
 from mission.run.states import started
-from tests.bridge.mavlink.site import tour
+from tests.mission.mavlink.following.worlds import tour
 
 MANUAL = 0
 
@@ -33,11 +33,11 @@ def told_at_first_look(boot_ms: int) -> list[str]:
     book.booted(clock.now_ns())
     book.move(lambda run: (started(run, run_id="r", now_ns=clock.now_ns(), by="me"),))
     clock.wait(60.0)
-    lookout = Lookout(ARDUPILOT, clock)
-    follower = Follower(book, None, lookout, NoHands())  # type: ignore[arg-type]
+    observer = Observer(ARDUPILOT)
+    follower = Follower(book, None, observer, NoHands())  # type: ignore[arg-type]
     for message in found_in_manual(boot_ms):
         clock.wait(0.1)
-        follower.look(lookout.take(message, book.course))
+        follower.look(observer.take(message, book.listed, clock.now_ns()))
     follower.begin()
     follower.look("SYSTEM_TIME")
     return [event.reason for event in book.journal.events() if isinstance(event, Paused)]

@@ -13,7 +13,8 @@ from mission.document import sealed
 from mission.events import Arrived, Failed, Held, PoseReport, Scanned, StateReport, Unconfirmed
 from recordings.field import FieldRecording
 from recordings.review import review
-from tests.bridge.mavlink.site import ALL, Site, told, tour, until, watched
+from tests.bridge.mavlink.site import ALL, Site, until, watched
+from tests.mission.mavlink.following.worlds import told, tour
 
 pytestmark = pytest.mark.usefixtures("own_time")
 

@@ -16,7 +16,7 @@ from mission.errors import AnswerIsNo, InputError
 from mission.events import Aborted, Paused
 from mission.mavlink.translate import translate
 from mission.run.states import Change, Run, changed, started
-from tests.bridge.mavlink.site import tour
+from tests.mission.mavlink.following.worlds import tour
 
 URL = Url("udpout", "127.0.0.1", 14550)
 
@@ -59,12 +59,12 @@ def test_what_was_sent_is_remembered_item_by_item(tmp_path: Path) -> None:
     mission = tour()
     sent = translate(mission, "px4")
     with logbook(URL, 1, tmp_path) as book:
-        assert book.course is None
+        assert book.listed is None
         remember(book, mission, sent)
     with logbook(URL, 1, tmp_path) as book:
-        assert book.course is not None
-        assert book.course.mission == mission
-        assert repr(book.course.sent) == repr(sent)
+        assert book.listed is not None
+        assert book.listed.mission == mission
+        assert repr(book.listed.sent) == repr(sent)
         assert (book.run.state, book.run.mission_id) == ("READY", mission.id)
 
 
@@ -94,7 +94,7 @@ def test_a_mission_that_was_cleared_is_forgotten_and_its_run_over(tmp_path: Path
         remember(book, mission, translate(mission, "px4"))
         book.move(lambda run: (started(run, run_id="r", now_ns=0, by="me"),))
         forget(book)
-        assert (book.run, book.course) == (Run(), None)
+        assert (book.run, book.listed) == (Run(), None)
         last = book.journal.events()[-1]
         assert isinstance(last, Aborted) and (last.run_id, last.mission_id) == ("r", mission.id)
         assert "cleared" in last.reason

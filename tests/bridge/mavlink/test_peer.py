@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.mavlink.line.peer import Origin, found, reached, station_beat
+from bridge.mavlink.line.peer import found, reached, station_beat
 from bridge.mavlink.line.url import read_url
 from bridge.mavlink.line.wire import Message, Who, dialect, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots.generic import GENERIC
+from mission.mavlink.local_frame import VehicleOrigin
 from tests.bridge.mavlink.scripted import Scripted, free_udp_port
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -133,12 +134,12 @@ def test_an_unanswered_order_is_unknown_and_an_unanswered_question_is_not() -> N
 
 def test_the_origin_is_asked_and_set() -> None:
     with Scripted() as vehicle, reached(vehicle.url, vehicle=1) as peer:
-        assert peer.origin() == Origin(lat=47.0, lon=8.0, alt=0.0)
+        assert peer.origin() == VehicleOrigin(lat=47.0, lon=8.0, alt=0.0)
         vehicle.origin = None
         assert peer.origin() is None
-        there = Origin(lat=47.5, lon=8.5, alt=400.0)
+        there = VehicleOrigin(lat=47.5, lon=8.5, alt=400.0)
         assert peer.set_origin(there) == there
-        assert peer.set_origin(Origin(lat=1.0, lon=1.0, alt=0.0)) == there, "a second one is not taken"
+        assert peer.set_origin(VehicleOrigin(lat=1.0, lon=1.0, alt=0.0)) == there, "a second one is not taken"
 
 
 def test_what_it_does_not_know_is_none() -> None:

@@ -31,7 +31,7 @@ from mission.mavlink.translate import translate
 from mission.run.states import started
 from tests.bridge.mavlink.lists import held, stops
 from tests.bridge.mavlink.scripted import Scripted, free_udp_port
-from tests.bridge.mavlink.site import tour
+from tests.mission.mavlink.following.worlds import tour
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
@@ -95,7 +95,7 @@ def test_a_mission_is_pushed_read_and_cleared(profile: str, run: Run, tmp_path: 
         code, printed, _ = run("clear", *to, "--json")
         assert (code, json.loads(printed)["had"]) == (0, 14)
         with logbook(url, 1, tmp_path / "state") as book:
-            assert (book.run.state, book.course) == ("IDLE", None)
+            assert (book.run.state, book.listed) == ("IDLE", None)
         code, printed, _ = run("fetch-mission", *to)
         assert (code, "holds 0 items" in printed) == (0, True)
 
@@ -117,7 +117,7 @@ def test_what_was_pushed_is_in_the_logbook(run: Run, mission: Mission, tmp_path:
     with at_site(mission) as url:
         assert run("push", "MISSION", "--mavlink", str(url))[0] == 0
         with logbook(url, 1, tmp_path / "state") as book:
-            assert book.course is not None and book.course.mission == mission
+            assert book.listed is not None and book.listed.mission == mission
 
 
 def test_another_origin_is_refused(run: Run) -> None:

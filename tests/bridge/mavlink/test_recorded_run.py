@@ -14,15 +14,15 @@ from bridge.clock import SimulatedClock
 from bridge.journal import memory_journal
 from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.logbook import Logbook, remember
-from bridge.mavlink.desk.lookout import Lookout
 from bridge.mavlink.line.wire import dialect
 from mission.document import Mission, SiteOrigin
 from mission.events import AnyEvent, Arrived, Failed
 from mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from mission.mavlink.back import recognise
+from mission.mavlink.following.observer import Observer
 from mission.mavlink.items import Command, Item, ItemList
 from mission.run.states import started
-from tests.bridge.mavlink.site import told
+from tests.mission.mavlink.following.worlds import told
 from tests.mission.worlds import mission_of, stop
 
 LOG = Path(__file__).parents[3].parent / "shared" / "data" / "logs" / "rover-stop-and-go.BIN"
@@ -86,18 +86,18 @@ def followed(log: list[Any], tour: Mission) -> tuple[AnyEvent, ...]:
     placed = recognise(items_of(log), mission=tour)
     remember(book, tour, ItemList("ardupilot", ORIGIN, placed))
     book.move(lambda run: (started(run, run_id="r", now_ns=clock.now_ns(), by="log"),))
-    lookout = Lookout(ARDUPILOT, clock)
-    follower = Follower(book, None, lookout, NoHands())  # type: ignore[arg-type]
+    observer = Observer(ARDUPILOT)
+    follower = Follower(book, None, observer, NoHands())  # type: ignore[arg-type]
     follower.looking = True
     armed_in_auto = dialect.MAVLink_heartbeat_message(10, 3, 128 | 1, 10, 4, 3)
     origin = dialect.MAVLink_gps_global_origin_message(473_977_000, 85_456_000, 488_000)
     for message in (armed_in_auto, origin):
-        lookout.take(message, book.course)
+        observer.take(message, book.listed, clock.now_ns())
     began_us = log[0].TimeUS
     for entry in log:
         clock.wait((entry.TimeUS - began_us) / 1e6 - (clock.now_ns() - SimulatedClock().now_ns()) / 1e9)
         for message in as_messages(entry):
-            follower.look(lookout.take(message, book.course))
+            follower.look(observer.take(message, book.listed, clock.now_ns()))
     clock.wait(3.0)  # it is waited for a word of the last scan
     follower.look("HEARTBEAT")
     return book.journal.events()

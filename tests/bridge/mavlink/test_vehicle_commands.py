@@ -17,7 +17,7 @@ from mission.document import Scan
 from mission.files.mission_json import write
 from recordings.review import review
 from tests.bridge.mavlink.scripted import free_udp_port
-from tests.bridge.mavlink.site import tour
+from tests.mission.mavlink.following.worlds import tour
 
 STOPGO = (sys.executable, "-m", "mission")
 KEYS = "robot boot_id state run_id mission_id revision stop done skipped battery"

@@ -16,7 +16,8 @@ from bridge.mavlink.line.wire import dialect
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
 from mission.events import Arrived, Held, Paused, Resumed, Started
 from mission.mavlink.translate import translate
-from tests.bridge.mavlink.site import ALL, Site, told, tour, until, watched
+from tests.bridge.mavlink.site import ALL, Site, until, watched
+from tests.mission.mavlink.following.worlds import told, tour
 
 pytestmark = pytest.mark.usefixtures("own_time")
 

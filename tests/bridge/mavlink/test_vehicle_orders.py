@@ -19,7 +19,8 @@ from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import Aborted, Pose, Resumed, Started
 from mission.mavlink.translate import translate
 from mission.run.orders import Order
-from tests.bridge.mavlink.site import ALL, Site, told, tour, until, watched
+from tests.bridge.mavlink.site import ALL, Site, until, watched
+from tests.mission.mavlink.following.worlds import told, tour
 
 pytestmark = pytest.mark.usefixtures("own_time")
 

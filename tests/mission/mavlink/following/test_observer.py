@@ -5,17 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from bridge.clock import SimulatedClock
-from bridge.mavlink.desk.lookout import Lookout
-from bridge.mavlink.desk.visits import Course, course_of
-from bridge.mavlink.line.wire import dialect
 from mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic
 from mission.mavlink.autopilots.ardupilot import ARDUPILOT
+from mission.mavlink.following.listed_mission import ListedMission, listed_mission
+from mission.mavlink.following.observer import Observer
 from mission.mavlink.translate import translate
 from mission.run.scans import ScanFailed, ScanResult
 from mission.run.states import Run
-from tests.bridge.mavlink.site import tour
+from tests.mission.mavlink.following.worlds import tour
 
 UNKNOWN, ACTIVE, COMPLETE = 0, dialect.MISSION_STATE_ACTIVE, dialect.MISSION_STATE_COMPLETE
 URL = b"scan-1.e57?size=1600&points=100&sha256=" + b"ab" * 32
@@ -23,23 +22,23 @@ AT_S1 = Run(state="RUNNING", run_id="r", at=0, stop_state="SCANNING")
 
 
 class Telling:
-    """A lookout, and what it is told."""
+    """A observer, and what it is told."""
 
     def __init__(self) -> None:
         mission = tour()
-        self.course: Course = course_of(mission, translate(mission, "ardupilot"))
-        self.clock = SimulatedClock()
-        self.lookout = Lookout(ARDUPILOT, self.clock)
-        self.site = self.course.sent.origin
+        self.listed: ListedMission = listed_mission(mission, translate(mission, "ardupilot"))
+        self.now_ns = 10**18
+        self.observer = Observer(ARDUPILOT)
+        self.site = self.listed.sent.origin
         self.tell(dialect.MAVLink_heartbeat_message(10, 3, 128, 10, 4, 3))
 
     def tell(self, *messages: Any) -> None:
         for message in messages:
-            self.clock.wait(0.1)
-            self.lookout.take(message, self.course)
+            self.now_ns += 10**8
+            self.observer.take(message, self.listed, self.now_ns)
 
     def current(self, seq: int, state: int = ACTIVE, total: int | None = None) -> None:
-        held = self.course.end if total is None else total
+        held = self.listed.end if total is None else total
         self.tell(dialect.MAVLink_mission_current_message(seq, held, state, 1))
 
     def reached(self, seq: int) -> None:
@@ -60,24 +59,24 @@ class Telling:
         )
 
     def scan(self, after: tuple[int, int] = (-1, -1)) -> ScanResult | ScanFailed | None:
-        sight = self.lookout.sight(AT_S1, self.course, after=after)
-        assert sight is not None
-        return sight.scan
+        observed = self.observer.observe(AT_S1, self.listed, after=after)
+        assert observed is not None
+        return observed.scan
 
 
 def test_a_mission_ends_by_its_state_or_by_its_last_item_where_there_is_none() -> None:
     telling = Telling()
-    last = telling.course.sequence(telling.course.end - 1)
+    last = telling.listed.sequence(telling.listed.end - 1)
     telling.current(last, UNKNOWN)
-    assert telling.lookout.place(telling.course) == telling.course.end - 1
+    assert telling.observer.place(telling.listed) == telling.listed.end - 1
     telling.reached(last - 1)
-    assert telling.lookout.place(telling.course) == telling.course.end - 1
+    assert telling.observer.place(telling.listed) == telling.listed.end - 1
     telling.reached(last)
-    assert telling.lookout.place(telling.course) == telling.course.end
+    assert telling.observer.place(telling.listed) == telling.listed.end
     telling.current(1, UNKNOWN)
-    assert telling.lookout.place(telling.course) == 0
+    assert telling.observer.place(telling.listed) == 0
     telling.current(last, COMPLETE)
-    assert telling.lookout.place(telling.course) == telling.course.end
+    assert telling.observer.place(telling.listed) == telling.listed.end
 
 
 def test_local_metres_are_exact_and_degrees_a_step_off() -> None:
@@ -90,13 +89,13 @@ def test_local_metres_are_exact_and_degrees_a_step_off() -> None:
         dialect.MAVLink_attitude_message(1, 0, 0, yaw, 0, 0, 0),
         dialect.MAVLink_global_position_int_message(1, lat, lon, 0, 0, 30, 40, 0, 0),
     )
-    fix = telling.lookout.fix
+    fix = telling.observer.fix
     assert fix is not None and fix.speed == pytest.approx(0.5)
     assert (fix.pose.x, fix.pose.y) == pytest.approx((3.0, 4.0), abs=0.008)
     assert fix.pose.heading == pytest.approx(0.0, abs=1e-6)
     telling.origin()
     telling.tell(dialect.MAVLink_local_position_ned_message(2, 4.0, 3.0, 0, 0, 0, 0))
-    assert (telling.lookout.fix.pose.x, telling.lookout.fix.pose.y) == pytest.approx((3.0, 4.0), abs=0.001)  # type: ignore[union-attr]
+    assert (telling.observer.fix.pose.x, telling.observer.fix.pose.y) == pytest.approx((3.0, 4.0), abs=0.001)  # type: ignore[union-attr]
 
 
 def test_a_pose_is_of_the_item_only_if_it_was_told_after_it() -> None:
@@ -105,10 +104,10 @@ def test_a_pose_is_of_the_item_only_if_it_was_told_after_it() -> None:
     telling.tell(dialect.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0))
     telling.tell(dialect.MAVLink_local_position_ned_message(2, 0, 1.0, 0, 0, 0, 0))
     telling.current(3)
-    before = telling.lookout.sight(AT_S1, telling.course)
+    before = telling.observer.observe(AT_S1, telling.listed)
     telling.current(3)
     telling.tell(dialect.MAVLink_local_position_ned_message(3, 0, 1.0, 0, 0, 0, 0))
-    after = telling.lookout.sight(AT_S1, telling.course)
+    after = telling.observer.observe(AT_S1, telling.listed)
     assert before is not None and before.pose is None
     assert after is not None and after.pose is not None and after.still
 
@@ -124,8 +123,8 @@ def test_a_vehicle_that_creeps_or_turns_is_not_seen_to_stand(
     telling.current(3)
     telling.tell(dialect.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, yaw_rate))
     telling.tell(dialect.MAVLink_local_position_ned_message(2, 0, 1.0, 0, north_m_s, 0, 0))
-    sight = telling.lookout.sight(AT_S1, telling.course)
-    assert sight is not None and sight.still is still
+    observed = telling.observer.observe(AT_S1, telling.listed)
+    assert observed is not None and observed.still is still
 
 
 def test_a_scan_belongs_to_the_stop_where_it_was_made_and_counts_once() -> None:
@@ -152,7 +151,7 @@ def test_a_battery_that_is_not_told_changes_nothing() -> None:
     telling = Telling()
     for remaining in (40, -1):
         telling.tell(dialect.MAVLink_sys_status_message(0, 0, 0, 0, 0, 0, remaining, 0, 0, 0, 0, 0, 0))
-    assert telling.lookout.battery == 0.4
+    assert telling.observer.battery == 0.4
 
 
 def test_a_number_of_items_that_is_not_told_is_not_taken_for_one() -> None:
@@ -160,7 +159,7 @@ def test_a_number_of_items_that_is_not_told_is_not_taken_for_one() -> None:
     told = []
     for total in (0, 65_535, 7):
         telling.current(1, total=total)
-        told.append(telling.lookout.items)
+        told.append(telling.observer.items)
     assert told == [None, None, 7]
     telling.current(0, dialect.MISSION_STATE_NO_MISSION, total=65_535)
-    assert telling.lookout.items == 0
+    assert telling.observer.items == 0

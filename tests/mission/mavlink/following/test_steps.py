@@ -5,23 +5,23 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from bridge.mavlink.desk.onward import onward
-from bridge.mavlink.desk.progress import Sight, held_by_vehicle, passed_by, steps, taken_over
-from bridge.mavlink.desk.visits import Course, course_of
 from mission.document import ScannerSpec
 from mission.events import AnyEvent, Pose
+from mission.mavlink.following.listed_mission import ListedMission, listed_mission
+from mission.mavlink.following.resuming import resume_place
+from mission.mavlink.following.steps import Observation, held_by_vehicle, passed_by, steps, taken_over
 from mission.mavlink.translate import translate
 from mission.run.scans import ScanFailed, ScanResult
 from mission.run.states import Run
-from tests.bridge.mavlink.site import told, tour
+from tests.mission.mavlink.following.worlds import told, tour
 
 SCAN = ScanResult(file="scan-1.e57", size=1600, points=100, sha256="0" * 64)
 S2_AT = Pose(x=2.0, y=1.0, heading=0.0)
 
 
-def course(**details: object) -> Course:
+def listed(**details: object) -> ListedMission:
     mission = tour(**details)
-    return course_of(mission, translate(mission, "ardupilot"))
+    return listed_mission(mission, translate(mission, "ardupilot"))
 
 
 def going(at: int = 1, stop_state: str = "NAVIGATING", **fields: object) -> Run:
@@ -37,13 +37,13 @@ def going(at: int = 1, stop_state: str = "NAVIGATING", **fields: object) -> Run:
     return Run(**(plain | fields))  # type: ignore[arg-type]
 
 
-def seen(place: int, **fields: object) -> Sight:
-    return Sight(mode="AUTO", armed=True, place=place, **fields)  # type: ignore[arg-type]
+def seen(place: int, **fields: object) -> Observation:
+    return Observation(mode="AUTO", armed=True, place=place, **fields)  # type: ignore[arg-type]
 
 
-def after(run: Run, course: Course, sight: Sight) -> tuple[list[str], Run]:
+def after(run: Run, listed: ListedMission, observed: Observation) -> tuple[list[str], Run]:
     """What is told of it, and the run then."""
-    changes = steps(run, course, sight)
+    changes = steps(run, listed, observed)
     return told([event_of(telling) for change in changes for telling in change.events]), (
         changes[-1].run if changes else run
     )
@@ -55,73 +55,73 @@ def event_of(telling: object) -> AnyEvent:
 
 
 def test_a_place_in_the_list_tells_the_stop_and_the_work_there() -> None:
-    visit = course().visits[1]
-    roles = [placed.role for placed in course().sent.placed]
-    assert (roles[visit.first], roles[visit.at]) == ("corner", "stop")
-    assert (roles[visit.scan], visit.after) == ("trigger", course().visits[2].first)
+    items = listed().stops[1]
+    roles = [placed.role for placed in listed().sent.placed]
+    assert (roles[items.first], roles[items.at]) == ("corner", "stop")
+    assert (roles[items.scan], items.after) == ("trigger", listed().stops[2].first)
 
 
 def test_a_waypoint_that_is_reached_is_an_arrival_only_within_the_tolerance() -> None:
-    mine, visit = course(), course().visits[1]
+    mine, items = listed(), listed().stops[1]
     near, far = Pose(x=2.03, y=1.0, heading=0.0), Pose(x=2.3, y=1.0, heading=0.0)
-    assert after(going(), mine, seen(visit.at, pose=near))[0] == []
-    assert after(going(), mine, seen(visit.at + 1, pose=near))[0] == ["Arrived S2"]
-    assert after(going(), mine, seen(visit.at + 1, pose=far))[0] == []
-    assert after(going(), mine, seen(visit.at + 1, pose=far, still=True))[0] == ["Failed S2", "Held"]
-    assert after(going(), mine, seen(visit.at + 1))[0] == []
+    assert after(going(), mine, seen(items.at, pose=near))[0] == []
+    assert after(going(), mine, seen(items.at + 1, pose=near))[0] == ["Arrived S2"]
+    assert after(going(), mine, seen(items.at + 1, pose=far))[0] == []
+    assert after(going(), mine, seen(items.at + 1, pose=far, still=True))[0] == ["Failed S2", "Held"]
+    assert after(going(), mine, seen(items.at + 1))[0] == []
 
 
 def test_a_stop_with_tries_left_is_tried_again_without_a_word() -> None:
-    mine, visit = course(retries=1), course().visits[1]
+    mine, items = listed(retries=1), listed().stops[1]
     far = Pose(x=2.3, y=1.0, heading=0.0)
-    words, run = after(going(), mine, seen(visit.at + 1, pose=far, still=True))
+    words, run = after(going(), mine, seen(items.at + 1, pose=far, still=True))
     assert words == [] and (run.attempt, run.stop_state) == (1, "WAITING")
 
 
 def test_a_scan_counts_when_its_wait_is_over() -> None:
-    mine, visit = course(), course().visits[1]
+    mine, items = listed(), listed().stops[1]
     scanning = going(stop_state="SCANNING", leg=2)
-    words, run = after(scanning, mine, seen(visit.scan, pose=S2_AT, scan=SCAN))
+    words, run = after(scanning, mine, seen(items.scan, pose=S2_AT, scan=SCAN))
     assert words == [] and run.stop_state == "VERIFYING"
-    assert after(run, mine, seen(visit.after, pose=S2_AT))[0] == ["Scanned S2"]
+    assert after(run, mine, seen(items.after, pose=S2_AT))[0] == ["Scanned S2"]
 
 
 def test_a_scan_that_nobody_confirms_is_unconfirmed_once_it_is_in_vain_to_wait() -> None:
-    mine, visit = course(), course().visits[1]
+    mine, items = listed(), listed().stops[1]
     scanning = going(stop_state="SCANNING", leg=2)
-    assert after(scanning, mine, seen(visit.after, stood=S2_AT))[0] == []
-    words, run = after(scanning, mine, seen(visit.after, stood=S2_AT, in_vain=True))
+    assert after(scanning, mine, seen(items.after, stood=S2_AT))[0] == []
+    words, run = after(scanning, mine, seen(items.after, stood=S2_AT, in_vain=True))
     assert words == ["Unconfirmed S2"] and run.done == ("S1", "S2")
 
 
 def test_a_scan_without_a_hash_is_no_scan() -> None:
-    mine, visit = course(), course().visits[1]
+    mine, items = listed(), listed().stops[1]
     scanning = going(stop_state="VERIFYING", scan=msgspec.structs.replace(SCAN, sha256=""))
-    assert after(scanning, mine, seen(visit.after, pose=S2_AT))[0] == ["Failed S2", "Held"]
+    assert after(scanning, mine, seen(items.after, pose=S2_AT))[0] == ["Failed S2", "Held"]
 
 
 def test_a_stop_that_was_left_is_never_gone_back_to() -> None:
-    mine, visit = course(retries=3), course().visits[1]
+    mine, items = listed(retries=3), listed().stops[1]
     scanning = going(stop_state="SCANNING")
-    words, run = after(scanning, mine, seen(visit.after, scan=ScanFailed(reason="dark")))
+    words, run = after(scanning, mine, seen(items.after, scan=ScanFailed(reason="dark")))
     assert words == ["Failed S2", "Held"] and run.state == "HELD"
 
 
 @pytest.mark.parametrize("mode", ["HOLD", "MANUAL"])
 def test_a_scan_under_way_outlives_a_hold_and_nothing_else(mode: str) -> None:
-    mine, visit = course(), course().visits[1]
-    sight = Sight(mode=mode, armed=True, place=visit.scan)
-    change = taken_over(going(stop_state="SCANNING"), mine, sight)
+    mine, items = listed(), listed().stops[1]
+    observed = Observation(mode=mode, armed=True, place=items.scan)
+    change = taken_over(going(stop_state="SCANNING"), mine, observed)
     assert change is not None
     assert change.run.stop_state == ("SCANNING" if mode == "HOLD" else "WAITING")
 
 
 def test_a_vehicle_that_waits_at_a_stop_that_was_left_out_is_led_past_it() -> None:
-    mine, (_, visit, last) = course(), course().visits
+    mine, (_, items, last) = listed(), listed().stops
     skipped = going(at=2, skipped=("S2",), leg=1)
-    assert passed_by(skipped, mine, seen(visit.at)) is None
-    assert passed_by(skipped, mine, seen(visit.scan)) == last.first
-    assert passed_by(going(at=2, done=("S1", "S2")), mine, seen(visit.scan)) is None
+    assert passed_by(skipped, mine, seen(items.at)) is None
+    assert passed_by(skipped, mine, seen(items.scan)) == last.first
+    assert passed_by(going(at=2, done=("S1", "S2")), mine, seen(items.scan)) is None
 
 
 @pytest.mark.parametrize(
@@ -135,17 +135,17 @@ def test_a_vehicle_that_waits_at_a_stop_that_was_left_out_is_led_past_it() -> No
 def test_after_a_reboot_the_vehicle_goes_on_along_the_piece_on_which_it_stands(
     pose: Pose, ahead: str
 ) -> None:
-    mine = course()
-    place = onward(going(stop_state="WAITING"), mine, seen(0), pose)
+    mine = listed()
+    place = resume_place(going(stop_state="WAITING"), mine, seen(0), pose)
     assert mine.sent.placed[place].role == ahead and mine.sent.placed[place].stop == "S2"
 
 
 def test_a_vehicle_that_has_lost_nothing_keeps_its_item() -> None:
-    mine, visit = course(), course().visits[1]
+    mine, items = listed(), listed().stops[1]
     here = Pose(x=2.0, y=0.5, heading=0.0)
-    assert onward(going(stop_state="WAITING"), mine, seen(visit.at), here) == visit.at
-    assert onward(going(stop_state="SCANNING"), mine, seen(visit.scan + 1), S2_AT) == visit.scan + 1
-    assert onward(going(stop_state="WAITING"), mine, seen(visit.scan + 1), S2_AT) == visit.at
+    assert resume_place(going(stop_state="WAITING"), mine, seen(items.at), here) == items.at
+    assert resume_place(going(stop_state="SCANNING"), mine, seen(items.scan + 1), S2_AT) == items.scan + 1
+    assert resume_place(going(stop_state="WAITING"), mine, seen(items.scan + 1), S2_AT) == items.at
 
 
 def test_a_stop_that_is_not_in_the_list_is_named() -> None:
@@ -154,30 +154,30 @@ def test_a_stop_that_is_not_in_the_list_is_named() -> None:
     whole = tour()
     shorter = msgspec.structs.replace(whole, stops=whole.stops[:2])
     with pytest.raises(InputError, match="S3"):
-        course_of(whole, translate(shorter, "ardupilot"))
+        listed_mission(whole, translate(shorter, "ardupilot"))
 
 
 def test_a_vehicle_that_ends_its_mission_in_another_mode_was_not_taken_over() -> None:
-    mine = course()
-    ended = Sight(mode="HOLD", armed=True, place=mine.end)
+    mine = listed()
+    ended = Observation(mode="HOLD", armed=True, place=mine.end)
     assert taken_over(going(at=2), mine, ended) is None
     paused = taken_over(going(at=2, state="PAUSED"), mine, ended)
     assert paused is not None and paused.run.state == "RUNNING"
 
 
 def test_home_is_no_answer_of_a_vehicle_that_drives_forward_only() -> None:
-    mine, visit = course(on_failure="home"), course().visits[1]
+    mine, items = listed(on_failure="home"), listed().stops[1]
     far = Pose(x=2.3, y=1.0, heading=0.0)
-    assert after(going(), mine, seen(visit.at + 1, pose=far, still=True))[0] == ["Failed S2", "Held"]
+    assert after(going(), mine, seen(items.at + 1, pose=far, still=True))[0] == ["Failed S2", "Held"]
 
 
 def test_a_scanner_that_does_not_see_all_around_must_face_the_right_way() -> None:
     mission = msgspec.structs.replace(tour(), scanner=ScannerSpec(profile="default", range=5.0, fov_deg=90.0))
-    mine = course_of(mission, translate(mission, "generic"))
-    visit, faces = mine.visits[1], mission.stops[1].heading
+    mine = listed_mission(mission, translate(mission, "generic"))
+    items, faces = mine.stops[1], mission.stops[1].heading
     right, wrong = (Pose(x=2.0, y=1.0, heading=faces + off) for off in (0.05, 0.2))
-    assert after(going(), mine, seen(visit.at + 1, pose=right))[0] == ["Arrived S2"]
-    words, run = after(going(), mine, seen(visit.at + 1, pose=wrong, still=True))
+    assert after(going(), mine, seen(items.at + 1, pose=right))[0] == ["Arrived S2"]
+    words, run = after(going(), mine, seen(items.at + 1, pose=wrong, still=True))
     assert words == ["Failed S2", "Held"] and "11.5°" in run.reason
 
 

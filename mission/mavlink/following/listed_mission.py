@@ -13,7 +13,7 @@ from mission.mavlink.items import ItemList, Placed
 
 
 @dataclass(frozen=True)
-class Visit:
+class StopItems:
     """A stop's items by their places in an `ItemList`."""
 
     stop: str
@@ -28,12 +28,12 @@ class Visit:
 
 
 @dataclass(frozen=True)
-class Course:
+class ListedMission:
     """A mission and the list by which a vehicle drives it."""
 
     mission: Mission
     sent: ItemList
-    visits: tuple[Visit, ...]
+    stops: tuple[StopItems, ...]
     """One for each of the mission's stops, in their order."""
 
     @property
@@ -55,15 +55,17 @@ class Course:
         return next((one.item.params[1] for one in self.sent.placed if one.role == "speed"), None)
 
 
-def course_of(mission: Mission, sent: ItemList) -> Course:
-    """The course of a mission that was sent as this list.
+def listed_mission(mission: Mission, sent: ItemList) -> ListedMission:
+    """A mission that was sent as this list.
 
     Raises
     ------
     InputError
         If a stop of the mission is not in the list.
     """
-    return Course(_forward(mission), sent, tuple(_visit(stop.id, sent.placed) for stop in mission.stops))
+    return ListedMission(
+        _forward(mission), sent, tuple(_stop_items(stop.id, sent.placed) for stop in mission.stops)
+    )
 
 
 def _forward(mission: Mission) -> Mission:
@@ -72,7 +74,7 @@ def _forward(mission: Mission) -> Mission:
     return replace(mission, stops=tuple(stops))
 
 
-def _visit(stop: str, placed: tuple[Placed, ...]) -> Visit:
+def _stop_items(stop: str, placed: tuple[Placed, ...]) -> StopItems:
     own = [
         place for place, one in enumerate(placed) if one.stop == stop and one.role not in ("speed", "return")
     ]
@@ -80,4 +82,4 @@ def _visit(stop: str, placed: tuple[Placed, ...]) -> Visit:
     if at is None:
         raise InputError(f"stop {stop} is not among the items that were sent; push the mission again")
     settles = [place for place in own if placed[place].role == "settle"]
-    return Visit(stop, own[0], at, max([at, *settles]) + 1, own[-1] + 1)
+    return StopItems(stop, own[0], at, max([at, *settles]) + 1, own[-1] + 1)

@@ -5,11 +5,27 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from bridge.mavlink.line.peer import Origin
 from mission.document import Point, SiteOrigin
 from mission.events import Pose
-from mission.geodesy import bearing_deg, from_geodetic, heading_of
-from mission.mavlink.origin import how_far_off
+from mission.geodesy import Geodetic, bearing_deg, from_geodetic, heading_of
+
+SAME_M = 0.05
+"""Origins that are no farther apart are the same: each is written in steps of a centimetre."""
+FAR_DEG = 0.01
+"""Beyond this (a kilometre) two origins are not of one site, and no metres are worth counting."""
+
+
+@dataclass(frozen=True)
+class VehicleOrigin:
+    """What a vehicle's local metres count from, degrees and metres above the sea."""
+
+    lat: float
+    lon: float
+    alt: float
+
+    @property
+    def place(self) -> Geodetic:
+        return Geodetic(lat=self.lat, lon=self.lon)
 
 
 @dataclass(frozen=True)
@@ -45,15 +61,29 @@ UNPLACED = LocalFrame(SiteOrigin(lat=0.0, lon=0.0, alt=0.0, heading_deg=0.0))
 """Without a mission: x is east, y is north of the autopilot's origin."""
 
 
-def local_frame(site: SiteOrigin, origin: Origin, rule: str) -> LocalFrame:
+def local_frame(site: SiteOrigin, origin: VehicleOrigin, rule: str) -> LocalFrame:
     """The autopilot's frame in the site's; the origins must be near one another (`apart`)."""
     return LocalFrame(site, from_geodetic(site, origin.place, rule))
 
 
-def apart(site: SiteOrigin, origin: Origin) -> str:
+def apart(site: SiteOrigin, origin: VehicleOrigin) -> str:
     """Why an autopilot that counts from `origin` cannot drive in `site`; empty if it can."""
     away = how_far_off(site, origin.place)
     return away and (
         f"the autopilot's origin ({origin.lat:.7f}, {origin.lon:.7f}) lies {away} from the mission's"
         f" ({site.lat:.7f}, {site.lon:.7f}); set the same one (most take one per boot), or plan with that"
     )
+
+
+def how_far_off(site: SiteOrigin, origin: Geodetic) -> str:
+    """How far from the site's origin an autopilot's lies, as in "0.08 m"; empty if they are the same."""
+    if is_elsewhere(site, origin):
+        return "more than a kilometre"
+    metres = math.hypot(*from_geodetic(site, origin))
+    return "" if metres <= SAME_M else f"{metres:.2f} m"
+
+
+def is_elsewhere(site: SiteOrigin, origin: Geodetic) -> bool:
+    """Whether an autopilot's origin is of another site altogether."""
+    d_lat, d_lon = origin.lat - site.lat, math.remainder(origin.lon - site.lon, 360.0)
+    return max(abs(d_lat), abs(d_lon)) > FAR_DEG

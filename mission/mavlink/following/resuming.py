@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from bridge.mavlink.desk.progress import Sight, passed_by
-from bridge.mavlink.desk.visits import Course
 from mission.document import Point
 from mission.events import Pose
+from mission.mavlink.following.listed_mission import ListedMission
+from mission.mavlink.following.steps import Observation, passed_by
 from mission.mavlink.read_back import point_at
 from mission.run.states import Run
+from mission.run.way import foot
 
 PASSED = frozenset({"corner", "stop", "return"})
 """Roles of waypoints."""
@@ -27,67 +28,61 @@ class Piece:
     place: int
     """Of the waypoint at its end."""
 
+    def nearest(self, pose: Pose) -> Point:
+        """The point of the piece that is nearest to the pose."""
+        return foot(self.start, self.end, (pose.x, pose.y))
+
     def away(self, pose: Pose) -> float:
-        """Metres from the pose to the nearest point of the piece."""
-        return math.dist((pose.x, pose.y), self.foot(pose))
-
-    def foot(self, pose: Pose) -> Point:
-        """That point."""
-        dx, dy = self.end[0] - self.start[0], self.end[1] - self.start[1]
-        square = dx * dx + dy * dy
-        along = 0.0
-        if square > 0:
-            along = ((pose.x - self.start[0]) * dx + (pose.y - self.start[1]) * dy) / square
-        along = min(1.0, max(0.0, along))
-        return (self.start[0] + along * dx, self.start[1] + along * dy)
+        """Metres from the pose to that point."""
+        return math.dist((pose.x, pose.y), self.nearest(pose))
 
 
-def onward(run: Run, course: Course, sight: Sight, pose: Pose) -> int:
+def resume_place(run: Run, listed: ListedMission, observed: Observation, pose: Pose) -> int:
     """The item with which the run goes on, as a place in the list.
 
     The vehicle's own, if that is on the way from the last stop that was reached, and the vehicle too; else
     the end of the piece of that way on which the robot stands, the first of equals: nothing is cut short.
     At a stop whose scan was broken off that is the stop's waypoint.
     """
-    pieces = way(run, course)
-    beyond = passed_by(run, course, sight)
-    if beyond is not None or keeps(run, course, sight.place):
-        return sight.place if beyond is None else beyond
+    pieces = way(run, listed)
+    beyond = passed_by(run, listed, observed)
+    if beyond is not None or keeps(run, listed, observed.place):
+        return observed.place if beyond is None else beyond
     for piece in pieces:
-        if piece.place == sight.place and piece.away(pose) <= ON_WAY_M:
-            return sight.place
+        if piece.place == observed.place and piece.away(pose) <= ON_WAY_M:
+            return observed.place
     if not pieces:
-        return sight.place
+        return observed.place
     return min(pieces, key=lambda piece: (round(piece.away(pose), 2), piece.place)).place
 
 
-def keeps(run: Run, course: Course, place: int) -> bool:
+def keeps(run: Run, listed: ListedMission, place: int) -> bool:
     """Whether the vehicle is in the middle of a stop's waits, and rightly so."""
-    for index, visit in enumerate(course.visits):
-        if visit.at < place < visit.after:
-            behind = index < run.at and visit.stop in run.done
+    for index, items in enumerate(listed.stops):
+        if items.at < place < items.after:
+            behind = index < run.at and items.stop in run.done
             return behind or (index == run.at and run.stop_state in ("SCANNING", "VERIFYING"))
     return False
 
 
-def way(run: Run, course: Course) -> tuple[Piece, ...]:
+def way(run: Run, listed: ListedMission) -> tuple[Piece, ...]:
     """The pieces from the last stop that was reached to the one that is worked on, or of the way back."""
-    mission = course.mission
-    stops = len(course.visits)
+    mission = listed.mission
+    stops = len(listed.stops)
     first = min(run.leg, run.at, stops - 1)
-    begin = course.visits[first].first
-    end = course.visits[run.at].at + 1 if run.at < stops else course.end
+    begin = listed.stops[first].first
+    end = listed.stops[run.at].at + 1 if run.at < stops else listed.end
     at = mission.stops[first].approach[0]
     pieces: list[Piece] = []
     for place in range(begin, end):
-        if course.sent.placed[place].role in PASSED:
-            to = point_of(course, place)
+        if listed.sent.placed[place].role in PASSED:
+            to = point_of(listed, place)
             pieces.append(Piece(at, to, place))
             at = to
     return tuple(pieces)
 
 
-def point_of(course: Course, place: int) -> Point:
+def point_of(listed: ListedMission, place: int) -> Point:
     """Where a waypoint of the list is, metres in the site's frame."""
-    item = course.sent.placed[place].item
-    return point_at(course.sent, item.x, item.y)
+    item = listed.sent.placed[place].item
+    return point_at(listed.sent, item.x, item.y)

@@ -6,22 +6,31 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
-from bridge.clock import Clock
-from bridge.mavlink.desk.progress import Sight
-from bridge.mavlink.desk.visits import Course
-from bridge.mavlink.gateway.local import LocalFrame, local_frame
-from bridge.mavlink.line.peer import Origin, origin_of
-from bridge.mavlink.line.wire import Message, dialect
 from mission.events import Arrived, Pose
 from mission.geodesy import heading_of
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.captures import Capture, Picture, capture_of
-from mission.mavlink.origin import is_elsewhere
+from mission.mavlink.enums import MissionState, ModeFlag
+from mission.mavlink.following.listed_mission import ListedMission
+from mission.mavlink.following.steps import Observation
+from mission.mavlink.local_frame import LocalFrame, VehicleOrigin, is_elsewhere, local_frame
 from mission.mavlink.read_back import point_at
-from mission.mavlink.telemetry import charge_of, is_lost, stands_still
+from mission.mavlink.telemetry import (
+    charge_of,
+    global_speed,
+    is_lost,
+    local_speed,
+    origin_of,
+    place_of,
+    stands_still,
+)
 from mission.run.states import Run
+
+Message = Any
+"""A MAVLink message as pymavlink gives it, from a line or a log."""
 
 CAPTURES_KEPT = 100
 TOLD = (
@@ -33,8 +42,8 @@ NONE_YET: Picture = (-1, -1)
 
 
 @dataclass(frozen=True)
-class Seen:
-    """Something that was told, and when that came (station's clock)."""
+class Told:
+    """Something that was told, and when that came."""
 
     message: Message
     ns: int
@@ -50,15 +59,14 @@ class Fix:
     ns: int
 
 
-class Lookout:
+class Observer:
     """Takes messages one after another; asked, it says what they come to."""
 
-    def __init__(self, autopilot: Autopilot, clock: Clock) -> None:
+    def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
-        self._clock = clock
-        self._newest: dict[str, Seen] = {}
+        self._newest: dict[str, Told] = {}
         self._captures: deque[Capture] = deque(maxlen=CAPTURES_KEPT)
-        self._frame: tuple[Course, Origin, LocalFrame] | None = None
+        self._frame: tuple[ListedMission, VehicleOrigin, LocalFrame] | None = None
         self._work: tuple[int, bool] | None = None
         """Sequence number that is worked on, and whether all is done."""
         self._work_ns = 0
@@ -69,16 +77,16 @@ class Lookout:
         self.battery = 1.0
         """0 to 1, as last told."""
 
-    def take(self, message: Message, course: Course | None) -> str:
+    def take(self, message: Message, listed: ListedMission | None, now_ns: int) -> str:
         """Remember what a message tells; its name."""
-        name, now_ns = str(message.get_type()), self._clock.now_ns()
+        name = str(message.get_type())
         before = (self.mode, self.armed)
-        self._newest[name] = Seen(message, now_ns)
+        self._newest[name] = Told(message, now_ns)
         if (self.mode, self.armed) != before:
             self._mode_began_ns = now_ns
         taking = TAKING.get(name)
         if taking is not None:
-            taking(self, message, course, now_ns)
+            taking(self, message, listed, now_ns)
         return name
 
     @property
@@ -93,34 +101,32 @@ class Lookout:
         newest = self._clock_told()
         return 0 if newest is None else int(newest.message.time_boot_ms)
 
-    @property
-    def mode_explained(self) -> bool:
+    def mode_explained(self, now_ns: int) -> bool:
         """Whether clock and item were told since the mode changed: by a reboot it does, and at the end."""
         newest = self._clock_told()
         told = newest is not None and min(newest.ns, self.current_ns) > self._mode_began_ns
-        return told or is_lost((self._clock.now_ns() - self._mode_began_ns) / 1e9)
+        return told or is_lost((now_ns - self._mode_began_ns) / 1e9)
 
-    @property
-    def pose(self) -> Pose | None:
+    def pose(self, now_ns: int) -> Pose | None:
         """Where it stands, unless it has not told so for a while."""
         fix = self.fix
-        lost = fix is None or is_lost((self._clock.now_ns() - fix.ns) / 1e9)
+        lost = fix is None or is_lost((now_ns - fix.ns) / 1e9)
         return None if fix is None or lost else fix.pose
 
-    def _clock_told(self) -> Seen | None:
+    def _clock_told(self) -> Told | None:
         told = [self._newest[name] for name in CLOCKS if name in self._newest]
         return max(told, key=lambda seen: seen.ns, default=None)
 
-    def fresh(self, within_s: float) -> bool:
+    def fresh(self, within_s: float, now_ns: int) -> bool:
         """Whether what is wanted most comes in often enough."""
-        oldest_ns = self._clock.now_ns() - round(within_s * 1e9)
+        oldest_ns = now_ns - round(within_s * 1e9)
         seen = [self._newest.get(name) for name in WANTED]
         return all(one is not None and one.ns > oldest_ns for one in seen)
 
-    def complete(self, course: Course | None) -> bool:
-        """Whether enough is known to say what the vehicle does, and where on the course."""
+    def complete(self, listed: ListedMission | None) -> bool:
+        """Whether enough is known to say what the vehicle does, and where in its list."""
         told = {"HEARTBEAT", "MISSION_CURRENT"} <= self._newest.keys()
-        return told and (course is None or self.fix is not None)
+        return told and (listed is None or self.fix is not None)
 
     @property
     def mode(self) -> str:
@@ -137,7 +143,7 @@ class Lookout:
     @property
     def armed(self) -> bool:
         seen = self._newest.get("HEARTBEAT")
-        return seen is not None and bool(seen.message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+        return seen is not None and bool(seen.message.base_mode & ModeFlag.SAFETY_ARMED)
 
     @property
     def sequence(self) -> int | None:
@@ -156,24 +162,24 @@ class Lookout:
         seen = self._newest.get("MISSION_CURRENT")
         if seen is None:
             return None
-        if seen.message.mission_state == dialect.MISSION_STATE_NO_MISSION:
+        if seen.message.mission_state == MissionState.NO_MISSION:
             return 0
         return seen.message.total if 0 < seen.message.total < UNKNOWN_TOTAL else None
 
-    def sight(
-        self, run: Run, course: Course, arrived: Arrived | None = None, *, after: Picture = NONE_YET
-    ) -> Sight | None:
+    def observe(
+        self, run: Run, listed: ListedMission, arrived: Arrived | None = None, *, after: Picture = NONE_YET
+    ) -> Observation | None:
         """What is seen of the vehicle, if enough is known.
 
         `arrived` tells that it was seen at its stop; scans count that were made after the one named `after`.
         """
         if self._work is None or "HEARTBEAT" not in self._newest:
             return None
-        place, began_ns = self.place(course), self._work_ns
+        place, began_ns = self.place(listed), self._work_ns
         fix = self.fix if self.fix is not None and self.fix.ns > began_ns else None
-        capture = self.capture(run, course, after)
+        capture = self.capture(run, listed, after)
         stood = capture.pose if capture is not None else None
-        return Sight(
+        return Observation(
             mode=self.mode, armed=self.armed, place=place,
             pose=None if fix is None else fix.pose,
             still=fix is not None and fix.still,
@@ -181,23 +187,23 @@ class Lookout:
             stood=arrived.pose if arrived is not None else stood,
         )  # fmt: skip
 
-    def place(self, course: Course) -> int:
+    def place(self, listed: ListedMission) -> int:
         """Place in the list of what the vehicle works on; its length once all is done."""
         current = self._newest["MISSION_CURRENT"].message
-        if current.mission_state == dialect.MISSION_STATE_COMPLETE:
-            return course.end
+        if current.mission_state == MissionState.COMPLETE:
+            return listed.end
         reached = self._newest.get("MISSION_ITEM_REACHED")
-        last = course.sequence(course.end - 1)
+        last = listed.sequence(listed.end - 1)
         through = reached is not None and reached.message.seq == last == current.seq
-        if through and current.mission_state == dialect.MISSION_STATE_UNKNOWN:
-            return course.end
-        return course.place(current.seq)
+        if through and current.mission_state == MissionState.UNKNOWN:
+            return listed.end
+        return listed.place(current.seq)
 
-    def capture(self, run: Run, course: Course, after: Picture) -> Capture | None:
+    def capture(self, run: Run, listed: ListedMission, after: Picture) -> Capture | None:
         """What was told last of a scan at the stop that is worked on."""
-        if run.at >= len(course.mission.stops):
+        if run.at >= len(listed.mission.stops):
             return None
-        stop = course.mission.stops[run.at]
+        stop = listed.mission.stops[run.at]
         own = [
             capture
             for capture in self._captures
@@ -205,55 +211,55 @@ class Lookout:
         ]
         return own[-1] if own else None
 
-    def _take_current(self, message: Message, course: Course | None, now_ns: int) -> None:
-        work = (message.seq, message.mission_state == dialect.MISSION_STATE_COMPLETE)
+    def _take_current(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
+        work = (message.seq, message.mission_state == MissionState.COMPLETE)
         if self._work != work:
             self._work, self._work_ns = work, now_ns
 
-    def _take_origin(self, message: Message, course: Course | None, now_ns: int) -> None:
+    def _take_origin(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         self._frame = None
 
-    def _take_local(self, message: Message, course: Course | None, now_ns: int) -> None:
-        attitude, frame = self._newest.get("ATTITUDE"), self._local_frame(course)
+    def _take_local(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
+        attitude, frame = self._newest.get("ATTITUDE"), self._local_frame(listed)
         if attitude is not None and frame is not None:
             pose = frame.pose(message.x, message.y, attitude.message.yaw)
-            self._fix(pose, math.hypot(message.vx, message.vy), attitude.message.yawspeed, now_ns)
+            self._fix(pose, local_speed(message), attitude.message.yawspeed, now_ns)
 
-    def _take_global(self, message: Message, course: Course | None, now_ns: int) -> None:
+    def _take_global(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         """Steps of 1e-7 degrees are centimetres: taken only of a vehicle that tells no local metres."""
         attitude = self._newest.get("ATTITUDE")
-        if course is None or attitude is None or (message.lat, message.lon) == (0, 0):
+        if listed is None or attitude is None or place_of(message) is None:
             return
-        if "LOCAL_POSITION_NED" in self._newest and self._local_frame(course) is not None:
+        if "LOCAL_POSITION_NED" in self._newest and self._local_frame(listed) is not None:
             return
-        x, y = point_at(course.sent, message.lat, message.lon)
-        heading = heading_of(course.sent.origin, math.degrees(attitude.message.yaw))
-        speed = math.hypot(message.vx, message.vy) / 100
+        x, y = point_at(listed.sent, message.lat, message.lon)
+        heading = heading_of(listed.sent.origin, math.degrees(attitude.message.yaw))
+        speed = global_speed(message)
         self._fix(Pose(x=x, y=y, heading=heading), speed, attitude.message.yawspeed, now_ns)
 
     def _fix(self, pose: Pose, speed: float, yaw_rate: float, now_ns: int) -> None:
         self.fix = Fix(pose, speed, stands_still(speed=speed, yaw_rate=yaw_rate), now_ns)
 
-    def _take_battery(self, message: Message, course: Course | None, now_ns: int) -> None:
+    def _take_battery(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         charge = charge_of(message.battery_remaining)
         self.battery = self.battery if charge is None else charge
 
-    def _take_capture(self, message: Message, course: Course | None, now_ns: int) -> None:
-        capture = capture_of(message, None if course is None else course.sent)
+    def _take_capture(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
+        capture = capture_of(message, None if listed is None else listed.sent)
         if all(capture.name != known.name for known in self._captures):
             self._captures.append(capture)
 
-    def _local_frame(self, course: Course | None) -> LocalFrame | None:
+    def _local_frame(self, listed: ListedMission | None) -> LocalFrame | None:
         """The vehicle's local metres in the site; `None` before its origin is known, or if it is far away."""
         told = self._newest.get("GPS_GLOBAL_ORIGIN")
-        if course is None or told is None:
+        if listed is None or told is None:
             return None
         origin = origin_of(told.message)
-        if is_elsewhere(course.sent.origin, origin.place):
+        if is_elsewhere(listed.sent.origin, origin.place):
             return None
-        if self._frame is None or self._frame[:2] != (course, origin):
-            rule = autopilot_named(course.sent.autopilot).rule
-            self._frame = (course, origin, local_frame(course.sent.origin, origin, rule))
+        if self._frame is None or self._frame[:2] != (listed, origin):
+            rule = autopilot_named(listed.sent.autopilot).rule
+            self._frame = (listed, origin, local_frame(listed.sent.origin, origin, rule))
         return self._frame[2]
 
 
@@ -261,12 +267,12 @@ UNKNOWN_TOTAL = 65_535
 WANTED = ("MISSION_CURRENT", "LOCAL_POSITION_NED", "ATTITUDE")
 CLOCKS = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "ATTITUDE", "SYSTEM_TIME")
 """Messages with the vehicle's time since it was started."""
-TAKING: dict[str, Callable[[Lookout, Message, Course | None, int], None]] = {
-    "MISSION_CURRENT": Lookout._take_current,
-    "GPS_GLOBAL_ORIGIN": Lookout._take_origin,
-    "LOCAL_POSITION_NED": Lookout._take_local,
-    "GLOBAL_POSITION_INT": Lookout._take_global,
-    "SYS_STATUS": Lookout._take_battery,
-    "BATTERY_STATUS": Lookout._take_battery,
-    "CAMERA_IMAGE_CAPTURED": Lookout._take_capture,
+TAKING: dict[str, Callable[[Observer, Message, ListedMission | None, int], None]] = {
+    "MISSION_CURRENT": Observer._take_current,
+    "GPS_GLOBAL_ORIGIN": Observer._take_origin,
+    "LOCAL_POSITION_NED": Observer._take_local,
+    "GLOBAL_POSITION_INT": Observer._take_global,
+    "SYS_STATUS": Observer._take_battery,
+    "BATTERY_STATUS": Observer._take_battery,
+    "CAMERA_IMAGE_CAPTURED": Observer._take_capture,
 }

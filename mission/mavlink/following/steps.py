@@ -1,0 +1,213 @@
+"""What is seen of a vehicle in AUTO, told as the steps of a run: arrived, settled, scanned, or why not.
+
+Nothing here touches a vehicle, a clock or a disk. That a waypoint is reached is the vehicle's word; whether
+the robot stands at the stop is measured here, by its pose. That a scan was made is believed only of the
+vehicle's camera or scanner.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from mission.document import Stop
+from mission.events import Pose, Settled, Unconfirmed
+from mission.mavlink.following.listed_mission import ListedMission, StopItems
+from mission.run import states as runs
+from mission.run.scans import ScanFailed, ScanResult, turned_away
+from mission.run.states import Change, Run, changed, deviation
+
+SOMEBODY = "the vehicle's operator"
+"""Who gives orders that were not given here."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """A vehicle at one moment, as far as it is known."""
+
+    mode: str
+    """"AUTO", "HOLD", or what else it calls itself."""
+    armed: bool
+    place: int
+    """The item it works on, as a place in the list; the list's length once all is done."""
+    pose: Pose | None = None
+    """Measured while it worked on that item."""
+    still: bool = False
+    """Stands, by that measurement."""
+    scan: ScanResult | ScanFailed | None = None
+    """What the scanner told of the stop that is worked on."""
+    stood: Pose | None = None
+    """Where the robot stood at that stop, as the scanner told, or as it was seen there before."""
+    in_vain: bool = False
+    """No word of the scanner is to be expected any more."""
+
+    @property
+    def drives(self) -> bool:
+        """Whether it follows its mission."""
+        return self.mode == "AUTO" and self.armed
+
+
+def steps(run: Run, listed: ListedMission, observed: Observation) -> tuple[Change, ...]:
+    """What has happened since the run was stored, one after another, up to the end of the present stop."""
+    taken: list[Change] = []
+    while (change := step(run, listed, observed)) is not None:
+        taken.append(change)
+        if change.run.at != run.at or tried_again(
+            run, change.run
+        ):  # what was observed is of this stop, this time
+            break
+        run = change.run
+    return tuple(taken)
+
+
+def step(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
+    """The next thing that has happened, if anything has."""
+    if run.state == "PAUSED":
+        return _ends_scan(run, listed, observed)
+    if run.state == "HOMING":
+        return runs.ended(run, run.then) if observed.place >= listed.end else None
+    if run.state != "RUNNING" or run.at >= len(listed.stops):
+        return None
+    return STEPS[run.stop_state](run, listed, observed, listed.stops[run.at])
+
+
+def _ends_scan(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
+    """A vehicle that is paused still ends the scan it was in."""
+    if run.stop_state == "VERIFYING":
+        return _verified(run, listed, observed)
+    if run.stop_state == "SCANNING" and isinstance(observed.scan, ScanResult):
+        return runs.scan_ended(run, listed.mission, observed.scan)
+    return None
+
+
+def _begun(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
+    return runs.leaving(run)
+
+
+def _driven(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
+    """The vehicle says that it is there; is it?"""
+    if observed.place <= items.at:
+        return None
+    left = observed.place >= items.after
+    pose = observed.stood if left else observed.pose
+    if pose is None:
+        reason = "nobody saw where the vehicle stood"
+        return _unconfirmed(run, listed, None, reason) if left else None
+    stop, wrong = listed.mission.stops[run.at], misplaced(pose, run, listed)
+    if not wrong:
+        return runs.reached(changed(run, leg=run.at), listed.mission, pose, deviation(pose, stop))
+    if left:
+        return runs.failed(_last_try(run, stop), listed.mission, wrong)
+    if observed.still or observed.place >= items.scan:
+        return runs.failed(run, listed.mission, wrong)
+    return None
+
+
+def _settled(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
+    if observed.place <= items.at:
+        return Change(changed(run, stop_state="NAVIGATING"))
+    if observed.place < items.scan:
+        return None
+    if observed.place >= items.after or observed.pose is None:
+        return Change(changed(run, stop_state="SCANNING")) if observed.place >= items.after else None
+    wrong = misplaced(observed.pose, run, listed)
+    if wrong:
+        return runs.failed(run, listed.mission, f"moved while it settled: {wrong}")
+    settled = partial(Settled, stop=items.stop, pose=observed.pose)
+    return Change(changed(run, stop_state="SCANNING"), (settled,))
+
+
+def _scanned(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
+    """The scanner's word is taken when it comes; the stop is done when its wait is over."""
+    if observed.place <= items.at:
+        return Change(changed(run, stop_state="NAVIGATING"))
+    if isinstance(observed.scan, ScanResult):
+        return runs.scan_ended(run, listed.mission, observed.scan)
+    if isinstance(observed.scan, ScanFailed):
+        left = observed.place >= items.after
+        tried = _last_try(run, listed.mission.stops[run.at]) if left else run
+        return runs.scan_ended(tried, listed.mission, observed.scan)
+    if observed.place < items.after or not observed.in_vain:
+        return None
+    return _unconfirmed(run, listed, observed.stood, "the vehicle told nothing of a scan")
+
+
+def _last_try(run: Run, stop: Stop) -> Run:
+    """From a stop that was left there is no planned way back to it."""
+    return changed(run, attempt=stop.retries)
+
+
+def _scan_over(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
+    """A scan that has come in counts once its wait is over."""
+    return None if items.at < observed.place < items.after else _verified(run, listed, observed)
+
+
+def _verified(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
+    pose = observed.stood or observed.pose
+    return None if pose is None else runs.verified(run, listed.mission, pose)
+
+
+def _unconfirmed(run: Run, listed: ListedMission, pose: Pose | None, reason: str) -> Change:
+    """The vehicle is through with the stop, and that is all that is known."""
+    stop = listed.mission.stops[run.at].id
+    behind = runs.next_stop(changed(run, leg=run.at + 1, done=(*run.done, stop)), listed.mission)
+    telling = partial(Unconfirmed, stop=stop, pose=pose, reason=reason)
+    return Change(behind.run, (telling, *behind.events))
+
+
+STEPS: dict[str, Callable[[Run, ListedMission, Observation, StopItems], Change | None]] = {
+    "WAITING": _begun,
+    "NAVIGATING": _driven,
+    "SETTLING": _settled,
+    "SCANNING": _scanned,
+    "VERIFYING": _scan_over,
+}
+
+
+def tried_again(before: Run, after: Run) -> bool:
+    """Whether the vehicle must go back to the stop's waypoint for another attempt."""
+    same = (before.at, after.state, after.stop_state) == (after.at, "RUNNING", "WAITING")
+    return same and after.attempt > before.attempt
+
+
+def passed_by(run: Run, listed: ListedMission, observed: Observation) -> int | None:
+    """Where a vehicle goes on that waits at a stop that was left out; `None` if it does not."""
+    for items in listed.stops[: run.at]:
+        if items.stop in run.skipped and items.at < observed.place < items.after < listed.end:
+            return items.after
+    return None
+
+
+def taken_over(
+    run: Run, listed: ListedMission, observed: Observation, *, by: str = SOMEBODY
+) -> Change | None:
+    """What a change of the vehicle's mode that was not ordered here means for the run."""
+    going = run.state in ("RUNNING", "HOMING")
+    if going and not observed.drives and observed.place < listed.end:
+        why = "disarmed" if observed.mode == "AUTO" else f"mode {observed.mode}"
+        return runs.paused(run, f"{why}, by {by}", stands=observed.mode == "HOLD")
+    if run.state in ("PAUSED", "HELD") and observed.drives and observed.place < listed.end:
+        return runs.resumed(run, by)
+    if run.state == "PAUSED" and observed.place >= listed.end:  # it went on unseen, to the end
+        return runs.resumed(run, by)
+    return None
+
+
+def held_by_vehicle(run: Run, items: int | None) -> Run:
+    """The run as it is told; a mission that lay ready is gone if the vehicle says that it holds none."""
+    return Run() if run.state == "READY" and items == 0 else run
+
+
+def misplaced(pose: Pose, run: Run, listed: ListedMission) -> str:
+    """How the robot stands elsewhere than at its stop, or turned away; empty if it stands there."""
+    stop, away = listed.mission.stops[run.at], deviation(pose, listed.mission.stops[run.at])
+    if away > stop.tolerance_m:
+        return (
+            f"{away:.3f} m from the stop, tolerance is {stop.tolerance_m:g} m; the vehicle calls it reached"
+        )
+    turned = turned_away(listed.mission.scanner, stop.heading, pose.heading)
+    if turned:
+        return f"turned {math.degrees(turned):.1f}° from the heading that its scanner needs"
+    return ""
