@@ -12,8 +12,8 @@ from bridge.console import say
 from bridge.ways import DEFAULT_ENDPOINT, Connect, Insecure, KeyFolder, RobotName, Site, alone, given_in
 
 if TYPE_CHECKING:
+    from bridge.mavlink.line.frames import Message
     from bridge.mavlink.line.transport import Transport
-    from bridge.mavlink.line.wire import Message
     from bridge.mavlink.tunnel import Tunnel
 
 MOST_KINDS = 100
@@ -133,7 +133,7 @@ class Refusals:
     def told(self, message: Message) -> bytes:
         """A STATUSTEXT that tells of it, or nothing if that was told a moment ago."""
         from bridge.mavlink.harmless import described
-        from bridge.mavlink.line.wire import dialect
+        from bridge.mavlink.line.messages import warning
 
         what, now = described(message), time.monotonic()
         if now - self._said.get(what, -SAY_EVERY_S) < SAY_EVERY_S:
@@ -141,10 +141,7 @@ class Refusals:
         if what not in self._said:
             say(f"refused {what}: only looking and stopping pass without --raw-orders")
         self._said[what] = now
-        vehicle = getattr(message, "target_system", 0) or 1
-        speaker = dialect.MAVLink(None, srcSystem=vehicle, srcComponent=dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
-        text = f"{REFUSED}{what}"[:50].encode()
-        return bytes(dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_WARNING, text).pack(speaker))
+        return warning(f"{REFUSED}{what}", system=getattr(message, "target_system", 0) or 1)
 
 
 class RefusalsHeard:

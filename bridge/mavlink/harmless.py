@@ -6,10 +6,12 @@ commander's lease would count. To stop a vehicle must always be possible.
 
 from __future__ import annotations
 
-from bridge.mavlink.line.peer import enum_name
-from bridge.mavlink.line.wire import Message, dialect
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.messages import enum_name
 from mission.mavlink.autopilots import autopilot_of
 from mission.mavlink.autopilots.kind import Autopilot, Modes
+from mission.mavlink.enums import Component
+from mission.mavlink.items import Command
 
 LOOKS = frozenset({
     "HEARTBEAT", "PING", "TIMESYNC", "SYSTEM_TIME", "COMMAND_CANCEL",
@@ -19,10 +21,10 @@ LOOKS = frozenset({
 })  # fmt: skip
 """Messages that ask."""
 ASKS = frozenset({
-    dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
-    dialect.MAV_CMD_GET_MESSAGE_INTERVAL, dialect.MAV_CMD_GET_HOME_POSITION,
-    dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, dialect.MAV_CMD_REQUEST_PROTOCOL_VERSION,
-    dialect.MAV_CMD_REQUEST_CAMERA_INFORMATION, dialect.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS,
+    Command.REQUEST_MESSAGE, Command.SET_MESSAGE_INTERVAL,
+    Command.GET_MESSAGE_INTERVAL, Command.GET_HOME_POSITION,
+    Command.REQUEST_AUTOPILOT_CAPABILITIES, Command.REQUEST_PROTOCOL_VERSION,
+    Command.REQUEST_CAMERA_INFORMATION, Command.REQUEST_CAMERA_CAPTURE_STATUS,
 })  # fmt: skip
 """Commands that ask."""
 COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
@@ -36,7 +38,7 @@ class Harmless:
 
     def sees(self, message: Message) -> None:
         """Look at a message that comes from the vehicle's side."""
-        if message.get_type() == "HEARTBEAT" and message.get_srcComponent() == dialect.MAV_COMP_ID_AUTOPILOT1:
+        if message.get_type() == "HEARTBEAT" and message.get_srcComponent() == Component.AUTOPILOT1:
             self._kinds[message.get_srcSystem()] = autopilot_of(message.autopilot)
 
     def lets_through(self, message: Message) -> bool:
@@ -51,13 +53,13 @@ class Harmless:
 
     def _stops(self, message: Message) -> bool:
         first, main, sub = message.param1, message.param2, message.param3
-        if message.command == dialect.MAV_CMD_COMPONENT_ARM_DISARM:
+        if message.command == Command.COMPONENT_ARM_DISARM:
             return bool(first == 0)
-        if message.command == dialect.MAV_CMD_DO_PAUSE_CONTINUE:
+        if message.command == Command.DO_PAUSE_CONTINUE:
             return bool(first == 0)
-        if message.command == dialect.MAV_CMD_DO_FLIGHTTERMINATION:
+        if message.command == Command.DO_FLIGHTTERMINATION:
             return bool(first >= 0.5)
-        if message.command != dialect.MAV_CMD_DO_SET_MODE:
+        if message.command != Command.DO_SET_MODE:
             return False
         meant = self._meant(message.target_system)
         return bool(meant) and all(modes.hold.main == main and modes.hold.sub in (0, sub) for modes in meant)

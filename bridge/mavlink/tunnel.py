@@ -8,7 +8,6 @@ nor a stuck listener holds up the robot. Frames pass unchanged, with their signa
 from __future__ import annotations
 
 import math
-import struct
 import threading
 import time
 from collections import Counter, OrderedDict, deque
@@ -17,8 +16,10 @@ from contextlib import contextmanager
 from typing import Any
 
 from bridge.link import Link
-from bridge.mavlink.line.transport import Address, Transport
-from bridge.mavlink.line.wire import Message, dialect
+from bridge.mavlink.line.frames import Frames, Message, dialect
+from bridge.mavlink.line.messages import on_board_beat
+from bridge.mavlink.line.transport import Transport
+from mission.mavlink.enums import Component
 
 QUEUE = 500
 """Frames that wait in one direction: some seconds of a talkative vehicle."""
@@ -29,36 +30,8 @@ SAMPLE_BYTES = 1200
 READ_S = 0.1
 ECHOES = 512
 """Frames that were written lately; one that comes back at once is an echo."""
-MAX_READERS = 16
-KNOCKING = (252, dialect.MAV_COMP_ID_UDP_BRIDGE)
+KNOCKING = (252, Component.UDP_BRIDGE)
 """Who knocks: not the gateway (253), by whose heartbeats a vehicle may tell that it is alive."""
-
-
-class Frames:
-    """Whole frames out of bytes, with what they say; what is no frame is dropped and counted."""
-
-    def __init__(self, dropped: Counter[str]) -> None:
-        self._dropped = dropped
-        self._parser = _parser()
-
-    def take(self, data: bytes, *, datagram: bool) -> list[tuple[bytes, Message]]:
-        if datagram and self._parser.buf_len() > 0:
-            self._parser = _parser()  # half a frame in a datagram is never completed by the next one
-        try:
-            messages = self._parser.parse_buffer(data) or []
-        except (dialect.MAVError, struct.error, UnicodeDecodeError, ValueError, TypeError, IndexError):
-            self._dropped["unreadable"] += 1
-            self._parser = _parser()
-            return []
-        whole = [message for message in messages if message.get_type() != "BAD_DATA"]
-        self._dropped["unreadable"] += len(messages) - len(whole)
-        return [(bytes(message.get_msgbuf()), message) for message in whole]
-
-
-def _parser() -> Any:
-    parser = dialect.MAVLink(None)
-    parser.robust_parsing = True
-    return parser
 
 
 class Waiting:
@@ -151,7 +124,7 @@ class Tunnel:
         self._echoes = Echoes()
         self._out = Waiting(self.dropped, "to the link")
         self._in = Waiting(self.dropped, "from the link")
-        self._readers: dict[Address, Frames] = {}
+        self._read_frames = Frames(self.dropped)
         self._heard = Frames(self.dropped)
         self._ended = threading.Event()
         self._error: Exception | None = None
@@ -188,10 +161,12 @@ class Tunnel:
         while not self._ended.is_set():
             if self._knocks and time.monotonic() - knocked_s >= 1.0:
                 knocked_s = time.monotonic()
-                self._transport.write(bytes(knock().pack(coder)))
+                self._transport.write(bytes(on_board_beat().pack(coder)))
                 coder.seq = (coder.seq + 1) % 256
             for address, data in self._transport.read(READ_S):
-                for frame, message in self._reader(address).take(data, datagram=self._transport.datagrams):
+                for frame, message in self._read_frames.whole(
+                    data, datagram=self._transport.datagrams, sender=address
+                ):
                     self._take(frame, message)
 
     def _take(self, frame: bytes, message: Message) -> None:
@@ -212,7 +187,7 @@ class Tunnel:
 
     def _write(self) -> None:
         while not self._ended.is_set():
-            for frame, message in self._heard.take(self._in.sample(), datagram=True):
+            for frame, message in self._heard.whole(self._in.sample(), datagram=True):
                 if self._passes(message):
                     self._echoes.wrote(frame)
                     self._transport.write(frame)
@@ -231,21 +206,6 @@ class Tunnel:
     def _say_back(self, frame: bytes) -> None:
         if frame:
             self._out.put(frame)
-
-    def _reader(self, address: Address) -> Frames:
-        """Half a frame is completed by the one who began it."""
-        reader = self._readers.pop(address, None) or Frames(self.dropped)
-        self._readers[address] = reader
-        while len(self._readers) > MAX_READERS:
-            del self._readers[next(iter(self._readers))]
-        return reader
-
-
-def knock() -> Message:
-    """The heartbeat of something that only carries."""
-    return dialect.MAVLink_heartbeat_message(
-        dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
-    )
 
 
 @contextmanager

@@ -77,3 +77,36 @@ class MissionState(IntEnum):
     ACTIVE = 3
     PAUSED = 4
     COMPLETE = 5
+
+
+class Component(IntEnum):
+    """MAV_COMP_ID."""
+
+    AUTOPILOT1 = 1
+    MISSIONPLANNER = 190
+    ONBOARD_COMPUTER = 191
+    UDP_BRIDGE = 240
+
+
+class MessageId(IntEnum):
+    """Numbers of messages that are asked for."""
+
+    HEARTBEAT = 0
+    SYS_STATUS = 1
+    SYSTEM_TIME = 2
+    SET_MODE = 11
+    GPS_RAW_INT = 24
+    ATTITUDE = 30
+    LOCAL_POSITION_NED = 32
+    GLOBAL_POSITION_INT = 33
+    MISSION_CURRENT = 42
+    MISSION_ITEM_REACHED = 46
+    GPS_GLOBAL_ORIGIN = 49
+    VFR_HUD = 74
+    RADIO_STATUS = 109
+    BATTERY_STATUS = 147
+    AUTOPILOT_VERSION = 148
+    HOME_POSITION = 242
+    EXTENDED_SYS_STATE = 245
+    CAMERA_CAPTURE_STATUS = 262
+    CAMERA_IMAGE_CAPTURED = 263

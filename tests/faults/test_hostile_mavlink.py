@@ -7,8 +7,9 @@ import socket
 
 import pytest
 
+from bridge.mavlink.line.frames import Message, dialect
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import Message, Wire, dialect, wire
+from bridge.mavlink.line.wire import Wire, wire
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting

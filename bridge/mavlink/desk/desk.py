@@ -25,7 +25,7 @@ from bridge.mavlink.desk.logbook import Logbook, logbook
 from bridge.mavlink.desk.orders import Consent, Orders
 from bridge.mavlink.line.peer import Peer, found
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import GROUND_STATION, Box, Who, dialect, wire
+from bridge.mavlink.line.wire import GROUND_STATION, Box, Who, wire
 from bridge.pages import POSES_KEPT, address_of, events_page, mission_part, poses_page
 from bridge.protocol import (
     CHUNK_BYTES,
@@ -43,6 +43,7 @@ from bridge.station import Station, whoami
 from mission import __version__
 from mission.errors import RobotUnreachable
 from mission.events import PoseReport, StateReport
+from mission.mavlink.enums import MessageId
 from mission.mavlink.following.observer import TOLD, Observer
 from mission.mavlink.following.steps import held_by_vehicle
 from mission.mavlink.telemetry import is_lost
@@ -181,7 +182,7 @@ class Desk:
         if compares:
             self._follower.compare()
         if not self._follower.run.over:  # what was missed: the scan that was made last
-            self._peer.ask(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
+            self._peer.ask(MessageId.CAMERA_IMAGE_CAPTURED)
         self._follower.begin()
 
     # What it hears, and tells

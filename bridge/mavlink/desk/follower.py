@@ -11,11 +11,11 @@ from functools import partial
 from bridge.mavlink.desk.hands import Denied, Hands
 from bridge.mavlink.desk.logbook import Logbook, Ordered, Owed
 from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.transfer.download import download
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.events import Arrived
 from mission.mavlink.autopilots.kind import AUTO
+from mission.mavlink.enums import MessageId
 from mission.mavlink.following import steps as progress
 from mission.mavlink.following.listed_mission import ListedMission
 from mission.mavlink.following.observer import CLOCKS, Observer
@@ -128,7 +128,7 @@ class Follower:
         if self._left is None or self._left[0] != stop:
             self._left = (stop, now_ns)
         if observed.scan is None:
-            self._hands.ask_for(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
+            self._hands.ask_for(MessageId.CAMERA_IMAGE_CAPTURED)
         beyond = run.at + 1 < len(listed.stops) and observed.place > listed.stops[run.at + 1].at
         return replace(observed, in_vain=beyond or now_ns > self._left[1] + GRACE_NS)
 

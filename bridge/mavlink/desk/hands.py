@@ -7,24 +7,26 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from bridge.clock import Clock
+from bridge.mavlink.line.messages import interval
 from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.wire import dialect
 from mission.errors import OutcomeUnknown
 from mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
+from mission.mavlink.enums import MessageId
 from mission.mavlink.following.observer import Observer
+from mission.mavlink.items import Command
 from mission.run.orders import Refused
 
 SHOWS_S = 5.0
 """A vehicle beats every second; so long it may take until it shows what it was told."""
 ASK_AGAIN_NS = 500_000_000
 REPEATED_HZ = {
-    dialect.MAVLINK_MSG_ID_MISSION_CURRENT: 5.0,
-    dialect.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: 2.0,
-    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 10.0,
-    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 2.0,
-    dialect.MAVLINK_MSG_ID_ATTITUDE: 10.0,
-    dialect.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
-    dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: 0.5,
+    MessageId.MISSION_CURRENT: 5.0,
+    MessageId.MISSION_ITEM_REACHED: 2.0,
+    MessageId.LOCAL_POSITION_NED: 10.0,
+    MessageId.GLOBAL_POSITION_INT: 2.0,
+    MessageId.ATTITUDE: 10.0,
+    MessageId.SYS_STATUS: 1.0,
+    MessageId.GPS_GLOBAL_ORIGIN: 0.5,
 }
 """How often each message is wanted; what is lost is told again."""
 
@@ -54,13 +56,8 @@ class Hands:
 
     def ask_for_telemetry(self) -> None:
         """Ask to be told everything often, without waiting for answers: some vehicles know no intervals."""
-        who = self._peer.who
-        for number, per_s in REPEATED_HZ.items():
-            message = dialect.MAVLink_command_long_message(
-                who.system, who.component, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, 0,
-                number, 1e6 / per_s, 0, 0, 0, 0, 0,
-            )  # fmt: skip
-            self._peer.send(message)
+        for number, hertz in REPEATED_HZ.items():
+            self._peer.send(interval(self._peer.who, number, hertz))
 
     def ask_for(self, number: int) -> None:
         """Ask for a message once more, without waiting; at most twice a second."""
@@ -68,13 +65,7 @@ class Hands:
         if now_ns < self._asked_ns + ASK_AGAIN_NS:
             return
         self._asked_ns = now_ns
-        who = self._peer.who
-        request = dialect.MAV_CMD_REQUEST_MESSAGE
-        self._peer.send(
-            dialect.MAVLink_command_long_message(
-                who.system, who.component, request, 0, number, 0, 0, 0, 0, 0, 0
-            )
-        )
+        self._peer.request(number)
 
     def hold(self) -> None:
         """Let it stand where it is."""
@@ -90,9 +81,7 @@ class Hands:
         `anew` also takes a mission that is complete out of that state.
         """
         asked_ns = self._clock.now_ns()
-        self._order(
-            dialect.MAV_CMD_DO_SET_MISSION_CURRENT, float(sequence), float(anew), what=f"item {sequence}"
-        )
+        self._order(Command.DO_SET_MISSION_CURRENT, float(sequence), float(anew), what=f"item {sequence}")
         near = range(sequence, sequence + 3)
         self._shown(
             lambda: self._observer.current_ns > asked_ns and self._observer.sequence in near,
@@ -102,17 +91,17 @@ class Hands:
     def arm(self, armed: bool = True) -> None:
         """Arm it, or disarm it."""
         what = "arming" if armed else "disarming"
-        self._order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, float(armed), what=what)
+        self._order(Command.COMPONENT_ARM_DISARM, float(armed), what=what)
         self._shown(lambda: self._observer.armed == armed, what)
 
     def speed(self, metres_per_s: float) -> None:
         """Set the speed that the mission's first item sets; not every firmware takes it from elsewhere."""
         with suppress(OutcomeUnknown):
-            self._peer.command(dialect.MAV_CMD_DO_CHANGE_SPEED, 1.0, metres_per_s, -1.0)
+            self._peer.command(Command.DO_CHANGE_SPEED, 1.0, metres_per_s, -1.0)
 
     def _mode(self, name: str, mode: Mode) -> None:
         asked_ns = self._clock.now_ns()
-        self._order(dialect.MAV_CMD_DO_SET_MODE, *mode.params, what=f"mode {name}")
+        self._order(Command.DO_SET_MODE, *mode.params, what=f"mode {name}")
         self._shown(
             lambda: self._observer.mode == name and self._observer.mode_ns > asked_ns, f"changing to {name}"
         )

@@ -11,18 +11,23 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from typing import Any
 
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.messages import aim_at, aim_yaw, command_long, interval, on_board_beat
 from bridge.mavlink.line.peer import Peer, found
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import Box, Message, Who, dialect, wire
+from bridge.mavlink.line.wire import Box, Who, wire
 from mission.document import Point
 from mission.errors import InputError, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots import AUTOPILOTS
 from mission.mavlink.autopilots.kind import Mode, why_no_rover
+from mission.mavlink.enums import Component, MessageId
+from mission.mavlink.items import Command
 from mission.mavlink.local_frame import VehicleOrigin
-from mission.mavlink.telemetry import charge_of, is_lost, origin_of, stands_still
+from mission.mavlink.telemetry import charge_of, is_lost, local_speed, origin_of, stands_still
 
-ON_BOARD = Who(253, dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
+ON_BOARD = Who(253, Component.ONBOARD_COMPUTER)
 """Ourselves: neither QGroundControl (255) nor a station of ours (254)."""
 KEEP_S = 0.1
 ORDER_S = 3.0
@@ -37,15 +42,12 @@ ORIGIN_S = 15.0
 POSE_HZ = 20
 POSE = ("LOCAL_POSITION_NED", "ATTITUDE")
 STREAMS = {
-    "LOCAL_POSITION_NED": (dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED, POSE_HZ),
-    "ATTITUDE": (dialect.MAVLINK_MSG_ID_ATTITUDE, POSE_HZ),
-    "BATTERY_STATUS": (dialect.MAVLINK_MSG_ID_BATTERY_STATUS, 1),
-    "SYS_STATUS": (dialect.MAVLINK_MSG_ID_SYS_STATUS, 1),
+    "LOCAL_POSITION_NED": (MessageId.LOCAL_POSITION_NED, POSE_HZ),
+    "ATTITUDE": (MessageId.ATTITUDE, POSE_HZ),
+    "BATTERY_STATUS": (MessageId.BATTERY_STATUS, 1),
+    "SYS_STATUS": (MessageId.SYS_STATUS, 1),
 }
 """What we want to be told, by name: number of the message, times a second."""
-POSITION_ONLY = 0x0DF8
-"""Type mask of a setpoint that is a place: speeds, accelerations and yaw are ignored."""
-YAW_ONLY = 0x09FF
 
 
 class Heard(Box):
@@ -113,13 +115,6 @@ def _check_drivable(peer: Peer) -> None:
         raise InputError(f"--controller: {no_rover}")
 
 
-def on_board_beat() -> Message:
-    """The heartbeat of a computer on the robot."""
-    return dialect.MAVLink_heartbeat_message(
-        dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
-    )
-
-
 class Autopilot:
     """A vehicle that was found. Places are metres north and east of its origin, yaws clockwise from north."""
 
@@ -173,14 +168,14 @@ class Autopilot:
     def speed(self) -> float:
         """Metres per second; 0 when it is not known any more."""
         told = self._heard.fresh("LOCAL_POSITION_NED")
-        return 0.0 if told is None else math.hypot(told.vx, told.vy)
+        return 0.0 if told is None else local_speed(told)
 
     def still(self) -> bool:
         """Whether it stands; not while it does not tell."""
         moved, turned = (self._heard.fresh(name) for name in POSE)
         if moved is None or turned is None:
             return False
-        return stands_still(speed=math.hypot(moved.vx, moved.vy), yaw_rate=turned.yawspeed)
+        return stands_still(speed=local_speed(moved), yaw_rate=turned.yawspeed)
 
     def battery(self) -> float | None:
         """0 to 1, as it last told, however old; `None` if it never did."""
@@ -239,11 +234,11 @@ class Autopilot:
 
     def aim(self, place: Point) -> None:
         """Drive to a place, in a straight line."""
-        self._setpoint(POSITION_ONLY, place, 0.0)
+        self.peer.send(aim_at(self.peer.who, place, **self._setpoint))
 
     def aim_yaw(self, yaw: float) -> None:
         """Turn where it stands."""
-        self._setpoint(YAW_ONLY, (0.0, 0.0), yaw)
+        self.peer.send(aim_yaw(self.peer.who, yaw, **self._setpoint))
 
     def order(self, command: int, *params: float, what: str) -> str:
         """Why an order was not obeyed; empty if it was."""
@@ -259,11 +254,11 @@ class Autopilot:
 
     def arm(self) -> str:
         """Why it cannot be armed; empty once it is."""
-        return self.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, what="arming")
+        return self.order(Command.COMPONENT_ARM_DISARM, 1.0, what="arming")
 
     def limit_speed(self, speed: float) -> str:
         """Why it does not keep to a speed (m/s); empty if it does."""
-        return self.order(dialect.MAV_CMD_DO_CHANGE_SPEED, 1.0, speed, -1.0, what=f"a speed of {speed:g} m/s")
+        return self.order(Command.DO_CHANGE_SPEED, 1.0, speed, -1.0, what=f"a speed of {speed:g} m/s")
 
     def guide(self) -> str:
         """Why it does not go into the mode in which we drive it; empty if it may (`is_guided`)."""
@@ -272,13 +267,13 @@ class Autopilot:
             self._guide_asked_s = time.monotonic()
         self.left = guided = self.modes.guided
         name = self.modes.name(guided)
-        return self.order(dialect.MAV_CMD_DO_SET_MODE, *guided.params, what=f"the mode {name}")
+        return self.order(Command.DO_SET_MODE, *guided.params, what=f"the mode {name}")
 
     def is_guided(self) -> bool:
         """Whether a heartbeat has shown it since `guide`; one from before a cut line shows nothing."""
         beat = self._heard.since("HEARTBEAT", self._guide_asked_s)
         if beat is None:
-            self._say(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT)
+            self.peer.request(MessageId.HEARTBEAT)
             return False
         return self.kind.mode_of(beat) == self.modes.guided
 
@@ -305,8 +300,8 @@ class Autopilot:
                 self.leave()
                 self._stop_owed.clear()
             elif mode in (self.modes.guided, self.modes.hold):
-                self._say(dialect.MAV_CMD_DO_SET_MODE, *self.modes.hold.params)
-        self._say(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT)
+                self.peer.send(command_long(self.peer.who, Command.DO_SET_MODE, *self.modes.hold.params))
+        self.peer.request(MessageId.HEARTBEAT)
 
     def _keep(self) -> None:
         """Until closed: ask for what should be told and is not, and order the stop that is owed."""
@@ -321,21 +316,12 @@ class Autopilot:
     def _ask_for_streams(self) -> None:
         for name, (number, hertz) in STREAMS.items():
             if self._heard.newest(name, 3.0 / hertz + 1.0) is None:
-                self._say(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / hertz)
+                self.peer.send(interval(self.peer.who, number, hertz))
         if self._heard.newest("GPS_GLOBAL_ORIGIN", ASK_ORIGIN_S) is None:
-            self._say(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
+            self.peer.request(MessageId.GPS_GLOBAL_ORIGIN)
 
-    def _say(self, command: int, *params: float) -> None:
-        """A command whose answer is what it leads to."""
-        who, filled = self.peer.who, (*params, *(0.0,) * 7)[:7]
-        self.peer.send(dialect.MAVLink_command_long_message(who.system, who.component, command, 0, *filled))
-
-    def _setpoint(self, mask: int, place: Point, yaw: float) -> None:
-        who, now_ms = self.peer.who, int(time.monotonic() * 1000) & 0xFFFFFFFF
+    @property
+    def _setpoint(self) -> dict[str, Any]:
+        """What every setpoint bears: the height it is at, and the time."""
         down = self._told("LOCAL_POSITION_NED").z
-        self.peer.send(
-            dialect.MAVLink_set_position_target_local_ned_message(
-                now_ms, who.system, who.component, dialect.MAV_FRAME_LOCAL_NED, mask,
-                *place, down, *(0.0,) * 6, yaw, 0.0,
-            )
-        )  # fmt: skip
+        return {"down": down, "now_ms": int(time.monotonic() * 1000)}

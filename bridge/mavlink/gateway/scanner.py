@@ -11,10 +11,14 @@ from typing import Literal
 
 from bridge.clock import Clock
 from bridge.mavlink.gateway.autopilot import Autopilot
-from bridge.mavlink.line.wire import Box, Message, dialect
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.messages import request
+from bridge.mavlink.line.wire import Box
 from mission.document import Mission, Scan
 from mission.errors import OutcomeUnknown, RobotUnreachable
 from mission.mavlink.captures import Picture, picture_of, result_of
+from mission.mavlink.enums import CommandResult, MessageId
+from mission.mavlink.items import Command
 from mission.mavlink.numbers import numbers_of
 from mission.mavlink.writing import SCAN_MESSAGE
 from mission.run.scans import ScanFailed, ScanResult
@@ -75,10 +79,10 @@ class MavlinkScanner:
 
     def _pictures_taken(self, box: Box) -> int | None:
         """The least number of the next picture, if the camera tells; all that was told so far is old."""
-        status = self._asked(dialect.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS)
+        status = self._asked(MessageId.CAMERA_CAPTURE_STATUS)
         if status is not None:
             return int(status.image_count)
-        last = self._asked(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
+        last = self._asked(MessageId.CAMERA_IMAGE_CAPTURED)
         self._forget(box)
         return None if last is None else int(last.image_index) + 1
 
@@ -91,13 +95,13 @@ class MavlinkScanner:
     def _order(self, label: str, scan: Scan, taken: int | None) -> Order:
         if self._trigger == "script":
             number = self._numbers.get(stop_of(label), 0)
-            return dialect.MAV_CMD_DO_SEND_SCRIPT_MESSAGE, (
+            return Command.DO_SEND_SCRIPT_MESSAGE, (
                 float(SCAN_MESSAGE), float(number), scan.duration_s, scan.timeout_s,
             )  # fmt: skip
         # All cameras, one picture. The interval means nothing for one, so it can carry how long a scan takes;
         # the number grows with every order, so that one which is repeated does not take two.
         self._last = max(self._last, taken or 0) + 1
-        return dialect.MAV_CMD_IMAGE_START_CAPTURE, (0.0, scan.duration_s, 1.0, float(self._last))
+        return Command.IMAGE_START_CAPTURE, (0.0, scan.duration_s, 1.0, float(self._last))
 
     def _ordered(self, order: Order, box: Box, until_s: float, interrupt: Event) -> str:
         """Why the vehicle does not scan; empty if it does, or may: then the result will tell.
@@ -110,7 +114,7 @@ class MavlinkScanner:
                 ack = self._autopilot.peer.command(command, *params, patience_s=ORDER_S)
             except OutcomeUnknown:
                 return ""
-            if ack.result != dialect.MAV_RESULT_TEMPORARILY_REJECTED:
+            if ack.result != CommandResult.TEMPORARILY_REJECTED:
                 return "" if ack.accepted else f"the vehicle answered the trigger with {ack.name}"
             if self._now_s() + BUSY_S > until_s:
                 return "the vehicle's scanner is busy"
@@ -143,17 +147,12 @@ class MavlinkScanner:
             self._told.add(picture_of(message))
 
     def _ask_for(self, index: int) -> None:
-        who, number = self._autopilot.peer.who, dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED
-        request = dialect.MAV_CMD_REQUEST_MESSAGE
-        self._autopilot.peer.send(
-            dialect.MAVLink_command_long_message(
-                who.system, who.component, request, 0, number, index, *(0.0,) * 5
-            )
-        )
+        peer = self._autopilot.peer
+        peer.send(request(peer.who, MessageId.CAMERA_IMAGE_CAPTURED, index))
 
     def _break_off(self) -> None:
         """Tell the vehicle to stop scanning; whether it does changes nothing here."""
-        self._autopilot.order(dialect.MAV_CMD_IMAGE_STOP_CAPTURE, what="the end of the scan")
+        self._autopilot.order(Command.IMAGE_STOP_CAPTURE, what="the end of the scan")
 
     def _now_s(self) -> float:
         return self._clock.now_ns() / 1e9

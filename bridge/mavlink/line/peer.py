@@ -14,13 +14,25 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.messages import (
+    command_int,
+    command_long,
+    enum_name,
+    is_signed,
+    message_name,
+    request,
+    set_origin,
+    station_beat,
+)
 from bridge.mavlink.line.round_trips import RoundTrips
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import SIGNATURE, Box, Message, Who, Wire, dialect, sender, wire
+from bridge.mavlink.line.wire import SIGNATURE, Box, Who, Wire, sender, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
-from mission.geodesy import to_steps
 from mission.mavlink.autopilots import autopilot_of
 from mission.mavlink.autopilots.kind import Autopilot
+from mission.mavlink.enums import CommandResult, Component, Firmware, MessageId, ModeFlag, VehicleType
+from mission.mavlink.items import Command, Frame
 from mission.mavlink.local_frame import VehicleOrigin
 from mission.mavlink.telemetry import began_again, origin_of
 
@@ -32,10 +44,9 @@ OTHERS_S = 1.3
 """Every vehicle beats once a second: so long one waits for a second one after the first."""
 KNOCK_S = 0.3
 """So often a vehicle that is not heard is asked for a heartbeat."""
-CLOCKS = (dialect.MAVLINK_MSG_ID_SYSTEM_TIME, dialect.MAVLINK_MSG_ID_ATTITUDE)
+CLOCKS = (MessageId.SYSTEM_TIME, MessageId.ATTITUDE)
 UNSET_ANSWERS = 8
 """So often a vehicle takes the question and sends nothing before that means there is nothing to send."""
-UNSAID: tuple[float, ...] = (0.0,) * 7
 
 
 @dataclass(frozen=True)
@@ -49,7 +60,7 @@ class Ack:
 
     @property
     def accepted(self) -> bool:
-        return self.result == dialect.MAV_RESULT_ACCEPTED
+        return self.result == CommandResult.ACCEPTED
 
     @property
     def name(self) -> str:
@@ -125,7 +136,7 @@ class Peer:
 
     @property
     def armed(self) -> bool:
-        return bool(self.heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+        return bool(self.heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
 
     @property
     def in_auto(self) -> bool:
@@ -174,12 +185,8 @@ class Peer:
         OutcomeUnknown
             If there is no answer.
         """
-        filled = (*params, *UNSAID)[:7]
-        target = (self.who.system, self.who.component)
         return self._commanded(
-            number,
-            lambda nth: dialect.MAVLink_command_long_message(*target, number, min(nth, 255), *filled),
-            patience_s,
+            number, lambda nth: command_long(self.who, number, *params, again=nth), patience_s
         )
 
     def command_int(
@@ -189,14 +196,11 @@ class Peer:
         x: int = 0,
         y: int = 0,
         z: float = 0.0,
-        frame: int = dialect.MAV_FRAME_GLOBAL,
+        frame: int = Frame.GLOBAL,
         patience_s: float | None = None,
     ) -> Ack:
         """A COMMAND_INT with up to four params and a place (1e-7 degrees); as `command`."""
-        filled = (*params, *UNSAID)[:4]
-        message = dialect.MAVLink_command_int_message(
-            self.who.system, self.who.component, frame, number, 0, 0, *filled, x, y, z
-        )
+        message = command_int(self.who, number, *params, x=x, y=y, z=z, frame=frame)
         return self._commanded(number, lambda _: message, patience_s)
 
     def order(self, number: int, *params: float, what: str = "", patience_s: float | None = None) -> Ack:
@@ -221,7 +225,7 @@ class Peer:
         RobotUnreachable
             If there is neither the message nor an answer.
         """
-        name = dialect.mavlink_map[number].msgname
+        name = message_name(number)
         taken = 0
         with self._ordering, self.box(name, "COMMAND_ACK") as box:
             for _ in self._tries(AGAIN_S, patience_s):
@@ -232,7 +236,7 @@ class Peer:
                 if reply.get_type() == name:
                     return reply
                 taken += 1
-                if reply.result != dialect.MAV_RESULT_ACCEPTED or taken >= UNSET_ANSWERS:
+                if reply.result != CommandResult.ACCEPTED or taken >= UNSET_ANSWERS:
                     return None
         if taken:
             return None
@@ -240,20 +244,16 @@ class Peer:
 
     def request(self, number: int) -> None:
         """Ask for the message of this number, and wait for nothing; `newest` has it if it comes."""
-        self.wire.send(self._request(number))
+        self.wire.send(request(self.who, number))
 
     def origin(self, *, patience_s: float | None = None) -> VehicleOrigin | None:
         """What its metres count from (GPS_GLOBAL_ORIGIN); `None` if it is not set, or not told."""
-        message = self.ask(dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, patience_s=patience_s)
+        message = self.ask(MessageId.GPS_GLOBAL_ORIGIN, patience_s=patience_s)
         return None if message is None else origin_of(message)
 
     def set_origin(self, origin: VehicleOrigin, *, patience_s: float | None = None) -> VehicleOrigin | None:
         """Tell it what its metres count from, and the origin it then has: the old one if it had one."""
-        message = dialect.MAVLink_set_gps_global_origin_message(
-            self.who.system,
-            *to_steps(origin.place),
-            round(origin.alt * 1000),
-        )
+        message = set_origin(self.who, origin)
         for _ in self._tries(0.0, patience_s):
             self.wire.send(message)
             held = self.origin(patience_s=patience_s)
@@ -271,7 +271,7 @@ class Peer:
             return f" (silent for {self.silent_s:.0f} s)"
         if self._newest.text_s > time.monotonic() - self.patience_s - OTHERS_S:
             return f' (it last said "{self._newest.text}")'
-        if self.heartbeat.get_header().incompat_flags & dialect.MAVLINK_IFLAG_SIGNED:
+        if is_signed(self.heartbeat):
             return " (it signs its messages, and may want ours signed: --signing-key FILE)"
         return " (its heartbeats come: does it want signed messages, or is the line one-way?)"
 
@@ -282,7 +282,7 @@ class Peer:
             for nth in count():
                 self.wire.send(message(nth))
                 while (ack := self._acked(box, number, min(AGAIN_S, until - time.monotonic()))) is not None:
-                    if ack.result != dialect.MAV_RESULT_IN_PROGRESS:
+                    if ack.result != CommandResult.IN_PROGRESS:
                         return ack
                     until = time.monotonic() + patience
                 if time.monotonic() >= until:
@@ -300,18 +300,13 @@ class Peer:
                 return Ack(message.command, message.result, message.result_param2)
         return None
 
-    def _request(self, number: int) -> Message:
-        return dialect.MAVLink_command_long_message(
-            self.who.system, self.who.component, dialect.MAV_CMD_REQUEST_MESSAGE, 0, number, 0, 0, 0, 0, 0, 0
-        )
-
     def _reply(self, box: Box, name: str, timeout_s: float) -> Message | None:
         """The message asked for, else the answer to the question, whichever says more."""
         until, answer = time.monotonic() + timeout_s, None
         while (message := box.get(until - time.monotonic())) is not None:
             if message.get_type() == name:
                 return message
-            if message.command == dialect.MAV_CMD_REQUEST_MESSAGE:
+            if message.command == Command.REQUEST_MESSAGE:
                 answer = message
                 until = min(until, time.monotonic() + AGAIN_S / 3)  # the message may follow its answer
         return answer
@@ -383,19 +378,6 @@ def found(
         yield Peer(wire, newest, autopilot_of(heartbeat.autopilot), timeout_s)
 
 
-def station_beat() -> Message:
-    """The heartbeat of a ground station."""
-    return dialect.MAVLink_heartbeat_message(
-        dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
-    )
-
-
-def enum_name(enum: str, number: int) -> str:
-    """As in "DENIED" for 2 of MAV_RESULT; the number itself if it has no name."""
-    entry = dialect.enums[enum].get(number)
-    return str(number) if entry is None else entry.name.removeprefix(f"{enum}_")
-
-
 def _heard(box: Box, vehicle: int | None, timeout_s: float, knock: Callable[[], None]) -> dict[int, Message]:
     """Heartbeats of autopilots by system id: of the one that is meant, or of all until no other can come."""
     heard: dict[int, Message] = {}
@@ -417,19 +399,14 @@ def _heard(box: Box, vehicle: int | None, timeout_s: float, knock: Callable[[], 
 def _knock(wire: Wire, vehicle: int | None, beat: Callable[[], Message]) -> None:
     """Show that we are here, and ask for a heartbeat: on a bad line one a second may be too few."""
     wire.send(beat())
-    wire.send(
-        dialect.MAVLink_command_long_message(
-            vehicle or 0, dialect.MAV_COMP_ID_AUTOPILOT1, dialect.MAV_CMD_REQUEST_MESSAGE, 0,
-            dialect.MAVLINK_MSG_ID_HEARTBEAT, 0, 0, 0, 0, 0, 0,
-        )
-    )  # fmt: skip
+    wire.send(request(Who(vehicle or 0, Component.AUTOPILOT1), MessageId.HEARTBEAT))
 
 
 def _of_autopilot(heartbeat: Message) -> bool:
     return (
-        heartbeat.get_srcComponent() == dialect.MAV_COMP_ID_AUTOPILOT1
-        and heartbeat.autopilot != dialect.MAV_AUTOPILOT_INVALID
-        and heartbeat.type != dialect.MAV_TYPE_GCS
+        heartbeat.get_srcComponent() == Component.AUTOPILOT1
+        and heartbeat.autopilot != Firmware.INVALID
+        and heartbeat.type != VehicleType.GCS
     )
 
 

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import hmac
-import os
 import queue
-import struct
 import threading
 import time
 from collections import Counter
@@ -18,18 +16,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
-
-os.environ.setdefault("MAVLINK20", "1")
-from pymavlink.dialects.v20 import ardupilotmega as dialect
+from typing import TypeVar
 
 from bridge.console import say
+from bridge.mavlink.line.frames import UNREADABLE, Frames, Message, dialect
 from bridge.mavlink.line.transport import Address, Transport, open_transport
 from bridge.mavlink.line.url import Url, check_guarded, read_url
 from mission.errors import InputError
-
-Message = Any
-"""A message of the dialect: `dialect.MAVLink_…_message`."""
+from mission.mavlink.enums import Component, MessageId
 
 BOX_SIZE = 10_000
 READ_S = 0.1
@@ -37,12 +31,11 @@ MAVLINK_EPOCH_S = 1_420_070_400
 """2015-01-01, from which signatures count in steps of 10 µs."""
 OLDEST_STEPS = 6_000_000
 """A sender heard for the first time may be a minute behind."""
-MAX_PARSERS = 64
 SIGNATURE = "wrong or no signature"
 """Reason by which `dropped` counts what was not signed with our key, or is a replay."""
 SLOW_BAUD = 57_600
 """At this rate eight mission items take 70 ms; telemetry radios are not faster."""
-UNSIGNED_ALLOWED = (dialect.MAVLINK_MSG_ID_RADIO_STATUS,)
+UNSIGNED_ALLOWED = (MessageId.RADIO_STATUS,)
 """Radios cannot sign."""
 LEAST_PASSPHRASE = 8
 KEY_FILE = f"64 hexadecimal digits, or a passphrase of {LEAST_PASSPHRASE} characters or more"
@@ -58,7 +51,7 @@ class Who:
     component: int
 
 
-GROUND_STATION = Who(254, dialect.MAV_COMP_ID_MISSIONPLANNER)
+GROUND_STATION = Who(254, Component.MISSIONPLANNER)
 """Not 255, which QGroundControl has: a vehicle must be able to tell two stations apart."""
 
 
@@ -118,7 +111,7 @@ class Wire:
         self._key, self._signs = signing_key, signs
         self._seen = SeenStreams()
         self._sending = self._mav()
-        self._parsers: dict[Address, Any] = {}
+        self._frames = Frames(self.dropped, self._mav)
         self._routes: dict[tuple[int, int], Address] = {}
         self._boxes: list[Box] = []
         self._lock = threading.Lock()
@@ -185,23 +178,11 @@ class Wire:
         try:
             while not self._closing.is_set():
                 for address, data in self._transport.read(READ_S):
-                    for message in self._messages(address, data):
+                    datagram = self._transport.datagrams
+                    for message in self._frames.messages(data, datagram=datagram, sender=address):
                         self._take(address, message)
         except Exception as error:  # noqa: BLE001 (the end of a thread)
             self._ended = f"reading ended: {error!r}; please report this"
-
-    def _messages(self, address: Address, data: bytes) -> Iterator[Message]:
-        parser = self._parsers.get(address)
-        if parser is None or (self._transport.datagrams and parser.buf_len() > 0):
-            # Half a frame in a datagram is never completed by the next one.
-            parser = self._parsers[address] = self._mav()
-            while len(self._parsers) > MAX_PARSERS:
-                del self._parsers[next(iter(self._parsers))]
-        try:
-            yield from parser.parse_buffer(data) or ()
-        except (dialect.MAVError, struct.error, UnicodeDecodeError, ValueError, TypeError, IndexError):
-            self.dropped["unreadable"] += 1
-            self._parsers[address] = self._mav()
 
     def _take(self, address: Address, message: Message) -> None:
         name = message.get_type()
@@ -235,7 +216,7 @@ class Wire:
 def _why_dropped(message: Message) -> str:
     if message.get_type() != "BAD_DATA":
         return "unknown"
-    return SIGNATURE if message.reason == "Invalid signature" else "unreadable"
+    return SIGNATURE if message.reason == "Invalid signature" else UNREADABLE
 
 
 class SeenStreams:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
-from bridge.mavlink.line.wire import Message
+from bridge.mavlink.line.frames import Message
 from bridge.mavlink.simulated.faults import Mishaps
+from bridge.mavlink.simulated.replies import picture
 from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.scanner import Captured, Scanner
 from bridge.mavlink.simulated.store import Store
@@ -79,10 +77,7 @@ class Camera:
 
     def _message(self, done: Captured, now_ns: int, boot_ms: int) -> Message:
         pose = self._rover.at(now_ns)[0]
-        lat, lon = self._rover.place((pose.x, pose.y))
-        half = math.pi / 4 - pose.heading / 2
-        facing = (math.cos(half), 0.0, 0.0, math.sin(half))
-        return dialect.MAVLink_camera_image_captured_message(
-            boot_ms, now_ns // 1000, 0, lat, lon, self._rover.alt_mm, 0, facing, done.index,
-            1 if done.file_url else 0, done.file_url.encode(),
+        return picture(
+            done.index, boot_ms=boot_ms, now_ns=now_ns, place=self._rover.place((pose.x, pose.y)),
+            alt_mm=self._rover.alt_mm, heading=pose.heading, file_url=done.file_url,
         )  # fmt: skip

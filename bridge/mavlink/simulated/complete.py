@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from bridge.clock import Clock
-from bridge.mavlink.line.wire import Message
+from bridge.mavlink.line.frames import Message
 from bridge.mavlink.simulated.orders import handlers
 from bridge.mavlink.simulated.telemetry import MAKERS
 from bridge.mavlink.simulated.vehicle import Setting, Vehicle

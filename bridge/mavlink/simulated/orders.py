@@ -6,26 +6,26 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
-from bridge.mavlink.line.wire import Message, Who
-from bridge.mavlink.simulated import telemetry
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.wire import Who
+from bridge.mavlink.simulated import replies, telemetry
 from bridge.mavlink.simulated.rover import FAR_M
 from bridge.mavlink.simulated.vehicle import Handlers, Vehicle
 from mission.document import SiteOrigin
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.autopilots.kind import Mode, ModeName
-from mission.mavlink.enums import ModeFlag
-from mission.mavlink.items import Command
+from mission.mavlink.enums import CommandResult, MessageId, ModeFlag
+from mission.mavlink.items import Command, Frame
 
-ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
-REJECTED, UNSUPPORTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED, dialect.MAV_RESULT_UNSUPPORTED
-FAILED = dialect.MAV_RESULT_FAILED
+ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
+REJECTED, UNSUPPORTED = CommandResult.TEMPORARILY_REJECTED, CommandResult.UNSUPPORTED
+FAILED = CommandResult.FAILED
 IGNORE_X_Y, IGNORE_YAW = 0b11, 1 << 10
-LOCAL_NED, LOCAL_OFFSET_NED = dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_FRAME_LOCAL_OFFSET_NED
+LOCAL_NED, LOCAL_OFFSET_NED = Frame.LOCAL_NED, Frame.LOCAL_OFFSET_NED
 NORTHMOST = 89.0
 """Degrees; at the poles there is no east."""
-CHANGE_MODE = dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+CHANGE_MODE = 1
+"""MAV_DO_REPOSITION_FLAGS."""
 
 
 @dataclass(frozen=True)
@@ -77,20 +77,16 @@ def _steps(degrees: float) -> int:
 
 def _answer(vehicle: Vehicle, who: Who, order: Order) -> None:
     """Obey and acknowledge; an order that makes the vehicle silent is acknowledged first."""
-    if order.command == dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN:
+    if order.command == Command.PREFLIGHT_REBOOT_SHUTDOWN:
         return _reboot(vehicle, who, order)
     obey = OBEYED.get(order.command)
     _acknowledge(vehicle, who, order.command, UNSUPPORTED if obey is None else obey(vehicle, order))
-    if order.command == dialect.MAV_CMD_REQUEST_MESSAGE:
+    if order.command == Command.REQUEST_MESSAGE:
         vehicle.requested(order.whole(0), order.whole(1))
 
 
 def _acknowledge(vehicle: Vehicle, who: Who, command: int, result: int) -> None:
-    vehicle.say(
-        dialect.MAVLink_command_ack_message(
-            command, result, target_system=who.system, target_component=who.component
-        )
-    )
+    vehicle.say(replies.command_ack(who, command, result))
 
 
 def _reboot(vehicle: Vehicle, who: Who, order: Order) -> None:
@@ -140,7 +136,7 @@ def _mode_of(vehicle: Vehicle, flags: int, custom: int) -> ModeName | None:
 def _set_mode_message(vehicle: Vehicle, who: Who, message: Message) -> None:
     result = _change_mode(vehicle, message.base_mode, message.custom_mode)
     if vehicle.autopilot.habits.acknowledges_set_mode:
-        _acknowledge(vehicle, who, dialect.MAVLINK_MSG_ID_SET_MODE, result)
+        _acknowledge(vehicle, who, MessageId.SET_MODE, result)
 
 
 def _set_current(vehicle: Vehicle, order: Order) -> int:
@@ -176,7 +172,7 @@ def _pause(vehicle: Vehicle, order: Order) -> int:
 def _reposition(vehicle: Vehicle, order: Order) -> int:
     """param1 is a speed (-1: as it is), param2 1 allows the change of mode, param4 is radians from north."""
     if not order.exact:
-        return int(dialect.MAV_RESULT_COMMAND_INT_ONLY)
+        return int(CommandResult.COMMAND_INT_ONLY)
     point, mode = vehicle.rover.point(order.x, order.y), vehicle.autopilot.driving.reposition_mode
     allowed = vehicle.mode == mode or order.whole(1, 0) & CHANGE_MODE
     if point is None or not vehicle.armed or not allowed:
@@ -211,7 +207,7 @@ def _tell_interval(vehicle: Vehicle, order: Order) -> int:
     number = order.whole(0)
     if not 0 <= number < 2**16:
         return int(DENIED)
-    vehicle.say(dialect.MAVLink_message_interval_message(number, vehicle.streams.interval_us(number)))
+    vehicle.say(replies.message_interval(number, vehicle.streams.interval_us(number)))
     return int(ACCEPTED)
 
 
@@ -221,12 +217,12 @@ def _request(vehicle: Vehicle, order: Order) -> int:
 
 
 def _tell_version(vehicle: Vehicle, order: Order) -> int:
-    vehicle.tell(dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+    vehicle.tell(MessageId.AUTOPILOT_VERSION)
     return int(ACCEPTED)
 
 
 def _tell_home(vehicle: Vehicle, order: Order) -> int:
-    return int(ACCEPTED) if vehicle.tell(dialect.MAVLINK_MSG_ID_HOME_POSITION) else _no(vehicle)
+    return int(ACCEPTED) if vehicle.tell(MessageId.HOME_POSITION) else _no(vehicle)
 
 
 def _capture(vehicle: Vehicle, order: Order) -> int:
@@ -256,20 +252,20 @@ def _scan(vehicle: Vehicle, order: Order, number: int, seconds: float) -> int:
 
 
 OBEYED: dict[int, Callable[[Vehicle, Order], int]] = {
-    dialect.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
-    dialect.MAV_CMD_DO_SET_MODE: _set_mode,
+    Command.COMPONENT_ARM_DISARM: _arm,
+    Command.DO_SET_MODE: _set_mode,
     Command.DO_SET_MISSION_CURRENT: _set_current,
-    dialect.MAV_CMD_MISSION_START: _start,
-    dialect.MAV_CMD_DO_PAUSE_CONTINUE: _pause,
-    dialect.MAV_CMD_DO_REPOSITION: _reposition,
+    Command.MISSION_START: _start,
+    Command.DO_PAUSE_CONTINUE: _pause,
+    Command.DO_REPOSITION: _reposition,
     Command.DO_CHANGE_SPEED: _change_speed,
-    dialect.MAV_CMD_SET_MESSAGE_INTERVAL: _interval,
-    dialect.MAV_CMD_GET_MESSAGE_INTERVAL: _tell_interval,
-    dialect.MAV_CMD_REQUEST_MESSAGE: _request,
-    dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _tell_version,
-    dialect.MAV_CMD_GET_HOME_POSITION: _tell_home,
+    Command.SET_MESSAGE_INTERVAL: _interval,
+    Command.GET_MESSAGE_INTERVAL: _tell_interval,
+    Command.REQUEST_MESSAGE: _request,
+    Command.REQUEST_AUTOPILOT_CAPABILITIES: _tell_version,
+    Command.GET_HOME_POSITION: _tell_home,
     Command.IMAGE_START_CAPTURE: _capture,
-    dialect.MAV_CMD_IMAGE_STOP_CAPTURE: _stop_capture,
+    Command.IMAGE_STOP_CAPTURE: _stop_capture,
     Command.DO_SEND_SCRIPT_MESSAGE: _script_message,
 }
 """Each gives the MAV_RESULT with which it is acknowledged."""

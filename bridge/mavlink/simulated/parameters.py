@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
-from bridge.mavlink.line.wire import Message, Who
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.wire import Who
+from bridge.mavlink.simulated import replies
 from bridge.mavlink.simulated.scanner import DEFAULT_S, LONGEST_S
 from mission.mavlink.autopilots.kind import Habits
 
 SCAN_TIME = "SIM_SCAN_TIME"
 """Seconds that a scan takes if its trigger does not say."""
-REAL32 = dialect.MAV_PARAM_TYPE_REAL32
 
 
 class Parameters:
@@ -61,7 +60,7 @@ class Parameters:
     def _value(self, name: str) -> Message:
         index = list(self._values).index(name)
         value, count = self._values[name], len(self._values)
-        return dialect.MAVLink_param_value_message(name.encode(), value, REAL32, count, index)
+        return replies.parameter(name, value, index=index, count=count)
 
 
 def _name(raw: str | bytes) -> str:

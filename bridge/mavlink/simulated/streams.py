@@ -5,24 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
 from bridge.clock import Clock
+from mission.mavlink.enums import MessageId
 
 LOWEST_INTERVAL_US, HIGHEST_INTERVAL_US = 10_000, 2**31 - 1
 DEFAULT_US: dict[int, int] = {
-    dialect.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
-    dialect.MAVLINK_MSG_ID_SYS_STATUS: 1_000_000,
-    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: 1_000_000,
-    dialect.MAVLINK_MSG_ID_ATTITUDE: 250_000,
-    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 250_000,
-    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 250_000,
-    dialect.MAVLINK_MSG_ID_MISSION_CURRENT: 1_000_000,
-    dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: 1_000_000,
-    dialect.MAVLINK_MSG_ID_VFR_HUD: 1_000_000,
-    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 2_000_000,
-    dialect.MAVLINK_MSG_ID_HOME_POSITION: 2_000_000,
-    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1_000_000,
+    MessageId.HEARTBEAT: 1_000_000,
+    MessageId.SYS_STATUS: 1_000_000,
+    MessageId.GPS_RAW_INT: 1_000_000,
+    MessageId.ATTITUDE: 250_000,
+    MessageId.LOCAL_POSITION_NED: 250_000,
+    MessageId.GLOBAL_POSITION_INT: 250_000,
+    MessageId.MISSION_CURRENT: 1_000_000,
+    MessageId.GPS_GLOBAL_ORIGIN: 1_000_000,
+    MessageId.VFR_HUD: 1_000_000,
+    MessageId.BATTERY_STATUS: 2_000_000,
+    MessageId.HOME_POSITION: 2_000_000,
+    MessageId.EXTENDED_SYS_STATE: 1_000_000,
 }
 """How often each is sent unless a station asks otherwise; the others only when something happens."""
 

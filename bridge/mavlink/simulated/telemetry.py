@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
-from bridge.mavlink.line.wire import Message
+from bridge.mavlink.line.frames import Message, dialect
 from bridge.mavlink.simulated.rover import bearing
 from bridge.mavlink.simulated.vehicle import BATTERY_NS, Maker, Vehicle
-from mission.mavlink.enums import ModeFlag
+from mission.mavlink.enums import MessageId, MissionState, ModeFlag, VehicleType
 
 CAPABILITIES = (
     dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
@@ -28,7 +26,7 @@ def heartbeat(vehicle: Vehicle) -> Message:
     modes = vehicle.autopilot.modes
     flags = modes.flags[vehicle.mode] | (ModeFlag.SAFETY_ARMED if vehicle.armed else 0)
     status = dialect.MAV_STATE_ACTIVE if vehicle.armed else dialect.MAV_STATE_STANDBY
-    rover = dialect.MAV_TYPE_GROUND_ROVER
+    rover = VehicleType.GROUND_ROVER
     return dialect.MAVLink_heartbeat_message(
         rover, vehicle.autopilot.firmware, flags, modes.custom(modes.numbers[vehicle.mode]), status, 3
     )
@@ -129,13 +127,13 @@ def mission_current(vehicle: Vehicle) -> Message:
 def mission_state(vehicle: Vehicle) -> int:
     course = vehicle.course
     if course.total == 0:
-        return int(dialect.MISSION_STATE_NO_MISSION)
+        return int(MissionState.NO_MISSION)
     if course.state == "active":
-        return int(dialect.MISSION_STATE_ACTIVE)
+        return int(MissionState.ACTIVE)
     if course.state == "complete":
-        return int(dialect.MISSION_STATE_COMPLETE)
+        return int(MissionState.COMPLETE)
     paused = vehicle.autopilot.habits.pauses and course.current > 0
-    return int(dialect.MISSION_STATE_PAUSED if paused else dialect.MISSION_STATE_NOT_STARTED)
+    return int(MissionState.PAUSED if paused else MissionState.NOT_STARTED)
 
 
 def item_reached(vehicle: Vehicle) -> Message | None:
@@ -161,22 +159,22 @@ def autopilot_version(vehicle: Vehicle) -> Message:
 
 
 MAKERS: dict[int, Maker] = {
-    dialect.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
-    dialect.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
-    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: gps_raw,
-    dialect.MAVLINK_MSG_ID_ATTITUDE: attitude,
-    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: local_position,
-    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: global_position,
-    dialect.MAVLINK_MSG_ID_MISSION_CURRENT: mission_current,
-    dialect.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: item_reached,
-    dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: origin,
-    dialect.MAVLINK_MSG_ID_VFR_HUD: vfr_hud,
-    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
-    dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
-    dialect.MAVLINK_MSG_ID_HOME_POSITION: home,
-    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_state,
-    dialect.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS: capture_status,
-    dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED: image_captured,
+    MessageId.HEARTBEAT: heartbeat,
+    MessageId.SYS_STATUS: sys_status,
+    MessageId.GPS_RAW_INT: gps_raw,
+    MessageId.ATTITUDE: attitude,
+    MessageId.LOCAL_POSITION_NED: local_position,
+    MessageId.GLOBAL_POSITION_INT: global_position,
+    MessageId.MISSION_CURRENT: mission_current,
+    MessageId.MISSION_ITEM_REACHED: item_reached,
+    MessageId.GPS_GLOBAL_ORIGIN: origin,
+    MessageId.VFR_HUD: vfr_hud,
+    MessageId.BATTERY_STATUS: battery_status,
+    MessageId.AUTOPILOT_VERSION: autopilot_version,
+    MessageId.HOME_POSITION: home,
+    MessageId.EXTENDED_SYS_STATE: extended_state,
+    MessageId.CAMERA_CAPTURE_STATUS: capture_status,
+    MessageId.CAMERA_IMAGE_CAPTURED: image_captured,
 }
 
 

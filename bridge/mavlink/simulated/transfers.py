@@ -6,15 +6,23 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import msgspec
-from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.clock import Clock
-from bridge.mavlink.line.wire import Message, Who
-from bridge.mavlink.simulated.carried import float_message, int_message, item_of
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.wire import Who
 from bridge.mavlink.simulated.faults import Mishaps
+from bridge.mavlink.simulated.replies import (
+    item_float,
+    item_int,
+    item_wanted,
+    mission_ack,
+    mission_count,
+    received_item,
+)
 from bridge.mavlink.simulated.store import ALL, FENCE, MISSION, RALLY, Items, Store
 from bridge.mavlink.simulated.validate import ACCEPTED, verdict
 from mission.mavlink.autopilots.kind import Autopilot
+from mission.mavlink.enums import MissionResult
 from mission.mavlink.items import Item
 
 KINDS = (MISSION, FENCE, RALLY)
@@ -104,7 +112,7 @@ class Transfers:
         if up and now - up.heard_ns > habits.give_up_s * 1e9:
             self._upload = None
             if habits.tells_giving_up:
-                self._ack(up.station, dialect.MAV_MISSION_OPERATION_CANCELLED, up.kind)
+                self._ack(up.station, MissionResult.OPERATION_CANCELLED, up.kind)
         elif up and now - up.asked_ns >= habits.ask_again_s * 1e9:
             self._ask(up)
         if down and now - down.heard_ns > habits.give_up_s * 1e9:
@@ -122,15 +130,15 @@ class Transfers:
     def _count(self, who: Who, message: Message) -> None:
         up, habits, kind = self._upload, self._habits, message.mission_type
         if kind not in KINDS:
-            return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
+            return self._ack(who, MissionResult.UNSUPPORTED, kind)
         if up and up.station != who:
             return self._ack(who, habits.other_station, kind)
         if up and up.items and not habits.begins_again:
-            return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
+            return self._ack(who, MissionResult.ERROR, kind)
         if self._download and self._one_by_one:
-            return self._ack(who, dialect.MAV_MISSION_ERROR, kind)  # source: busy, until it is acknowledged
+            return self._ack(who, MissionResult.ERROR, kind)  # source: busy, until it is acknowledged
         if message.count > self._autopilot.max_items:
-            return self._ack(who, dialect.MAV_MISSION_NO_SPACE, kind)
+            return self._ack(who, MissionResult.NO_SPACE, kind)
         self._begin(who, kind, message.count)
 
     def _begin(self, who: Who, kind: int, count: int) -> None:
@@ -152,10 +160,10 @@ class Transfers:
         if up is None:
             return self._no_upload(who, message)
         if message.mission_type != up.kind:
-            return self._ack(who, dialect.MAV_MISSION_ERROR, message.mission_type)
+            return self._ack(who, MissionResult.ERROR, message.mission_type)
         if message.seq != len(up.items):
             return self._stray(up)
-        item = item_of(message)
+        item = received_item(message)
         result = self._verdict(up, item)
         if result != ACCEPTED:
             self._upload = None
@@ -167,7 +175,7 @@ class Transfers:
         number = len(up.items)
         fault = self._mishaps.once("nack", number)
         if fault:
-            return int(fault.amount) or int(dialect.MAV_MISSION_ERROR)
+            return int(fault.amount) or int(MissionResult.ERROR)
         return verdict(self._autopilot, up.kind, item)
 
     def _take(self, up: Upload, item: Item, *, marked: bool) -> None:
@@ -191,7 +199,7 @@ class Transfers:
         if self._habits.strays != "tell":
             up.heard_ns = self._clock.now_ns()
         if self._habits.strays == "tell":
-            self._ack(up.station, dialect.MAV_MISSION_INVALID_SEQUENCE, up.kind)
+            self._ack(up.station, MissionResult.INVALID_SEQUENCE, up.kind)
         elif self._habits.strays == "ask":
             self._ask(up)
 
@@ -202,12 +210,12 @@ class Transfers:
             return self._ack(who, self._habits.last_again, kind)
         late = done is not None and (who, kind) == done[:2] and message.seq < done[2]
         if not (late and self._habits.forgives_late):
-            self._ack(who, dialect.MAV_MISSION_ERROR, kind)
+            self._ack(who, MissionResult.ERROR, kind)
 
     def _request_list(self, who: Who, message: Message) -> None:
         kind = message.mission_type
         if kind not in KINDS:
-            return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
+            return self._ack(who, MissionResult.UNSUPPORTED, kind)
         if self._upload:
             return self._busy(who, kind)
         if self._one_by_one:
@@ -219,7 +227,7 @@ class Transfers:
     def _request(self, who: Who, message: Message) -> None:
         kind, number = message.mission_type, message.seq
         if kind not in KINDS:
-            return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
+            return self._ack(who, MissionResult.UNSUPPORTED, kind)
         if self._upload:
             return self._busy(who, kind)
         if self._one_by_one and not self._in_order(who, kind, number):
@@ -229,11 +237,11 @@ class Transfers:
             items = (self._home(),)  # source: home can always be read
         if number < len(items):
             whole = message.get_type() == "MISSION_REQUEST_INT"
-            return self._say((int_message if whole else float_message)(who, kind, number, items[number]))
+            return self._say((item_int if whole else item_float)(who, kind, number, items[number]))
         if self._habits.counts_again:
             self._say_count(who, kind)
-            return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
-        self._ack(who, dialect.MAV_MISSION_INVALID_SEQUENCE, kind)
+            return self._ack(who, MissionResult.ERROR, kind)
+        self._ack(who, MissionResult.INVALID_SEQUENCE, kind)
 
     def _in_order(self, who: Who, kind: int, number: int) -> bool:
         """Whether the item is given: the next one, or the last one again; anything else ends it (source)."""
@@ -242,7 +250,7 @@ class Transfers:
             return False
         if number not in (down.next, down.next - 1):
             self._download = None
-            self._ack(who, dialect.MAV_MISSION_ERROR, kind)
+            self._ack(who, MissionResult.ERROR, kind)
             return False
         down.heard_ns, down.next = self._clock.now_ns(), number + 1
         return True
@@ -250,12 +258,12 @@ class Transfers:
     def _clear_all(self, who: Who, message: Message) -> None:
         kind = message.mission_type
         if kind not in (*KINDS, ALL):
-            return self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, kind)
+            return self._ack(who, MissionResult.UNSUPPORTED, kind)
         if (self._upload or self._download) and self._one_by_one:
             return self._busy(who, kind)
         drives = kind in (MISSION, ALL) and self._running()
         if self._upload or (drives and not self._habits.clears_in_auto):
-            return self._ack(who, dialect.MAV_MISSION_ERROR, kind)
+            return self._ack(who, MissionResult.ERROR, kind)
         for one in KINDS if kind == ALL else (kind,):
             self._replace(one, (), None)
         self._ack(who, ACCEPTED, kind)
@@ -264,7 +272,7 @@ class Transfers:
         up, down = self._upload, self._download
         if down and (down.station, down.kind) == (who, message.mission_type):
             self._download = None
-        ends = message.type == dialect.MAV_MISSION_OPERATION_CANCELLED and self._habits.cancels
+        ends = message.type == MissionResult.OPERATION_CANCELLED and self._habits.cancels
         if up and ends and (up.station, up.kind) == (who, message.mission_type):
             self._upload = None
 
@@ -276,7 +284,7 @@ class Transfers:
             self._ack(who, self._habits.other_station, kind)
 
     def _partial(self, who: Who, message: Message) -> None:
-        self._ack(who, dialect.MAV_MISSION_UNSUPPORTED, message.mission_type)
+        self._ack(who, MissionResult.UNSUPPORTED, message.mission_type)
 
     # What is said
 
@@ -289,19 +297,14 @@ class Transfers:
 
     def _ask(self, up: Upload) -> None:
         up.asked_ns = self._clock.now_ns()
-        asking = (
-            dialect.MAVLink_mission_request_int_message
-            if self._habits.asks_int
-            else dialect.MAVLink_mission_request_message
-        )
-        self._say(asking(up.station.system, up.station.component, len(up.items), up.kind))
+        self._say(item_wanted(up.station, up.kind, len(up.items), as_int=self._habits.asks_int))
 
     def _ack(self, who: Who, result: int, kind: int) -> None:
-        self._say(dialect.MAVLink_mission_ack_message(who.system, who.component, result, kind))
+        self._say(mission_ack(who, kind, result))
 
     def _say_count(self, who: Who, kind: int) -> None:
         count = len(self.items(kind))
-        self._say(dialect.MAVLink_mission_count_message(who.system, who.component, count, kind))
+        self._say(mission_count(who, kind, count))
 
 
 def _same(one: Items, other: Items) -> bool:

@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
 from bridge.clock import Clock
-from bridge.mavlink.line.wire import Message, Who, sender
-from bridge.mavlink.simulated import parameters
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.wire import Who, sender
+from bridge.mavlink.simulated import parameters, replies
 from bridge.mavlink.simulated.camera import Camera
 from bridge.mavlink.simulated.course import Course, Tells
 from bridge.mavlink.simulated.faults import NO_FAULTS, Mishaps, VehicleFaults
@@ -23,6 +22,7 @@ from bridge.mavlink.simulated.transfers import Transfers
 from mission.document import SiteOrigin
 from mission.events import Pose
 from mission.mavlink.autopilots.kind import Autopilot, ModeName
+from mission.mavlink.enums import MessageId
 from mission.mavlink.items import Command, Frame, Item
 from mission.mavlink.read_back import home_item
 
@@ -160,7 +160,7 @@ class Vehicle:
         return made is not None
 
     def text(self, text: str) -> None:
-        self.say(dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_NOTICE, text.encode()[:50]))
+        self.say(replies.text(text))
 
     def motion(self) -> tuple[Pose, float]:
         return self.rover.at(self.now_ns)
@@ -196,14 +196,14 @@ class Vehicle:
         self.rover.brake(self.now_ns)
         if mode == "auto" and self.armed:
             self.course.go_on(self.now_ns)
-        self.tell(dialect.MAVLINK_MSG_ID_HEARTBEAT)
+        self.tell(MessageId.HEARTBEAT)
         return True
 
     def arm(self) -> None:
         was, self.armed = self.armed, True
         if self.mode == "auto" and not was:
             self.course.go_on(self.now_ns)
-        self.tell(dialect.MAVLINK_MSG_ID_HEARTBEAT)
+        self.tell(MessageId.HEARTBEAT)
 
     def disarm(self) -> None:
         """Stand still; the mission begins anew next time."""
@@ -212,21 +212,21 @@ class Vehicle:
         self.course.stand(self.now_ns)
         self.rover.brake(self.now_ns)
         self.course.reset()
-        self.tell(dialect.MAVLINK_MSG_ID_HEARTBEAT)
+        self.tell(MessageId.HEARTBEAT)
 
     def set_origin(self, origin: SiteOrigin) -> None:
         """Take a global origin; ArduPilot takes one per boot, and says nothing about others."""
         if self.rover.origin is not None and not self.autopilot.habits.origin_again:
             return
         self.rover.origin = origin
-        self.tell(dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
-        self.tell(dialect.MAVLINK_MSG_ID_HOME_POSITION)
+        self.tell(MessageId.GPS_GLOBAL_ORIGIN)
+        self.tell(MessageId.HOME_POSITION)
         if self.course.state == "active":
             self.course.jump(self.course.current, self.now_ns)
 
     def requested(self, number: int, index: int) -> None:
         """Send a message that was asked for, if there is something to tell; an older scan's by its number."""
-        if number == dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED and index > 0 and index in self.camera.told:
+        if number == MessageId.CAMERA_IMAGE_CAPTURED and index > 0 and index in self.camera.told:
             self.say(self.camera.told[index])
         elif number in self._makers:
             self.tell(number)
@@ -268,11 +268,11 @@ class Vehicle:
         return self._wall.now_ns() < self._quiet_until_ns
 
     def _went_on(self, number: int) -> None:
-        self.tell(dialect.MAVLINK_MSG_ID_MISSION_CURRENT)
+        self.tell(MessageId.MISSION_CURRENT)
 
     def _reach(self, number: int) -> None:
         self.reached = number
-        self.tell(dialect.MAVLINK_MSG_ID_MISSION_ITEM_REACHED)
+        self.tell(MessageId.MISSION_ITEM_REACHED)
 
     def _triggered(self, number: int, seconds: float, now_ns: int) -> None:
         self.now_ns = max(self.now_ns, now_ns)
@@ -281,10 +281,10 @@ class Vehicle:
 
     def _finish(self, now_ns: int) -> None:
         self.text("Mission Complete")
-        self.tell(dialect.MAVLINK_MSG_ID_MISSION_CURRENT)
+        self.tell(MessageId.MISSION_CURRENT)
         if self.autopilot.habits.done_mode != self.mode:
             self.mode = self.autopilot.habits.done_mode
-            self.tell(dialect.MAVLINK_MSG_ID_HEARTBEAT)
+            self.tell(MessageId.HEARTBEAT)
 
     def _scanned(self) -> None:
         message, why = self.camera.end(self.now_ns, self.boot_ms)
@@ -299,7 +299,7 @@ class Vehicle:
     def _stored(self, kind: int, marked: int | None) -> None:
         if kind == MISSION:
             self.course.replaced(marked, self.now_ns)
-            self.tell(dialect.MAVLINK_MSG_ID_MISSION_CURRENT)
+            self.tell(MessageId.MISSION_CURRENT)
 
     def _item_came(self, number: int) -> bool:
         """Whether an upload's item gets through what the faults have in store for it."""

@@ -8,9 +8,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.wire import Message, dialect
-from bridge.mavlink.transfer.messages import (
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.messages import (
     ack_message,
     item_of,
     item_request,
@@ -18,8 +17,10 @@ from bridge.mavlink.transfer.messages import (
     of_mission,
     result_name,
 )
+from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.transfer.pace import Pace, Silence, window_for
 from mission.errors import AnswerIsNo, RobotUnreachable
+from mission.mavlink.enums import MissionResult
 from mission.mavlink.items import Item
 
 Progress = Callable[[int, int], None]
@@ -81,7 +82,7 @@ class _Reading:
         self._refused = False
         """Whether something was refused since the last try, or, if items may be wanted in order, item."""
         self._refusals = 0
-        self._result = dialect.MAV_MISSION_ACCEPTED
+        self._result = MissionResult.ACCEPTED
 
     def run(self) -> int | None:
         """Read everything; what the vehicle refuses with, or `None`."""
@@ -98,7 +99,7 @@ class _Reading:
                 if self._refusals >= REFUSALS or self._stuck:
                     return self._result
         for _ in range(LAST_WORDS):
-            self._peer.send(ack_message(dialect.MAV_MISSION_ACCEPTED, self._peer.who))
+            self._peer.send(ack_message(MissionResult.ACCEPTED, self._peer.who))
         return None
 
     @property
@@ -116,7 +117,7 @@ class _Reading:
         name = message.get_type()
         if name == "MISSION_ACK":
             self._silence.heard(went_on=False)
-            if message.type != dialect.MAV_MISSION_ACCEPTED:
+            if message.type != MissionResult.ACCEPTED:
                 self._refused, self._result = True, message.type
             return
         self._refused, self._refusals = False, 0

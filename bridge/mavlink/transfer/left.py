@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from bridge.mavlink.line.messages import ack_message, clear_all
 from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.messages import MISSION, ack_message
 from bridge.mavlink.transfer.pace import window_for
 from bridge.mavlink.transfer.sending import send_items
 from mission.errors import AnswerIsNo, RobotUnreachable
+from mission.mavlink.enums import MissionResult
 from mission.mavlink.items import Item
 
 CANCELS = 3
@@ -78,7 +78,7 @@ def own_items(peer: Peer, read: Sequence[Item]) -> tuple[Item, ...]:
 def cancel(peer: Peer) -> None:
     """Tell the vehicle that the transfer ends here."""
     for _ in range(CANCELS):
-        peer.send(ack_message(dialect.MAV_MISSION_OPERATION_CANCELLED, peer.who))
+        peer.send(ack_message(MissionResult.OPERATION_CANCELLED, peer.who))
 
 
 def emptied(peer: Peer) -> bool:
@@ -89,7 +89,7 @@ def emptied(peer: Peer) -> bool:
     if _holds(peer, ()):
         return True
     with peer.box("MISSION_ACK") as box:
-        peer.send(dialect.MAVLink_mission_clear_all_message(peer.who.system, peer.who.component, MISSION))
+        peer.send(clear_all(peer.who))
         box.get(CLEARED_S)
     return _holds(peer, ())
 

@@ -12,17 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.messages import ack_message, count_message, item_message, list_request, of_mission
 from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.wire import Message, dialect
 from bridge.mavlink.transfer.download import Progress
-from bridge.mavlink.transfer.messages import (
-    ack_message,
-    count_message,
-    item_message,
-    list_request,
-    of_mission,
-)
 from bridge.mavlink.transfer.pace import Pace, Silence
+from mission.mavlink.enums import MissionResult
 from mission.mavlink.items import Item
 
 How = Literal["accepted", "unsure", "refused", "busy", "dropped", "silent", "rebooted"]
@@ -39,10 +34,8 @@ PROBE_AFTER = 4
 """After so long, or sending so often, without an answer to the last item, ask for what the vehicle holds."""
 TIME_EACH = 5
 """After so many windows without an answer the vehicle's clock is asked for again."""
-HINTS = frozenset({dialect.MAV_MISSION_INVALID_SEQUENCE})
-ENDINGS = frozenset(
-    {dialect.MAV_MISSION_ERROR, dialect.MAV_MISSION_DENIED, dialect.MAV_MISSION_OPERATION_CANCELLED}
-)
+HINTS = frozenset({MissionResult.INVALID_SEQUENCE})
+ENDINGS = frozenset({MissionResult.ERROR, MissionResult.DENIED, MissionResult.OPERATION_CANCELLED})
 """These say that there is no transfer, not that an item is wrong."""
 HEARD = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", "MISSION_COUNT")
 
@@ -52,7 +45,7 @@ class Ended:
     how: How
     at: int
     """How many items are known to have arrived; where one was refused, its number."""
-    result: int = dialect.MAV_MISSION_ACCEPTED
+    result: int = MissionResult.ACCEPTED
     """MAV_MISSION_RESULT that ended it."""
 
 
@@ -94,7 +87,7 @@ class _Sending:
         self._error = False
         """Whether the vehicle has said that no transfer is under way, since it asked for an item."""
         self._errors = 0
-        self._result = dialect.MAV_MISSION_ACCEPTED
+        self._result: int = MissionResult.ACCEPTED
         self._unanswered = 0
         """How often in a row the window was sent without an answer."""
         self._probed = False
@@ -179,7 +172,7 @@ class _Sending:
 
     def _take_ack(self, result: int) -> Ended | None:
         self._silence.heard(went_on=False)
-        if result == dialect.MAV_MISSION_ACCEPTED:
+        if result == MissionResult.ACCEPTED:
             return Ended("accepted", len(self._items)) if self._all_sent else None
         if result in HINTS:
             if self._begun:
@@ -192,7 +185,7 @@ class _Sending:
     def _take_ending(self, result: int) -> Ended | None:
         """The vehicle says that no transfer is under way: it is over, or it never began."""
         self._error, self._result = True, result
-        if self._all_sent and result != dialect.MAV_MISSION_DENIED:
+        if self._all_sent and result != MissionResult.DENIED:
             return Ended("unsure", self._base, result)
         return None
 
@@ -204,7 +197,7 @@ class _Sending:
         if not self._begun:
             self._error = False
             if self._silence.seconds > PROBE_S:  # the last word of a download may have been lost
-                self._peer.send(ack_message(dialect.MAV_MISSION_ACCEPTED, self._peer.who))
+                self._peer.send(ack_message(MissionResult.ACCEPTED, self._peer.who))
             self._send_count()
             return
         self._unanswered += 1

@@ -11,15 +11,15 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from bridge.mavlink.line.messages import result_name
 from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.transfer.download import Progress, download
 from bridge.mavlink.transfer.left import cancel, emptied, left_on, own_items, unknown
-from bridge.mavlink.transfer.messages import result_name
 from bridge.mavlink.transfer.pace import window_for
 from bridge.mavlink.transfer.sending import Ended, send_items
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots import autopilot_named
+from mission.mavlink.enums import MissionResult
 from mission.mavlink.items import Item, ItemList
 from mission.mavlink.read_back import differences, upload_of
 
@@ -164,7 +164,7 @@ def _attempted(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None
             if seen is None or seen == failure:  # twice the same is no accident of the line
                 return seen
             failure = seen
-        elif ended.how == "refused" and (window == 1 or ended.result == dialect.MAV_MISSION_NO_SPACE):
+        elif ended.how == "refused" and (window == 1 or ended.result == MissionResult.NO_SPACE):
             return Failure(_refusal(sent, ended))
         elif ended.how in ("busy", "silent", "rebooted"):
             return _given_up(peer, ended, len(items))
@@ -191,7 +191,7 @@ def _read_back(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None
 def _refusal(sent: ItemList, ended: Ended) -> str:
     """Which item was refused, by what it is for, and which of its fields."""
     name = result_name(ended.result)
-    if ended.result == dialect.MAV_MISSION_NO_SPACE:
+    if ended.result == MissionResult.NO_SPACE:
         return f"it refused {len(upload_of(sent))} items ({name}): plan fewer stops at once"
     index = autopilot_named(sent.autopilot).index(ended.at)
     if not 0 <= index < len(sent.placed):
@@ -205,15 +205,15 @@ def _refusal(sent: ItemList, ended: Ended) -> str:
 def _field(item: Item, result: int) -> str:
     """The field that a refusal is about, with its value; empty if it names none."""
     values: dict[int, tuple[str, float]] = {
-        dialect.MAV_MISSION_UNSUPPORTED: ("command", item.command),
-        dialect.MAV_MISSION_UNSUPPORTED_FRAME: ("frame", item.frame),
-        dialect.MAV_MISSION_INVALID_PARAM1: ("param1", item.params[0]),
-        dialect.MAV_MISSION_INVALID_PARAM2: ("param2", item.params[1]),
-        dialect.MAV_MISSION_INVALID_PARAM3: ("param3", item.params[2]),
-        dialect.MAV_MISSION_INVALID_PARAM4: ("param4", item.params[3]),
-        dialect.MAV_MISSION_INVALID_PARAM5_X: ("x (latitude)", item.x),
-        dialect.MAV_MISSION_INVALID_PARAM6_Y: ("y (longitude)", item.y),
-        dialect.MAV_MISSION_INVALID_PARAM7: ("z", item.z),
+        MissionResult.UNSUPPORTED: ("command", item.command),
+        MissionResult.UNSUPPORTED_FRAME: ("frame", item.frame),
+        MissionResult.INVALID_PARAM1: ("param1", item.params[0]),
+        MissionResult.INVALID_PARAM2: ("param2", item.params[1]),
+        MissionResult.INVALID_PARAM3: ("param3", item.params[2]),
+        MissionResult.INVALID_PARAM4: ("param4", item.params[3]),
+        MissionResult.INVALID_PARAM5_X: ("x (latitude)", item.x),
+        MissionResult.INVALID_PARAM6_Y: ("y (longitude)", item.y),
+        MissionResult.INVALID_PARAM7: ("z", item.z),
     }
     if result not in values:
         return ""

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from bridge.clock import SimulatedClock
-from bridge.mavlink.line.wire import Message, Who, dialect
+from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.wire import Who
 from bridge.mavlink.simulated.complete import complete_vehicle
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.profile import PROFILES

@@ -13,9 +13,9 @@ import msgspec
 from bridge.bodies import AutopilotBody
 from bridge.follow import Report
 from bridge.link import Switchboard
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.peer import Peer, reached
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.simulated.faults import NO_FAULTS, VehicleFaults
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import profile_named

@@ -7,7 +7,7 @@ import random
 from collections.abc import Iterator
 from typing import Any
 
-from bridge.mavlink.line.wire import Message, dialect
+from bridge.mavlink.line.frames import Message, dialect
 from mission.mavlink.items import Item
 
 FLOATS = (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from bridge.mavlink.line.wire import Message
-from bridge.mavlink.transfer.messages import item_message
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.messages import item_message
 from mission.document import SiteOrigin
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import Command, Frame, Item, ItemList, Placed

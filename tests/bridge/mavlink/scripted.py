@@ -12,8 +12,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+from bridge.mavlink.line.frames import Message, dialect
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import Message, Who, Wire, dialect, sender, wire
+from bridge.mavlink.line.wire import Who, Wire, sender, wire
 
 ASK_AGAIN_S = 0.25
 VEHICLE = Who(1, dialect.MAV_COMP_ID_AUTOPILOT1)

@@ -6,7 +6,7 @@ from bridge.clock import SimulatedClock
 from bridge.journal import memory_journal
 from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.logbook import Logbook, remember
-from bridge.mavlink.line.wire import Message, dialect
+from bridge.mavlink.line.frames import Message, dialect
 from mission.events import Paused
 from mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from mission.mavlink.following.observer import Observer

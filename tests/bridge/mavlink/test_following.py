@@ -7,8 +7,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.peer import reached as found_peer
-from bridge.mavlink.line.wire import dialect
 from mission.document import sealed
 from mission.events import Arrived, Failed, Held, PoseReport, Scanned, StateReport, Unconfirmed
 from recordings.field import FieldRecording

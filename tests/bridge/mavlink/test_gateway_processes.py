@@ -12,9 +12,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.peer import reached
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import dialect
 from bridge.spawn import end_robot, free_port, robot_process, start, start_robot
 from bridge.station import connect
 from mission.events import Scanned

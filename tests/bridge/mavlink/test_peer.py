@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.mavlink.line.peer import found, reached, station_beat
+from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.messages import station_beat
+from bridge.mavlink.line.peer import found, reached
 from bridge.mavlink.line.url import read_url
-from bridge.mavlink.line.wire import Message, Who, dialect, wire
+from bridge.mavlink.line.wire import Who, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots.generic import GENERIC
 from mission.mavlink.local_frame import VehicleOrigin

@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 
 from bridge.mavlink.desk.logbook import logbook, remember
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.peer import reached
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES

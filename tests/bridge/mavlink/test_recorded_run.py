@@ -14,7 +14,7 @@ from bridge.clock import SimulatedClock
 from bridge.journal import memory_journal
 from bridge.mavlink.desk.follower import Follower
 from bridge.mavlink.desk.logbook import Logbook, remember
-from bridge.mavlink.line.wire import dialect
+from bridge.mavlink.line.frames import dialect
 from mission.document import Mission, SiteOrigin
 from mission.events import AnyEvent, Arrived, Failed
 from mission.mavlink.autopilots.ardupilot import ARDUPILOT

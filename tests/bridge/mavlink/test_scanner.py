@@ -10,8 +10,9 @@ from typing import Any
 
 from bridge.clock import WallClock
 from bridge.mavlink.gateway.scanner import MavlinkScanner, stop_of
+from bridge.mavlink.line.frames import Message, dialect
 from bridge.mavlink.line.peer import Ack
-from bridge.mavlink.line.wire import Box, Message, Who, dialect
+from bridge.mavlink.line.wire import Box, Who
 from mission.document import Scan
 from mission.errors import OutcomeUnknown
 from mission.run.scans import ScanFailed, ScanResult

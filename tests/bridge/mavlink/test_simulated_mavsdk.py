@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import dialect, wire
+from bridge.mavlink.line.wire import wire
 from bridge.mavlink.simulated.faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.process import vehicle_on
 from bridge.mavlink.simulated.profile import PROFILES

@@ -15,9 +15,10 @@ from pathlib import Path
 
 import pytest
 
+from bridge.mavlink.line.frames import Message, dialect
 from bridge.mavlink.line.transport import Address
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import SIGNATURE, Message, Who, Wire, dialect, wire
+from bridge.mavlink.line.wire import SIGNATURE, Who, Wire, wire
 from bridge.mavlink.simulated.faults import (
     FAULTS,
     VehicleFault,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.mavlink.line.wire import dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.simulated.profile import PROFILES
 from mission.mavlink.items import Command, Frame, Item
 from tests.bridge.mavlink.bench import (

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.mavlink.line.wire import Message, dialect
+from bridge.mavlink.line.frames import Message, dialect
 from bridge.mavlink.simulated.process import read_origin
 from bridge.mavlink.simulated.profile import PROFILES
 from bridge.mavlink.simulated.rover import to_east

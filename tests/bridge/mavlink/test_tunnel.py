@@ -15,11 +15,11 @@ from bridge.keys import init_site, issue, now_utc, read_keys
 from bridge.link import MemoryLink, Switchboard
 from bridge.mavlink import tunnel as tunnels
 from bridge.mavlink.harmless import Harmless
+from bridge.mavlink.line.frames import Frames, dialect
 from bridge.mavlink.line.peer import Peer, reached
 from bridge.mavlink.line.transport import Address, open_transport
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import dialect
-from bridge.mavlink.tunnel import QUEUE, Frames, Tunnel, open_tunnel
+from bridge.mavlink.tunnel import QUEUE, Tunnel, open_tunnel
 from bridge.protocol import Keys
 from bridge.spawn import end_robot, free_port, robot_process, start
 from bridge.tunnel_commands import Refusals, RefusalsHeard
@@ -107,7 +107,7 @@ def test_frames_are_whole_however_a_stream_is_cut() -> None:
     reader = Frames(dropped)
     stream = b"".join(taken)
     pieces = [stream[at : at + 7] for at in range(0, len(stream), 7)]
-    read = [frame for piece in pieces for frame, _ in reader.take(piece, datagram=False)]
+    read = [frame for piece in pieces for frame, _ in reader.whole(piece, datagram=False)]
     assert read == taken
     assert not +dropped
 
@@ -136,7 +136,7 @@ def test_a_link_that_is_stuck_costs_the_oldest_frames_and_never_waits() -> None:
 def test_without_raw_orders_one_can_look_and_stop_and_nothing_else() -> None:
     judge = Harmless()
     reader = Frames(tunnels.Counter())
-    for _, message in reader.take(frames(1)[0], datagram=True):
+    for _, message in reader.whole(frames(1)[0], datagram=True):
         judge.sees(message)
 
     def command(number: int, *params: float) -> bool:
@@ -167,7 +167,7 @@ def test_on_px4_holding_is_another_number() -> None:
     judge = Harmless()
     coder = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
     beat = bytes(dialect.MAVLink_heartbeat_message(10, 12, 0, 0, 4, 3).pack(coder))
-    for _, message in Frames(tunnels.Counter()).take(beat, datagram=True):
+    for _, message in Frames(tunnels.Counter()).whole(beat, datagram=True):
         judge.sees(message)
     hold, mission = (COMMAND(1, 1, dialect.MAV_CMD_DO_SET_MODE, 0, 1, 4, sub, 0, 0, 0, 0) for sub in (3, 4))
     assert judge.lets_through(hold)
@@ -235,7 +235,7 @@ def test_the_station_is_told_once_for_each_kind_of_message_that_is_refused(
     told = [Refusals().told(message) for message in (count, arm, count)]
     capsys.readouterr()
     for frame in (*told, *frames(1)):
-        for _, message in reader.take(frame, datagram=True):
+        for _, message in reader.whole(frame, datagram=True):
             heard.hears(message)
     said = capsys.readouterr().err.splitlines()
     assert [line.split("refused ")[1].split(":")[0] for line in said] == [
@@ -304,7 +304,7 @@ def test_viewers_hear_the_vehicle_and_cannot_speak_to_it(tmp_path: Path) -> None
         reader = Frames(tunnels.Counter())
 
         def hear(key: str, payload: bytes) -> None:
-            for _, message in reader.take(payload, datagram=True):
+            for _, message in reader.whole(payload, datagram=True):
                 heard.put(f"{message.get_type()} {getattr(message, 'target_system', '')}")
 
         viewer, commander = link_of("vera"), link_of("alice")

@@ -7,12 +7,13 @@ from typing import Any
 
 import pytest
 
+from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.messages import item_message, item_of
 from bridge.mavlink.line.origin import check_origin
 from bridge.mavlink.line.peer import Peer, reached
-from bridge.mavlink.line.wire import Message, Who, dialect
+from bridge.mavlink.line.wire import Who
 from bridge.mavlink.transfer import upload as uploads
 from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.messages import item_message, item_of
 from bridge.mavlink.transfer.upload import Uploaded, clear, upload
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots import autopilot_named

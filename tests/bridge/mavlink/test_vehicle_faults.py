@@ -10,9 +10,9 @@ import pytest
 
 from bridge.follow import Silence
 from bridge.mavlink.desk.logbook import remember
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.peer import reached as found_peer
-from bridge.mavlink.line.wire import dialect
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
 from mission.events import Arrived, Held, Paused, Resumed, Started
 from mission.mavlink.translate import translate

@@ -10,9 +10,9 @@ import pytest
 
 from bridge.answers import answer_to, remember_answer
 from bridge.mavlink.desk.orders import Consent, Orders
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.peer import reached as found_peer
-from bridge.mavlink.line.wire import dialect
 from bridge.mavlink.simulated.store import Store
 from mission.document import Scan, SiteOrigin
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable

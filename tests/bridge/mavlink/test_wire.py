@@ -18,9 +18,10 @@ from typing import Any
 
 import pytest
 
+from bridge.mavlink.line.frames import Message, dialect
 from bridge.mavlink.line.transport import open_transport
 from bridge.mavlink.line.url import Url, read_url
-from bridge.mavlink.line.wire import SIGNATURE, Box, Message, Who, Wire, dialect, read_signing_key, wire
+from bridge.mavlink.line.wire import SIGNATURE, Box, Who, Wire, read_signing_key, wire
 from mission.errors import InputError, RobotUnreachable
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.scripted import free_udp_port

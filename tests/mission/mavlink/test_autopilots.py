@@ -10,11 +10,12 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from mission.mavlink import enums
 from mission.mavlink.autopilots import AUTOPILOTS, autopilot_of
 from mission.mavlink.autopilots.kind import Autopilot, Mode
+from mission.mavlink.items import Command
 
 PREFIXES: dict[type[IntEnum] | type[IntFlag], str] = {
     enums.Firmware: "MAV_AUTOPILOT", enums.VehicleType: "MAV_TYPE", enums.ModeFlag: "MAV_MODE_FLAG",
     enums.MissionResult: "MAV_MISSION", enums.CommandResult: "MAV_RESULT",
-    enums.MissionState: "MISSION_STATE",
+    enums.MissionState: "MISSION_STATE", enums.Component: "MAV_COMP_ID", enums.MessageId: "MAVLINK_MSG_ID",
 }  # fmt: skip
 KINDS = pytest.mark.parametrize("kind", AUTOPILOTS.values(), ids=list(AUTOPILOTS))
 
@@ -23,6 +24,11 @@ KINDS = pytest.mark.parametrize("kind", AUTOPILOTS.values(), ids=list(AUTOPILOTS
 def test_numbers_are_those_of_the_dialect(enum: type[IntEnum]) -> None:
     for one in enum:
         assert one == getattr(dialect, f"{PREFIXES[enum]}_{one.name}")
+
+
+@pytest.mark.parametrize("name", [name for name in vars(Command) if name.isupper()])
+def test_commands_are_those_of_the_dialect(name: str) -> None:
+    assert getattr(Command, name) == getattr(dialect, f"MAV_CMD_{name}")
 
 
 @KINDS

@@ -1,0 +1,153 @@
+"""MAVLink messages from what they say: all that our end sends, in the names and units of its fields."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.wire import Who
+from mission.document import Point
+from mission.geodesy import to_steps
+from mission.mavlink.enums import Firmware, VehicleType
+from mission.mavlink.items import Command, Item
+from mission.mavlink.local_frame import VehicleOrigin
+
+MISSION = dialect.MAV_MISSION_TYPE_MISSION
+"""Not the fence and not the rally points, which go by the same protocol."""
+POSITION_ONLY = 0x0DF8
+"""Type mask of a setpoint that is a place: speeds, accelerations and yaw are ignored."""
+YAW_ONLY = 0x09FF
+
+
+def heartbeat(kind: VehicleType) -> Message:
+    """Of ourselves, who are no vehicle."""
+    return dialect.MAVLink_heartbeat_message(kind, Firmware.INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3)
+
+
+def station_beat() -> Message:
+    """The heartbeat of a ground station."""
+    return heartbeat(VehicleType.GCS)
+
+
+def on_board_beat() -> Message:
+    """The heartbeat of a computer on the robot."""
+    return heartbeat(VehicleType.ONBOARD_CONTROLLER)
+
+
+def command_long(to: Who, number: int, *params: float, again: int = 0) -> Message:
+    """A command; what is not given of the seven params is 0. `again`: how often it was sent before."""
+    filled = (*params, *(0.0,) * 7)[:7]
+    return dialect.MAVLink_command_long_message(to.system, to.component, number, min(again, 255), *filled)
+
+
+def command_int(to: Who, number: int, *params: float, x: int, y: int, z: float, frame: int) -> Message:
+    """A command with a place in steps of 1e-7 degrees, and up to four params."""
+    filled = (*params, *(0.0,) * 4)[:4]
+    return dialect.MAVLink_command_int_message(to.system, to.component, frame, number, 0, 0, *filled, x, y, z)
+
+
+def request(to: Who, message: int, index: int = 0) -> Message:
+    """Asks for a message; `index` for those that are numbered."""
+    return command_long(to, Command.REQUEST_MESSAGE, message, index)
+
+
+def interval(to: Who, message: int, hertz: float) -> Message:
+    """Asks to be told something so often."""
+    return command_long(to, Command.SET_MESSAGE_INTERVAL, message, 1e6 / hertz)
+
+
+def set_origin(to: Who, origin: VehicleOrigin) -> Message:
+    """What its local metres are to count from."""
+    return dialect.MAVLink_set_gps_global_origin_message(
+        to.system, *to_steps(origin.place), round(origin.alt * 1000)
+    )
+
+
+def aim_at(to: Who, place: Point, *, down: float, now_ms: int) -> Message:
+    """Drive to a place: metres north and east of its origin."""
+    return _setpoint(to, POSITION_ONLY, place, down, 0.0, now_ms)
+
+
+def aim_yaw(to: Who, yaw: float, *, down: float, now_ms: int) -> Message:
+    """Turn on the spot: radians clockwise from north."""
+    return _setpoint(to, YAW_ONLY, (0.0, 0.0), down, yaw, now_ms)
+
+
+def _setpoint(to: Who, mask: int, place: Point, down: float, yaw: float, now_ms: int) -> Message:
+    return dialect.MAVLink_set_position_target_local_ned_message(
+        now_ms & 0xFFFFFFFF, to.system, to.component, dialect.MAV_FRAME_LOCAL_NED, mask,
+        *place, down, *(0.0,) * 6, yaw, 0.0,
+    )  # fmt: skip
+
+
+def item_message(item: Item, seq: int, to: Who) -> Message:
+    """The MISSION_ITEM_INT that carries an item."""
+    return dialect.MAVLink_mission_item_int_message(
+        to.system, to.component, seq, item.frame, item.command, 0, int(item.autocontinue),
+        *item.params, item.x, item.y, item.z, MISSION,
+    )  # fmt: skip
+
+
+def item_of(message: Message) -> Item:
+    """The item in a MISSION_ITEM_INT."""
+    return Item(
+        command=message.command,
+        frame=message.frame,
+        params=(message.param1, message.param2, message.param3, message.param4),
+        x=message.x,
+        y=message.y,
+        z=message.z,
+        autocontinue=bool(message.autocontinue),
+    )
+
+
+def count_message(count: int, to: Who) -> Message:
+    return dialect.MAVLink_mission_count_message(to.system, to.component, count, MISSION)
+
+
+def list_request(to: Who) -> Message:
+    return dialect.MAVLink_mission_request_list_message(to.system, to.component, MISSION)
+
+
+def item_request(seq: int, to: Who) -> Message:
+    return dialect.MAVLink_mission_request_int_message(to.system, to.component, seq, MISSION)
+
+
+def ack_message(result: int, to: Who) -> Message:
+    return dialect.MAVLink_mission_ack_message(to.system, to.component, result, MISSION)
+
+
+def clear_all(to: Who) -> Message:
+    return dialect.MAVLink_mission_clear_all_message(to.system, to.component, MISSION)
+
+
+def of_mission(message: Message) -> bool:
+    """Whether a message of the mission protocol is about the mission."""
+    return bool(message.mission_type == MISSION)
+
+
+def warning(text: str, *, system: int) -> bytes:
+    """A STATUSTEXT for people, as if the computer on that vehicle said it; at most 50 letters arrive."""
+    speaker: Any = dialect.MAVLink(None, srcSystem=system, srcComponent=dialect.MAV_COMP_ID_ONBOARD_COMPUTER)
+    message = dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_WARNING, text[:50].encode())
+    return bytes(message.pack(speaker))
+
+
+def is_signed(message: Message) -> bool:
+    return bool(message.get_header().incompat_flags & dialect.MAVLINK_IFLAG_SIGNED)
+
+
+def message_name(message: int) -> str:
+    """As messages call themselves, such as "GPS_GLOBAL_ORIGIN"."""
+    return str(dialect.mavlink_map[message].msgname)
+
+
+def enum_name(enum: str, number: int) -> str:
+    """As in "DENIED" for 2 of MAV_RESULT; the number itself if it has no name."""
+    entry = dialect.enums[enum].get(number)
+    return str(number) if entry is None else entry.name.removeprefix(f"{enum}_")
+
+
+def result_name(result: int) -> str:
+    """Of a MAV_MISSION_RESULT, as in "INVALID_PARAM1"."""
+    return enum_name("MAV_MISSION_RESULT", result).removeprefix("MAV_MISSION_")

@@ -1,0 +1,104 @@
+"""What the vehicle says to one station, or to people, as messages."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.messages import item_of
+from bridge.mavlink.line.wire import Who
+from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.fields import PLACED
+from mission.mavlink.items import Item
+
+STEPPED = PLACED | frozenset(range(5000, 5005)) | {5100}
+"""Commands whose x and y are degrees."""
+INT32 = 2**31 - 1
+
+
+def command_ack(to: Who, command: int, result: int) -> Message:
+    return dialect.MAVLink_command_ack_message(
+        command, result, target_system=to.system, target_component=to.component
+    )
+
+
+def message_interval(number: int, interval_us: int) -> Message:
+    return dialect.MAVLink_message_interval_message(number, interval_us)
+
+
+def text(words: str) -> Message:
+    """For people; at most 50 letters arrive."""
+    return dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_NOTICE, words.encode()[:50])
+
+
+def parameter(name: str, value: float, *, index: int, count: int) -> Message:
+    return dialect.MAVLink_param_value_message(
+        name.encode(), value, dialect.MAV_PARAM_TYPE_REAL32, count, index
+    )
+
+
+def item_wanted(to: Who, kind: int, number: int, *, as_int: bool) -> Message:
+    """Asks for an item of an upload."""
+    asking = (
+        dialect.MAVLink_mission_request_int_message if as_int else dialect.MAVLink_mission_request_message
+    )
+    return asking(to.system, to.component, number, kind)
+
+
+def mission_ack(to: Who, kind: int, result: int) -> Message:
+    return dialect.MAVLink_mission_ack_message(to.system, to.component, result, kind)
+
+
+def mission_count(to: Who, kind: int, count: int) -> Message:
+    return dialect.MAVLink_mission_count_message(to.system, to.component, count, kind)
+
+
+def item_int(to: Who, kind: int, number: int, item: Item) -> Message:
+    return _item(dialect.MAVLink_mission_item_int_message, to, kind, number, item, item.x, item.y)
+
+
+def item_float(to: Who, kind: int, number: int, item: Item) -> Message:
+    """The old MISSION_ITEM: x and y are degrees where the command has a place."""
+    scale = STEPS_PER_DEGREE if item.command in STEPPED else 1
+    return _item(dialect.MAVLink_mission_item_message, to, kind, number, item, item.x / scale, item.y / scale)
+
+
+def _item(made: Any, to: Who, kind: int, number: int, item: Item, x: float, y: float) -> Message:
+    return made(
+        to.system, to.component, number, item.frame, item.command, 0, int(item.autocontinue), *item.params,
+        x, y, item.z, kind,
+    )  # fmt: skip
+
+
+def received_item(message: Message) -> Item:
+    """The item in a MISSION_ITEM_INT, or in the old MISSION_ITEM: degrees in float32, good to a metre."""
+    item = item_of(message)
+    if message.get_type() != "MISSION_ITEM":
+        return item
+    scale = STEPS_PER_DEGREE if message.command in STEPPED else 1
+    return replace(item, x=_whole(message.x * scale), y=_whole(message.y * scale))
+
+
+def _whole(value: float) -> int:
+    """The nearest int32; what is no place is as far off the earth as it can be."""
+    return round(value) if math.isfinite(value) and abs(value) <= INT32 else INT32
+
+
+def picture(
+    index: int,
+    *,
+    boot_ms: int,
+    now_ns: int,
+    place: tuple[int, int],
+    alt_mm: int,
+    heading: float,
+    file_url: str,
+) -> Message:
+    """What a camera tells of one; `heading` is counter-clockwise from east. Without a file it has failed."""
+    half = math.pi / 4 - heading / 2
+    facing = (math.cos(half), 0.0, 0.0, math.sin(half))
+    return dialect.MAVLink_camera_image_captured_message(
+        boot_ms, now_ns // 1000, 0, *place, alt_mm, 0, facing, index, 1 if file_url else 0, file_url.encode()
+    )
