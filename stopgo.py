@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from contextlib import AbstractContextManager
 
-    from bridge.follow import Report
-    from bridge.station import Station
+    from bridge.station.follow import Report
+    from bridge.station.station import Station
     from mission.document import Mission
     from mission.floor import FloorPlan
     from mission.plan import Plan
-    from mission.sense import Problem
+    from mission.problems import Problem
     from mission.settings import Settings
 
 FOLDERS = ("mission", "planner", "bridge", "recordings")
@@ -116,7 +116,7 @@ def write_mission(mission: Mission, path: str | Path) -> None:
 
 def check(mission: Mission, floor: str | Path | None = None) -> tuple[Problem, ...]:
     """What of a mission makes no sense; and with a floor's file, what does not fit that floor."""
-    from mission.sense import problems_of
+    from mission.problems import problems_of
 
     problems = problems_of(mission)
     if floor is None:
@@ -146,14 +146,14 @@ def export(mission: Mission, path: str | Path, *, to: str | None = None) -> None
 def connect(endpoint: str, *, robot: str, **options: Any) -> AbstractContextManager[Station]:
     """A robot that has been reached at `endpoint`, such as `tcp/127.0.0.1:7447`, as a context manager.
 
-    Options are those of `bridge.station.connect`: site, commander, timeout_s, keys, insecure.
+    Options are those of `bridge.station.station.connect`: site, commander, timeout_s, keys, insecure.
 
     Raises
     ------
     RobotUnreachable
         If the robot did not show itself in time; nothing was sent.
     """
-    from bridge.station import connect as connected
+    from bridge.station.station import connect as connected
 
     return connected(endpoint, robot=robot, **options)
 

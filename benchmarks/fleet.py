@@ -15,12 +15,12 @@ from pathlib import Path
 
 import msgspec
 
-from bridge.protocol import Keys
-from bridge.spawn import end_robot, free_port, start_robot
-from bridge.station import fleet
-from bridge.zenoh_link import connecting
+from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.link.protocol import Keys
+from bridge.link.zenoh_link import connecting
+from bridge.station.station import fleet
 from mission.events import PoseReport
-from tests.bridge.test_fleet import router
+from tests.bridge.station.test_fleet import router
 
 
 def main() -> None:

@@ -18,9 +18,9 @@ from typing import Any
 from benchmarks.table import put, table, versions
 from bridge.mavlink.line.peer import Peer, reached
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.simulated.process import vehicle_on
-from bridge.mavlink.simulated.profile import PROFILES
+from bridge.mavlink.simulated.profiles import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
+from bridge.mavlink.simulated.vehicle_process import vehicle_on
 from bridge.mavlink.transfer.download import download
 from bridge.mavlink.transfer.upload import upload
 from mission.errors import StopgoError

@@ -10,11 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bridge.console import Bar, print_json, refusals_in, say, tell
-from bridge.key_commands import key_commands
-from bridge.order_commands import Json, TakeOver, add_orders, status_json
-from bridge.tunnel_commands import tunnel_commands
-from bridge.ways import (
+from bridge.commands.connection import (
     DEFAULT_ENDPOINT,
     Insecure,
     KeyFolder,
@@ -29,11 +25,15 @@ from bridge.ways import (
     given_in,
     reached,
 )
+from bridge.commands.key_commands import key_commands
+from bridge.commands.order_commands import Json, TakeOver, add_orders, status_json
+from bridge.commands.tunnel_commands import tunnel_commands
+from bridge.console import Bar, print_json, refusals_in, say, tell
 from mission.errors import InputError
 
 if TYPE_CHECKING:
-    from bridge.mavlink.gateway.scanner import Trigger
-    from bridge.watch import Recording
+    from bridge.mavlink.driving.mavlink_scanner import Trigger
+    from bridge.station.watch import Recording
     from mission.document import Mission, Transform
     from mission.events import Pose
     from mission.run.revision import RevisionPolicy
@@ -147,9 +147,10 @@ def robot(
 
     Example: stopgo robot --mavlink-vehicle udpin:127.0.0.1:14550 --profile ardupilot --origin 47.4,8.5,400
     """
-    from bridge.bodies import AutopilotBody, Incarnate, SimulatedBody, autopilot_url
-    from bridge.robot import RobotOptions, run_robot
-    from bridge.simulator import Faults, read_fault
+    from bridge.mavlink.driving.autopilot_body import AutopilotBody, autopilot_url
+    from bridge.robot.bodies import Incarnate, SimulatedBody
+    from bridge.robot.program import RobotOptions, run_robot
+    from bridge.robot.simulator import Faults, read_fault
 
     given, driven = given_in(context), ("--arm", "--trigger", "--vehicle")
     if mavlink_vehicle is not None:
@@ -187,7 +188,7 @@ def robot(
 
 def be_vehicle(name: str | None, **options: Any) -> None:
     """Be a MAVLink vehicle until SIGTERM."""
-    from bridge.mavlink.simulated.process import VehicleOptions, run_vehicle
+    from bridge.mavlink.simulated.vehicle_process import VehicleOptions, run_vehicle
 
     called = f"{name or 'vehicle'} ({options['profile']})"
     run_vehicle(VehicleOptions(**options), ready=lambda url: say(f"ready {called} at {url}"))
@@ -204,7 +205,7 @@ def read_revisions(text: str) -> RevisionPolicy:
 
 def read_trigger(text: str) -> Trigger:
     """What makes an autopilot's scanner scan."""
-    from bridge.mavlink.gateway.scanner import TRIGGERS
+    from bridge.mavlink.driving.mavlink_scanner import TRIGGERS
 
     known = next((trigger for trigger in TRIGGERS if trigger == text), None)
     if known is None:
@@ -253,7 +254,7 @@ def push(
             "--any-origin", "--while-running",
         )  # fmt: skip
         return push_over_zenoh(read(mission), pushing(way, patience), take_over=take_over, json_=json_)
-    from bridge.mavlink.commands import Leave, Line, Writing, push_mission
+    from bridge.commands.vehicle_missions import Leave, Line, Writing, push_mission
 
     alone(way.given, "--mavlink", "--take-over", "--as")
     vehicle = way.mavlink
@@ -304,7 +305,7 @@ def fetch_mission(
 
     Example: stopgo fetch-mission --mavlink udpout:127.0.0.1:14550 -o held.plan
     """
-    from bridge.mavlink.commands import Line, fetch_mission
+    from bridge.commands.vehicle_missions import Line, fetch_mission
 
     line = Line(mavlink, vehicle, signing_key, insecure, autopilot, timeout)
     with refusals_in(json_):
@@ -327,7 +328,7 @@ def clear(
 
     Example: stopgo clear --mavlink udpout:127.0.0.1:14550
     """
-    from bridge.mavlink.commands import Line, clear_mission
+    from bridge.commands.vehicle_missions import Line, clear_mission
 
     line = Line(mavlink, vehicle, signing_key, insecure, autopilot, timeout)
     with refusals_in(json_):
@@ -365,7 +366,7 @@ def watch(
 
     Example: stopgo watch --mavlink udpout:127.0.0.1:14550 --rrd field.rrd
     """
-    from bridge.watch import Lines, Table, watch_showing
+    from bridge.station.watch import Lines, Table, watch_showing
 
     with (
         recording(rrd, view=view) as record,

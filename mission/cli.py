@@ -15,7 +15,7 @@ from mission.errors import AnswerIsNo, InputError
 if TYPE_CHECKING:
     from mission.document import Mission
     from mission.files.exports.format import FloorDrawing, Supplements
-    from mission.sense import Problem
+    from mission.problems import Problem
 
 MissionFile = Annotated[Path, typer.Argument(metavar="MISSION", help="A mission.json.")]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout and nothing else.")]
@@ -41,8 +41,8 @@ def show(mission: MissionFile, as_json: AsJson = False) -> None:
     """
     from mission.files.mission_json import read
     from mission.page import json_text, page, report
+    from mission.problems import problems_of
     from mission.schedule import schedule
-    from mission.sense import problems_of
 
     document = read(mission)
     for problem in problems_of(document)[:1]:
@@ -103,7 +103,7 @@ class _Checked:
 
 def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Checked:
     from mission.files.coverage_json import read_coverage
-    from mission.sense import problems_of
+    from mission.problems import problems_of
 
     problems = problems_of(mission)
     if floor is None:
@@ -144,7 +144,7 @@ def _is_of_plan(error: ModuleNotFoundError) -> bool:
 def _other_floor(mission: Mission, floor: Path) -> tuple[Problem, ...]:
     import hashlib
 
-    from mission.sense import Problem
+    from mission.problems import Problem
 
     try:
         digest = hashlib.sha256(floor.read_bytes()).hexdigest()
@@ -218,7 +218,7 @@ def export(
     from mission.files.exports import FORMATS, check_uses, exported, format_named
     from mission.files.exports.placing import moved, placed
     from mission.files.mission_json import read
-    from mission.sense import problems_of
+    from mission.problems import problems_of
 
     document = read(mission)
     there = placed(document, origin=origin, to_map=map_)

@@ -16,7 +16,7 @@ import typer
 from mission.errors import InputError, StopgoError
 
 if TYPE_CHECKING:
-    from bridge.station import Station
+    from bridge.station.station import Station
     from mission.comparison import Comparison
     from mission.document import Mission
     from mission.events import AnyEvent
@@ -320,8 +320,8 @@ def demo_command(
     import tempfile
     from importlib.resources import as_file, files
 
-    from bridge.spawn import robot_process
-    from bridge.station import connect
+    from bridge.commands.spawn import robot_process
+    from bridge.station.station import connect
     from mission.settings import read_settings
     from recordings.compare import compare
 
@@ -348,7 +348,7 @@ def demo_command(
 
 def _follow(station: Station, mission: Mission, path: Path) -> tuple[EventTee, str]:
     """Record the run to its end; what was told of it, and the state it ended in."""
-    from bridge.watch import watch_run
+    from bridge.station.watch import watch_run
     from recordings.field import FieldRecording
 
     with FieldRecording(path, mission, say=lambda line: typer.echo(line, err=True)) as recording:

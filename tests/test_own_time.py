@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bridge.clock import WallClock
+from bridge.link.clock import WallClock
 from bridge.mavlink.line.transport import open_transport
 from bridge.mavlink.line.url import Url
 from tests.own_time import World, stepped_into

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from mission.document import Mission
-from mission.mavlink.manner import Manner
+from mission.mavlink.translation_options import Manner
 from mission.run.scans import needs_heading
 
 

@@ -10,9 +10,9 @@ from mission.errors import AnswerIsNo, InputError
 from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.fields import as_sent
 from mission.mavlink.items import Command, Placed
-from mission.mavlink.manner import Manner
+from mission.mavlink.translation_options import Manner
+from mission.problems import problems_of
 from mission.run.scans import needs_heading
-from mission.sense import problems_of
 
 LONGEST_SCRIPT_S = 255
 """NAV_SCRIPT_TIME keeps its timeout in a uint8."""

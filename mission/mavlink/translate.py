@@ -13,10 +13,10 @@ from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.corners import corners
 from mission.mavlink.items import Command, Item, ItemList, Placed
-from mission.mavlink.manner import Manner, ScanWait, Settle, Trigger
 from mission.mavlink.notes import notes_of
 from mission.mavlink.numbers import numbers_of
 from mission.mavlink.refusals import check, check_count, check_fields, origin_of
+from mission.mavlink.translation_options import Manner, ScanWait, Settle, Trigger
 from mission.mavlink.writing import (
     capture,
     corner_waypoint,

@@ -7,7 +7,7 @@ import math
 from mission.document import Point, Stop
 from mission.geodesy import bearing_deg, to_geodetic, to_steps
 from mission.mavlink.items import NAN, Command, Frame, Item
-from mission.mavlink.manner import Manner
+from mission.mavlink.translation_options import Manner
 
 SCAN_MESSAGE = 100
 """Message id by which a script on the vehicle knows that a scan is due."""

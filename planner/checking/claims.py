@@ -21,7 +21,7 @@ from mission.figures import percent
 from mission.files.coverage_json import DIGITS, Coverage
 from mission.geometry import BoolArray, IntArray
 from mission.planning import Candidates, NavigableSpace, weights_of
-from mission.sense import Problem
+from mission.problems import Problem
 from planner.candidates import STRATEGIES, candidates
 from planner.shapes import local_origin
 from planner.sight.sightlines import SightLines

@@ -19,7 +19,7 @@ from shapely.geometry.base import BaseGeometry
 from mission.document import Mission, Point, Stop
 from mission.floor import Element, FloorPlan
 from mission.geometry import FloatArray
-from mission.sense import Problem
+from mission.problems import Problem
 from mission.settings import Settings
 from planner.appraisal.plausible import over_ignored
 from planner.assemble import CLEAR_SLACK

@@ -7,8 +7,8 @@ import sys
 import threading
 from pathlib import Path
 
-from bridge.keys import now_utc, read_keys
-from bridge.zenoh_link import Guard, listening
+from bridge.link.keys import now_utc, read_keys
+from bridge.link.zenoh_link import Guard, listening
 
 
 def leave(signum: int, frame: object) -> None:

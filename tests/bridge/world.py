@@ -10,16 +10,16 @@ from typing import Any
 
 import msgspec
 
-from bridge.agent import Agent
-from bridge.bodies import pose_of
-from bridge.clock import SimulatedClock
-from bridge.controller import Controller
-from bridge.inbox import Inbox
-from bridge.journal import Journal, memory_journal
-from bridge.link import MemoryLink, Switchboard
-from bridge.protocol import Commit, Keys, Manifest
-from bridge.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
-from bridge.station import Station
+from bridge.link.clock import SimulatedClock
+from bridge.link.link import MemoryLink, Switchboard
+from bridge.link.protocol import Commit, Keys, Manifest
+from bridge.robot.agent import Agent
+from bridge.robot.bodies import pose_of
+from bridge.robot.controller import Controller
+from bridge.robot.inbox import Inbox
+from bridge.robot.journal import Journal, memory_journal
+from bridge.robot.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
+from bridge.station.station import Station
 from mission.document import (
     Frame,
     Mission,

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from bridge.journal import open_journal
+from bridge.robot.journal import open_journal
 from tests.bridge.world import Field, corridor
 
 

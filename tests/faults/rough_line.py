@@ -21,8 +21,8 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bridge.spawn import end_robot, start_robot
-from bridge.station import Station, connect
+from bridge.commands.spawn import end_robot, start_robot
+from bridge.station.station import Station, connect
 from mission.events import PoseReport, StateReport
 from tests.bridge.world import corridor
 

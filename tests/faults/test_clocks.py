@@ -14,24 +14,24 @@ from pathlib import Path
 
 import pytest
 
-from bridge import agent as agents
-from bridge import keys as site_keys
-from bridge.agent import Agent, trusting
-from bridge.bodies import pose_of
-from bridge.clock import WallClock
-from bridge.controller import Controller
-from bridge.journal import memory_journal
-from bridge.keys import init_site, issue, now_utc, read_keys
-from bridge.link import Switchboard
-from bridge.protocol import Keys, Rejected
-from bridge.simulator import SimulatedBase, SimulatedScanner
-from bridge.station import Station
+from bridge.link import keys as site_keys
+from bridge.link.clock import WallClock
+from bridge.link.keys import init_site, issue, now_utc, read_keys
+from bridge.link.link import Switchboard
+from bridge.link.protocol import Keys, Rejected
+from bridge.robot import agent as agents
+from bridge.robot.agent import Agent, trusting
+from bridge.robot.bodies import pose_of
+from bridge.robot.controller import Controller
+from bridge.robot.journal import memory_journal
+from bridge.robot.simulator import SimulatedBase, SimulatedScanner
+from bridge.station.station import Station
 from mission.document import Mission
 from mission.errors import AnswerIsNo, InputError
 from mission.events import AnyEvent, Finished, PoseReport, Scanned, StateReport
 from mission.run.lease import lasting_ns
 from mission.run.orders import Answer, Verb
-from tests.bridge.test_push import manifest_of
+from tests.bridge.robot.test_push import manifest_of
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
 from tests.faults.test_crashes import ENTRIES, Mains, Trial, check

@@ -14,13 +14,13 @@ from typing import TypeVar
 
 import pytest
 
-from bridge.link import Request
-from bridge.protocol import encode
+from bridge.link.link import Request
+from bridge.link.protocol import encode
 from mission.document import Mission
 from mission.events import Event, Finished, Scanned, Started
 from mission.run.orders import Answer, Order, Verb
 from mission.run.states import Run
-from tests.bridge.test_push import manifest_of
+from tests.bridge.robot.test_push import manifest_of
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
 

@@ -9,9 +9,9 @@ import msgspec
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bridge.protocol import Malformed, Reply, encode
+from bridge.link.protocol import Malformed, Reply, encode
 from mission.run.orders import Order
-from tests.bridge.test_push import manifest_of
+from tests.bridge.robot.test_push import manifest_of
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
 

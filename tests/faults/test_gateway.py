@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from bridge.spawn import end_robot, free_port, start_robot
-from bridge.station import Station, connect
+from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.station.station import Station, connect
 from mission.document import Scan
 from mission.errors import AnswerIsNo
 from mission.events import PoseReport, Scanned, StateReport
-from tests.bridge.mavlink.gateway import Operator, Rover, rover, site_mission, until
+from tests.bridge.mavlink.driving.world import Operator, Rover, rover, site_mission, until
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.faults.sizes import size
 

@@ -10,12 +10,12 @@ import pytest
 from bridge.mavlink.line.frames import Message, dialect
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import Wire, wire
-from bridge.mavlink.simulated.process import vehicle_on
-from bridge.mavlink.simulated.profile import PROFILES
+from bridge.mavlink.simulated.profiles import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
-from tests.bridge.mavlink.bench import ACCEPTED, ORIGIN, Bench, delay, waypoint
+from bridge.mavlink.simulated.vehicle_process import vehicle_on
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.scripted import free_udp_port
+from tests.bridge.mavlink.simulated.bench import ACCEPTED, ORIGIN, Bench, delay, waypoint
 from tests.faults.sizes import size
 
 FRAMES = size(short=3000, full=20_000)

@@ -21,11 +21,11 @@ from typing import TypeVar
 
 import pytest
 
-from bridge.journal import open_journal
-from bridge.keys import init_site, issue, now_utc
-from bridge.protocol import encode
-from bridge.spawn import end_robot, free_port, start_robot
-from bridge.station import Station, connect
+from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.link.keys import init_site, issue, now_utc
+from bridge.link.protocol import encode
+from bridge.robot.journal import open_journal
+from bridge.station.station import Station, connect
 from mission.document import Mission, Scan
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started

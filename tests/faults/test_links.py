@@ -11,10 +11,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.follow import Report
-from bridge.protocol import Keys, encode
-from bridge.spawn import end_robot, free_port, start_robot
-from bridge.station import Station, connect
+from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.link.protocol import Keys, encode
+from bridge.station.follow import Report
+from bridge.station.station import Station, connect
 from mission.errors import AnswerIsNo, OutcomeUnknown
 from mission.events import Finished, PoseReport, Scanned, StateReport
 from tests.bridge.proxy import Proxy

@@ -14,11 +14,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.bodies import pose_of
-from bridge.clock import SimulatedClock
-from bridge.journal import Journal, open_journal
-from bridge.robot import clocks
-from bridge.simulator import Fault, Faults
+from bridge.link.clock import SimulatedClock
+from bridge.robot.bodies import pose_of
+from bridge.robot.journal import Journal, open_journal
+from bridge.robot.program import clocks
+from bridge.robot.simulator import Fault, Faults
 from mission.events import Aborted, Finished, Scanned, Skipped, Started
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size

@@ -34,7 +34,9 @@ def without_extras(code: str, *arguments: str) -> subprocess.CompletedProcess[st
 
 
 def test_the_nouns_and_the_bridge_import() -> None:
-    done = without_extras("import mission, bridge, bridge.robot, bridge.station, mission.files.mission_json")
+    done = without_extras(
+        "import mission, bridge, bridge.robot.program, bridge.station.station, mission.files.mission_json"
+    )
     assert done.returncode == 0, done.stderr
 
 

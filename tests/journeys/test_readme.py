@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 
-from bridge.spawn import free_port
+from bridge.commands.spawn import free_port
 from mission.files import mission_json
 from recordings.read import check
 from tests.journeys.readme import PRINTED, blocks, commands, robot, run, with_output, workplace

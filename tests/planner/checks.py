@@ -14,7 +14,7 @@ from mission.files.mission_json import encode, parse
 from mission.floor import FloorPlan
 from mission.geometry import Polygon
 from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
-from mission.sense import problems_of
+from mission.problems import problems_of
 from mission.settings import Settings
 from planner.routing.roadmap import ways_between
 from planner.shapes import GRID, local_origin, to_grid, whole_steps_of

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from rerun.experimental import ViewerClient
 
-from bridge.watch import hand_over
+from bridge.station.watch import hand_over
 from mission.document import Mission
 from recordings import palette
 from recordings.field import FieldRecording

@@ -35,7 +35,7 @@ class Url:
     @property
     def stays_here(self) -> bool:
         """Whether nothing leaves this machine by way of a network."""
-        from bridge.zenoh_link import is_loopback
+        from bridge.link.zenoh_link import is_loopback
 
         return self.kind == "serial" or is_loopback(self.host)
 

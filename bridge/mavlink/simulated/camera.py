@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from bridge.mavlink.line.frames import Message
-from bridge.mavlink.simulated.faults import Mishaps
 from bridge.mavlink.simulated.replies import picture
 from bridge.mavlink.simulated.rover import Rover
-from bridge.mavlink.simulated.scanner import Captured, Scanner
-from bridge.mavlink.simulated.store import Store
+from bridge.mavlink.simulated.vehicle_faults import Mishaps
+from bridge.mavlink.simulated.vehicle_scanner import Captured, Scanner
+from bridge.mavlink.simulated.vehicle_store import Store
 
 
 class Camera:

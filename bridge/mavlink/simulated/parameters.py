@@ -8,7 +8,7 @@ from collections.abc import Callable
 from bridge.mavlink.line.frames import Message
 from bridge.mavlink.line.wire import Who
 from bridge.mavlink.simulated import replies
-from bridge.mavlink.simulated.scanner import DEFAULT_S, LONGEST_S
+from bridge.mavlink.simulated.vehicle_scanner import DEFAULT_S, LONGEST_S
 from mission.mavlink.autopilots.kind import Habits
 
 SCAN_TIME = "SIM_SCAN_TIME"

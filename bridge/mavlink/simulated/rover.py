@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from bridge.mavlink.simulated.store import Store
-from bridge.motion import Brake, Motion, along
+from bridge.mavlink.simulated.vehicle_store import Store
+from bridge.robot.motion import Brake, Motion, along
 from mission.document import Point, RobotSpec, SiteOrigin
 from mission.events import Pose
 from mission.geodesy import STEPS_PER_DEGREE, from_geodetic, from_steps, to_geodetic

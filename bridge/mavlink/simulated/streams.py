@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 
-from bridge.clock import Clock
+from bridge.link.clock import Clock
 from mission.mavlink.enums import MessageId
 
 LOWEST_INTERVAL_US, HIGHEST_INTERVAL_US = 10_000, 2**31 - 1

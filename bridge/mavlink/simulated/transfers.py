@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from bridge.clock import Clock
+from bridge.link.clock import Clock
 from bridge.mavlink.line.frames import Message
 from bridge.mavlink.line.wire import Who
-from bridge.mavlink.simulated.faults import Mishaps
+from bridge.mavlink.simulated.item_check import ACCEPTED, verdict
 from bridge.mavlink.simulated.replies import (
     item_float,
     item_int,
@@ -19,8 +19,8 @@ from bridge.mavlink.simulated.replies import (
     mission_count,
     received_item,
 )
-from bridge.mavlink.simulated.store import ALL, FENCE, MISSION, RALLY, Items, Store
-from bridge.mavlink.simulated.validate import ACCEPTED, verdict
+from bridge.mavlink.simulated.vehicle_faults import Mishaps
+from bridge.mavlink.simulated.vehicle_store import ALL, FENCE, MISSION, RALLY, Items, Store
 from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.enums import MissionResult
 from mission.mavlink.items import Item

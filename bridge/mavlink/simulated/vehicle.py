@@ -6,19 +6,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridge.clock import Clock
+from bridge.link.clock import Clock
 from bridge.mavlink.line.frames import Message
 from bridge.mavlink.line.wire import Who, sender
 from bridge.mavlink.simulated import parameters, replies
+from bridge.mavlink.simulated.auto_mission import Course, Tells
 from bridge.mavlink.simulated.camera import Camera
-from bridge.mavlink.simulated.course import Course, Tells
-from bridge.mavlink.simulated.faults import NO_FAULTS, Mishaps, VehicleFaults
-from bridge.mavlink.simulated.lead import Lead
+from bridge.mavlink.simulated.guided_target import Lead
 from bridge.mavlink.simulated.parameters import Parameters
 from bridge.mavlink.simulated.rover import Rover
-from bridge.mavlink.simulated.store import MISSION, Store
 from bridge.mavlink.simulated.streams import Streams
 from bridge.mavlink.simulated.transfers import Transfers
+from bridge.mavlink.simulated.vehicle_faults import NO_FAULTS, Mishaps, VehicleFaults
+from bridge.mavlink.simulated.vehicle_store import MISSION, Store
 from mission.document import SiteOrigin
 from mission.events import Pose
 from mission.mavlink.autopilots.kind import Autopilot, ModeName

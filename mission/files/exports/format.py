@@ -11,7 +11,7 @@ from mission.document import Mission, Point
 from mission.errors import InputError
 from mission.files.exports.stretches import Stretches
 from mission.mavlink.autopilots import AUTOPILOTS
-from mission.mavlink.manner import ScanWait, Settle, Trigger
+from mission.mavlink.translation_options import ScanWait, Settle, Trigger
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

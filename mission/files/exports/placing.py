@@ -8,7 +8,7 @@ import msgspec
 
 from mission.document import Frame, Mission, SiteOrigin, Transform
 from mission.errors import InputError
-from mission.sense import FAR
+from mission.problems import FAR
 from mission.settings import HOW, read_settings
 
 MAP = "write X,Y,HEADING in metres and degrees, such as 1.5,2,90"

@@ -12,7 +12,7 @@ from mission.document import Mission
 from mission.errors import InputError
 from mission.files.coverage_json import CoverageSegment, read_coverage
 from mission.geometry import FloatArray, frozen
-from mission.sense import FAR
+from mission.problems import FAR
 
 Fraction = tuple[float, float]
 

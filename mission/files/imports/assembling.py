@@ -22,7 +22,7 @@ from mission.document import (
 )
 from mission.errors import InputError
 from mission.files.imports.track import Track, Visit
-from mission.sense import problems_of
+from mission.problems import problems_of
 from mission.settings import Settings
 from mission.specs import origin_of, policy_of, robot_of, rounded, scan_of, scanner_of, site_origin_of
 

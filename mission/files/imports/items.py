@@ -17,9 +17,9 @@ from mission.files.imports import track
 from mission.files.imports.track import Given, Track
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.back import GLOBAL_FRAMES, PLACES, TRIGGERS, WAITS, recognise
 from mission.mavlink.items import NAMES, Command, Item, Placed
-from mission.mavlink.rounds import Round, Visit, round_of
+from mission.mavlink.recognise import GLOBAL_FRAMES, PLACES, TRIGGERS, WAITS, recognise
+from mission.mavlink.recognised_tour import Round, Visit, round_of
 from mission.mavlink.writing import SCAN_MESSAGE
 
 MOST = 65_535

@@ -19,7 +19,7 @@ from mission.document import OnFailure, Point
 from mission.errors import InputError
 from mission.files.imports.track import Given, Track, Visit
 from mission.geodesy import Geodetic, from_geodetic, heading_of
-from mission.sense import JOIN
+from mission.problems import JOIN
 
 METRES = ("x_m", "y_m")
 DEGREES = ("lat_deg", "lon_deg")

@@ -18,7 +18,7 @@ from mission.files.imports import READERS, read_mission
 from mission.files.imports.assembling import mission_of
 from mission.files.imports.track import Given
 from mission.mavlink.autopilots import AUTOPILOTS
-from mission.sense import problems_of
+from mission.problems import problems_of
 from mission.settings import Settings
 from tests.mission.exports.worlds import laboratory
 from tests.mission.worlds import mission_of as mission_over

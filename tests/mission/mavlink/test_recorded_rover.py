@@ -10,9 +10,9 @@ import pytest
 
 from mission.document import SiteOrigin
 from mission.mavlink.autopilots.ardupilot import keeps as ardupilot_keeps
-from mission.mavlink.back import recognise
 from mission.mavlink.items import Command, Frame, Item
-from mission.mavlink.rounds import round_of
+from mission.mavlink.recognise import recognise
+from mission.mavlink.recognised_tour import round_of
 
 LOG = Path(__file__).parents[3].parent / "shared" / "data" / "logs" / "rover-stop-and-go.BIN"
 # Where the log's ORGN message says that the vehicle's origin is.

@@ -1,0 +1,1 @@
+"""The bridge's commands, one module for each family."""

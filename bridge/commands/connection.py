@@ -1,0 +1,223 @@
+"""The ways to a robot, over zenoh by its name or over MAVLink by a URL, and the options that say which."""
+
+from __future__ import annotations
+
+import inspect
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mission.errors import InputError
+
+if TYPE_CHECKING:
+    from bridge.station.station import Station
+
+RobotName = Annotated[str, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
+AnyRobot = Annotated[str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
+Connect = Annotated[
+    str, typer.Option("--connect", metavar="ENDPOINT", help="Where it listens, such as tcp/127.0.0.1:7447.")
+]
+Site = Annotated[str | None, typer.Option("--site", metavar="NAME", help="Prefix of the site's keys.")]
+As = Annotated[
+    str | None, typer.Option("--as", metavar="WHO", help="Who gives the order; user@host if not given.")
+]
+Timeout = Annotated[
+    float, typer.Option("--timeout", min=0.1, metavar="S", help="How long to wait, in seconds.")
+]
+Insecure = Annotated[
+    bool, typer.Option("--insecure", help="Allow addresses beyond this machine without keys.")
+]
+KeyFolder = Annotated[
+    Path | None, typer.Option("--keys", metavar="DIR", help="Folder of the keys that stopgo keys issued.")
+]
+MavlinkUrl = Annotated[
+    str | None,
+    typer.Option("--mavlink", metavar="URL", help="A vehicle instead, such as udpout:127.0.0.1:14550."),
+]
+VehicleId = Annotated[
+    int | None,
+    typer.Option("--vehicle", metavar="ID", min=1, max=255, help="Its system id, if several are heard."),
+]
+SigningKey = Annotated[
+    Path | None,
+    typer.Option(
+        "--signing-key",
+        metavar="FILE",
+        help="Sign what is said over MAVLink; FILE: 64 hex digits or a passphrase of at least 8 characters.",
+    ),
+]
+StateFolder = Annotated[
+    Path | None,
+    typer.Option("--state", metavar="DIR", help="What is remembered of the vehicle; one folder for each."),
+]
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+VEHICLES = ("--vehicle", "--signing-key", "--state")
+"""Options of the way to a vehicle."""
+Given = frozenset[str]
+"""The options on a command line, such as "--site"."""
+LEAST_S = 0.5
+"""Left for a question or an order, however long it took to find the robot."""
+
+
+@dataclass(frozen=True)
+class Mavlink:
+    """How a vehicle is to be reached."""
+
+    url: str
+    vehicle: int | None = None
+    signing_key: Path | None = None
+    state: Path | None = None
+    arm: bool = False
+    """It may be armed."""
+    disarm: bool = False
+    any_origin: bool = False
+    """It finds its place by satellites."""
+    looks_only: bool = False
+    compares: bool = False
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a robot is to be reached, and by whom."""
+
+    robot: str
+    """Its name; empty for a vehicle, which has a number."""
+    endpoint: str
+    site: str | None
+    who: str | None
+    timeout_s: float
+    insecure: bool
+    keys: Path | None
+    patience_s: float = 20.0
+    """For each piece of a mission that is pushed."""
+    mavlink: Mavlink | None = field(default=None)
+    given: Given = frozenset()
+
+    def to_drive(self, *, arm: bool = False, disarm: bool = False, any_origin: bool = False) -> Way:
+        """The same way, for an order and what it may do to a vehicle, or overlook."""
+        if self.mavlink is None:
+            alone(self.given, "--robot", "--arm", "--disarm", "--any-origin")
+            return self
+        given = replace(self.mavlink, arm=arm, disarm=disarm, any_origin=any_origin)
+        return replace(self, mavlink=given)
+
+    def to_look(self, *, compares: bool = False) -> Way:
+        """The same way: to look at a vehicle and do no more, or to follow one whose mission is compared."""
+        if self.mavlink is None:
+            return self
+        return replace(self, mavlink=replace(self.mavlink, looks_only=not compares, compares=compares))
+
+
+def way_of(
+    given: Given,
+    *,
+    robot: AnyRobot = None,
+    connect: Connect = DEFAULT_ENDPOINT,
+    site: Site = None,
+    who: As = None,
+    mavlink: MavlinkUrl = None,
+    vehicle: VehicleId = None,
+    signing_key: SigningKey = None,
+    state: StateFolder = None,
+    timeout: Timeout = 5.0,
+    insecure: Insecure = False,
+    keys: KeyFolder = None,
+) -> Way:
+    """The way that the options mean; those after `given` are the options of every command that goes one."""
+    if mavlink is None:
+        alone(given, "--robot", *VEHICLES)
+        if robot is None:
+            raise InputError("say which robot: --robot NAME, or --mavlink URL for a vehicle")
+        return Way(robot, connect, site, who, timeout, insecure, keys, given=given)
+    alone(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
+    return Way(
+        "", connect, None, who, timeout, insecure, None,
+        mavlink=Mavlink(mavlink, vehicle=vehicle, signing_key=signing_key, state=state), given=given,
+    )  # fmt: skip
+
+
+def given_in(context: typer.Context) -> Given:
+    """The options on the command line, whatever their values."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    typed = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
+    return frozenset(
+        option for parameter in context.command.params if parameter.name in typed for option in parameter.opts
+    )
+
+
+def alone(given: Given, what: str, *options: str) -> None:
+    """Refuse options that were given and have no meaning with `what`."""
+    for option in options:
+        if option in given:
+            raise InputError(f"{option} has no meaning with {what}; leave it out")
+
+
+CommandBody = Callable[..., Any]
+
+
+def by_way(*, without: tuple[str, ...] = ()) -> Callable[[CommandBody], CommandBody]:
+    """Gives a command's first parameter, `way`, by the options of `way_of`; none that it goes `without`."""
+    return partial(_by_way, without)
+
+
+def _by_way(without: tuple[str, ...], command: CommandBody) -> CommandBody:
+    (_, *options), (_, *own) = (
+        [
+            one
+            for one in inspect.signature(which, eval_str=True).parameters.values()
+            if one.name not in without
+        ]
+        for which in (way_of, command)
+    )
+
+    def called(context: typer.Context, **values: Any) -> Any:
+        chosen = {option.name: values.pop(option.name) for option in options}
+        return command(way_of(given_in(context), **chosen), **values)
+
+    context = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context)
+    everything = [context, *options, *own]
+    called.__name__, called.__doc__ = command.__name__, command.__doc__
+    called.__signature__ = inspect.Signature(everything)  # type: ignore[attr-defined]
+    called.__annotations__ = {parameter.name: parameter.annotation for parameter in everything}
+    return called
+
+
+def reached(way: Way) -> AbstractContextManager[Station]:
+    """The robot or vehicle at the end of the way; raises as both `connect` do."""
+    if way.mavlink is not None:
+        return _vehicle(way, way.mavlink)
+    from bridge.station.station import connect
+
+    return connect(
+        way.endpoint, robot=way.robot, site=way.site, commander=way.who, timeout_s=way.timeout_s,
+        patience_s=way.patience_s, insecure=way.insecure, keys=way.keys,
+    )  # fmt: skip
+
+
+def _vehicle(way: Way, mavlink: Mavlink) -> AbstractContextManager[Station]:
+    from bridge.mavlink.auto.vehicle_agent import Options, connect
+    from bridge.mavlink.auto.vehicle_orders import Consent
+    from bridge.mavlink.line.wire import read_line
+
+    url, key = read_line(mavlink.url, mavlink.signing_key, insecure=way.insecure)
+    options = Options(
+        vehicle=mavlink.vehicle, signing_key=key, state=mavlink.state, timeout_s=way.timeout_s,
+        commander=way.who, consent=Consent(mavlink.arm, mavlink.disarm, mavlink.any_origin),
+        looks_only=mavlink.looks_only, compares=mavlink.compares,
+    )  # fmt: skip
+    return connect(url, options)
+
+
+@contextmanager
+def in_time(way: Way) -> Iterator[Station]:
+    """A robot that has been reached, with what is left of the time for one question or order."""
+    began = time.monotonic()
+    with reached(way) as station:
+        station.timeout_s = max(LEAST_S, way.timeout_s - (time.monotonic() - began))
+        yield station

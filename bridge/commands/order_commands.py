@@ -1,0 +1,181 @@
+"""The commands that give one order (`start`, `pause`, ... `home`) or ask one question (`status`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from bridge.commands.connection import (
+    DEFAULT_ENDPOINT,
+    VEHICLES,
+    Connect,
+    Insecure,
+    KeyFolder,
+    MavlinkUrl,
+    SigningKey,
+    Site,
+    StateFolder,
+    Timeout,
+    VehicleId,
+    Way,
+    alone,
+    by_way,
+    given_in,
+    in_time,
+    way_of,
+)
+from bridge.console import print_json, refusals_in, tell
+
+if TYPE_CHECKING:
+    from mission.events import StateReport
+    from mission.run.orders import Answer, Verb
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+TakeOver = Annotated[bool, typer.Option("--take-over", help="Command it though somebody else does.")]
+StopId = Annotated[str | None, typer.Option("--stop", metavar="ID", help="The stop that is meant.")]
+Arm = Annotated[bool, typer.Option("--arm", help="Arm a vehicle that is disarmed.")]
+OtherOrigin = Annotated[
+    bool, typer.Option("--any-origin", help="Do not compare origins: it has satellite positions.")
+]
+STATUS_KEYS = (
+    "robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop", "done", "skipped", "battery",
+)  # fmt: skip
+
+
+def add_orders(app: typer.Typer) -> None:
+    """Add the verbs of this module to the front door."""
+    app.command()(start)
+    for verb in ABOUT:
+        app.command(name=verb)(order_of(verb))
+    app.command()(status)
+
+
+@by_way()
+def start(
+    way: Way,
+    *,
+    take_over: TakeOver = False,
+    again: Annotated[bool, typer.Option("--again", help="Run a mission that was run before.")] = False,
+    from_here: Annotated[
+        bool, typer.Option("--from-here", help="Start at the nearest point of the route.")
+    ] = False,
+    arm: Arm = False,
+    any_origin: OtherOrigin = False,
+    json_: Json = False,
+) -> None:
+    """Start the mission that the robot holds.
+
+    Example: stopgo start --robot r1 --connect tcp/127.0.0.1:7447
+
+    Example: stopgo start --mavlink udpout:127.0.0.1:14550 --arm
+    """
+    driving = way.to_drive(arm=arm, any_origin=any_origin)
+    with refusals_in(json_), in_time(driving) as station:
+        answer = station.command("start", again=again, from_here=from_here, take_over=take_over)
+    report_answer(answer, station.keys.robot, json_)
+
+
+ABOUT: dict[Verb, str] = {
+    "pause": "Let the robot stand still; a scan under way is finished. Any station may.",
+    "resume": "Let a paused robot go on, from where it stands.",
+    "skip": "Leave out the stop that the robot works on; its way is still driven.",
+    "retry": "Let a robot that is held try again.",
+    "abort": "End the run where the robot stands. Any station may.",
+    "home": "End the run and drive back along the legs that were driven.",
+}
+
+
+def order_of(verb: Verb) -> Callable[..., None]:
+    """The command that gives the order `verb`."""
+
+    def command(
+        way: Way,
+        *,
+        stop: StopId = None,
+        take_over: TakeOver = False,
+        arm: Arm = False,
+        any_origin: OtherOrigin = False,
+        disarm: Annotated[bool, typer.Option("--disarm", help="Disarm a vehicle that stands.")] = False,
+        json_: Json = False,
+    ) -> None:
+        driving = way.to_drive(arm=arm, disarm=disarm, any_origin=any_origin)
+        with refusals_in(json_), in_time(driving) as station:
+            answer = station.command(verb, stop=stop, take_over=take_over)
+        report_answer(answer, station.keys.robot, json_)
+
+    command.__doc__ = f"{ABOUT[verb]}\n\nExample: stopgo {verb} --robot r1 --connect {DEFAULT_ENDPOINT}"
+    without = () if verb in ("resume", "retry", "skip") else ("arm", "any_origin")
+    return by_way(without=without if verb == "abort" else (*without, "disarm"))(command)
+
+
+def status(
+    context: typer.Context,
+    *,
+    robot: Annotated[
+        str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot; all if not given.")
+    ] = None,
+    connect: Connect = DEFAULT_ENDPOINT,
+    site: Site = None,
+    mavlink: MavlinkUrl = None,
+    vehicle: VehicleId = None,
+    signing_key: SigningKey = None,
+    state: StateFolder = None,
+    timeout: Timeout = 5.0,
+    insecure: Insecure = False,
+    keys: KeyFolder = None,
+    json_: Json = False,
+) -> None:
+    """Tell what the robot is doing, or what all robots of the site are.
+
+    Example: stopgo status --robot r1 --json
+
+    Example: stopgo status --mavlink udpout:127.0.0.1:14550
+    """
+    from bridge.station.station import fleet
+
+    given = given_in(context)
+    if robot is None and mavlink is None:
+        alone(given, "all robots of a site", *VEHICLES)
+        reports = fleet(connect, site=site, timeout_s=timeout, insecure=insecure, keys=keys)
+        as_json: dict[str, Any] = {"robots": [status_json(report) for report in reports]}
+    else:
+        way = way_of(
+            given, robot=robot, connect=connect, site=site, mavlink=mavlink, vehicle=vehicle,
+            signing_key=signing_key, state=state, timeout=timeout, insecure=insecure, keys=keys,
+        )  # fmt: skip
+        with in_time(way.to_look()) as station:
+            reports = (station.status(),)
+        as_json = status_json(reports[0])
+    if json_:
+        print_json(as_json)
+    else:
+        tell("\n".join(state_line(report) for report in reports))
+
+
+def status_json(report: StateReport) -> dict[str, Any]:
+    return {key: getattr(report, key) for key in STATUS_KEYS}
+
+
+def report_answer(answer: Answer, robot: str, json_: bool) -> None:
+    if json_:
+        print_json({"robot": robot, "verb": answer.verb, "outcome": answer.outcome,
+                    "run_id": answer.run_id, "state": answer.state})  # fmt: skip
+    else:
+        tell(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
+
+
+def state_line(report: StateReport) -> str:
+    """The state as one line a person reads."""
+    mission = (
+        f"mission {report.mission_id[:12]} revision {report.revision}" if report.mission_id else "no mission"
+    )
+    stop = f", {report.stop_state} at {report.stop}" if report.stop else ""
+    skipped = f", {len(report.skipped)} skipped" if report.skipped else ""
+    if report.next_revision is not None:
+        mission += f" (revision {report.next_revision} from the next stop on)"
+    return (
+        f"{report.robot}: {report.state}{stop}; {mission}; {len(report.done)} done{skipped};"
+        f" battery {report.battery:.0%}"
+    )

@@ -1,0 +1,313 @@
+"""A link over zenoh. Everything that zenoh must be told, and every trap it has, is in this module.
+
+The robot listens as a router and stations connect as peers without scouting. Shared memory is off, for it
+drops queries silently; the lease is set at both ends, for each end's governs the other; a session is
+always closed, for one with callbacks hangs the interpreter's exit.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+import re
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+import zenoh
+
+from bridge.link.keys import Keys, now_utc
+from bridge.link.link import Answering, Hearing, Presence, Publish, Request
+from mission.errors import InputError
+
+LEASE_MS = 2000
+OPEN_S = 5.0
+LEAST_OPEN_S = 0.5
+BATCH_BYTES = 8192
+"""Of what zenoh sends in one piece: one that takes longer than the lease to arrive closes the link."""
+SEND_BUFFER_BYTES = 32 * 1024
+"""Of the operating system, per link: what lies there no urgent message can overtake."""
+MAX_MESSAGE_BYTES = 1_000_000
+OPEN = ("tcp", "udp", "ws")
+ENCRYPTED = ("tls", "quic")
+JSON = zenoh.Encoding.APPLICATION_JSON
+
+PROMPT = zenoh.Priority.INTERACTIVE_LOW
+BULK = zenoh.Priority.DATA_LOW
+
+COMMON: dict[str, Any] = {
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": False,
+    "scouting/delay": 0,
+    "transport/shared_memory/enabled": False,
+    "transport/link/tx/lease": LEASE_MS,
+    "transport/link/tx/batch_size": BATCH_BYTES,
+    "transport/link/tcp/so_sndbuf": SEND_BUFFER_BYTES,
+    "transport/link/tls/so_sndbuf": SEND_BUFFER_BYTES,
+    "transport/link/rx/max_message_size": MAX_MESSAGE_BYTES,
+    "adminspace/enabled": False,
+}
+RETRY = {"period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 1.5}
+LAST_SECOND = timedelta(seconds=1)
+"""In which a certificate that has ended is still taken for a new link, which zenoh does not close again."""
+
+
+@dataclass(frozen=True)
+class Guard:
+    """How a link is guarded: by keys, or by staying on this machine, or knowingly not at all."""
+
+    keys: Keys | None = None
+    insecure: bool = False
+    access: dict[str, Any] | None = None
+    """zenoh's access control, at the end that is asked."""
+
+
+UNGUARDED = Guard()
+"""Good for this machine only."""
+
+
+@contextmanager
+def listening(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
+    """A link on which others connect to `endpoint`, such as `tcp/127.0.0.1:7447`; it routes between them."""
+    check_endpoint(endpoint, guard, option="--listen")
+    with _opened({"mode": "router", "listen/endpoints": [endpoint]}, endpoint, guard) as link:
+        yield link
+
+
+@contextmanager
+def joining(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
+    """A robot's link to the router at `endpoint`, which stations connect to as well.
+
+    The robot is a router too: a router does not carry between two peers that it takes for neighbours.
+    """
+    check_endpoint(endpoint, guard, option="--connect")
+    with _opened({"mode": "router", **_reaching(endpoint)}, endpoint, guard) as link:
+        yield link
+
+
+@contextmanager
+def connecting(endpoint: str, guard: Guard = UNGUARDED, *, open_s: float = OPEN_S) -> Iterator[ZenohLink]:
+    """A station's link to `endpoint`; returned at once, it connects, again and again, in the background.
+
+    Each attempt takes at most `open_s`; closing waits for the one under way.
+    """
+    check_endpoint(endpoint, guard, option="--connect")
+    opening = {"transport/unicast/open_timeout": round(max(LEAST_OPEN_S, open_s) * 1e3)}
+    with _opened({"mode": "peer", **_reaching(endpoint), **opening}, endpoint, guard) as link:
+        yield link
+
+
+def _reaching(endpoint: str) -> dict[str, Any]:
+    return {"connect/endpoints": [endpoint], "listen/endpoints": [], "connect/retry": RETRY,
+            "connect/exit_on_failure": False}  # fmt: skip
+
+
+def _guarding(guard: Guard) -> dict[str, Any]:
+    """What zenoh must be told of keys and access; each setting is refused at opening if it cannot be."""
+    settings: dict[str, Any] = {} if guard.access is None else {"access_control": guard.access}
+    if guard.keys is None:
+        return settings
+    files, tls = guard.keys.files, "transport/link/tls"
+    return settings | {
+        f"{tls}/root_ca_certificate": str(files.authority),
+        f"{tls}/enable_mtls": True,
+        # Robots have addresses, not names; what they are is in their certificates' roles.
+        f"{tls}/verify_name_on_connect": False,
+        f"{tls}/close_link_on_expiration": True,
+        f"{tls}/listen_certificate": str(files.certificate),
+        f"{tls}/listen_private_key": str(files.key),
+        f"{tls}/connect_certificate": str(files.certificate),
+        f"{tls}/connect_private_key": str(files.key),
+    }
+
+
+@contextmanager
+def _opened(settings: dict[str, Any], endpoint: str, guard: Guard) -> Iterator[ZenohLink]:
+    config = zenoh.Config()
+    try:
+        for key, value in {**COMMON, **settings, **_guarding(guard)}.items():
+            config.insert_json5(key, json.dumps(value))
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        raise InputError(f"{endpoint}: cannot be opened ({_short(error)}); is the address free?") from None
+    with session:
+        link = ZenohLink(session)
+        try:
+            with _silent_after(link, guard.keys):
+                yield link
+        finally:
+            link.close()
+
+
+@contextmanager
+def _silent_after(link: ZenohLink, keys: Keys | None) -> Iterator[None]:
+    """Whoever's keys have ended says and hears nothing more, also on a link of the last second."""
+    if keys is None:
+        yield
+        return
+    left = keys.holder.not_after + LAST_SECOND - now_utc()
+    timer = threading.Timer(left.total_seconds(), link.fall_silent)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+class ZenohLink:
+    """One open zenoh session."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+        # A token or subscriber that nobody refers to is collected, and gone.
+        self._declared: list[Any] = []
+        self._publishers: list[zenoh.Publisher] = []
+        self._lock = threading.Lock()
+        self._silent = False
+
+    def fall_silent(self) -> None:
+        """Be gone for the others, while the session stays open."""
+        self._silent = True
+        with self._lock:
+            _undeclare(self._declared)
+
+    def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
+        priority = BULK if bulk else PROMPT
+
+        def answered(query: zenoh.Query) -> None:
+            with query:
+                payload = b"" if query.payload is None else query.payload.to_bytes()
+                signature = b"" if query.attachment is None else query.attachment.to_bytes()
+                request = Request(str(query.key_expr), payload, _parameters(query.parameters), signature)
+                query.reply(
+                    query.key_expr, answer(request), encoding=JSON,
+                    priority=priority, congestion_control=zenoh.CongestionControl.BLOCK,
+                )  # fmt: skip
+
+        self._declared.append(self._session.declare_queryable(key, answered, complete=True))
+
+    def publisher(self, key: str, *, bulk: bool = False) -> Publish:
+        control = zenoh.CongestionControl.DROP if bulk else zenoh.CongestionControl.BLOCK
+        publisher = self._session.declare_publisher(
+            key, encoding=JSON, congestion_control=control, priority=BULK if bulk else PROMPT
+        )
+        self._publishers.append(publisher)
+
+        def publish(payload: bytes) -> None:
+            if not self._silent:
+                publisher.put(payload)
+
+        return publish
+
+    def announce(self, key: str) -> None:
+        self._declared.append(self._session.liveliness().declare_token(key))
+
+    def ask(
+        self,
+        key: str,
+        payload: bytes = b"",
+        *,
+        timeout_s: float,
+        parameters: Mapping[str, str] | None = None,
+        bulk: bool = False,
+        signature: bytes = b"",
+    ) -> bytes | None:
+        if self._silent:
+            return None
+        selector = zenoh.Selector(key, dict(parameters or {}))
+        priority = zenoh.Priority.BACKGROUND if bulk else zenoh.Priority.INTERACTIVE_HIGH
+        replies = self._session.get(
+            selector,
+            payload=payload,
+            attachment=signature or None,
+            encoding=JSON,
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=timeout_s,
+            priority=priority,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            express=not bulk,
+        )
+        for reply in replies:
+            if reply.ok is not None:
+                return reply.ok.payload.to_bytes()
+        return None
+
+    def ask_all(self, key: str, *, timeout_s: float) -> list[bytes]:
+        replies = self._session.get(
+            key,
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=timeout_s,
+        )
+        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+
+    def hear(self, key: str, heard: Hearing) -> None:
+        def sampled(sample: zenoh.Sample) -> None:
+            heard(str(sample.key_expr), sample.payload.to_bytes())
+
+        self._declared.append(self._session.declare_subscriber(key, sampled))
+
+    def watch_presence(self, key: str, changed: Presence) -> None:
+        def noticed(sample: zenoh.Sample) -> None:
+            changed(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+        self._declared.append(self._session.liveliness().declare_subscriber(key, noticed, history=True))
+
+    def close(self) -> None:
+        with self._lock:
+            _undeclare(self._declared)
+            _undeclare(self._publishers)
+
+
+def _undeclare(declared: list[Any]) -> None:
+    while declared:
+        declared.pop().undeclare()
+
+
+def check_endpoint(endpoint: str, guard: Guard, *, option: str) -> None:
+    """Refuse what is not an endpoint, and one that is not guarded as it should be.
+
+    Raises
+    ------
+    InputError
+        Naming the option, the endpoint and the way out.
+    """
+    protocol, _, rest = endpoint.partition("/")
+    address = rest.partition("?")[0].partition("#")[0]
+    host, _, port = address.rpartition(":")
+    if protocol not in (*OPEN, *ENCRYPTED) or not host or not re.fullmatch("[0-9]+", port):
+        raise InputError(f"{option} {endpoint}: not an endpoint; write it like tcp/127.0.0.1:7447")
+    if not 1 <= int(port) <= 65535:
+        raise InputError(f"{option} {endpoint}: {port} is no port (1 to 65535)")
+    if guard.keys is None and protocol in ENCRYPTED:
+        raise InputError(f"{option} {endpoint}: {protocol} needs --keys DIR; make them with stopgo keys")
+    if guard.keys is not None and protocol in OPEN:
+        raise InputError(f"{option} {endpoint}: {protocol} cannot carry keys; write it like tls/{address}")
+    if guard.keys is None and not guard.insecure and not is_loopback(host):
+        raise InputError(
+            f"{option} {endpoint}: leaves this machine without keys; use 127.0.0.1, tls/ with --keys DIR,"
+            " or add --insecure"
+        )
+
+
+def is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _parameters(parameters: zenoh.Parameters) -> dict[str, str]:
+    pairs = (pair.partition("=") for pair in str(parameters).split(";") if pair)
+    return {name: value for name, _, value in pairs}
+
+
+def _short(error: zenoh.ZError) -> str:
+    """The part of zenoh's message that a person can use: the operating system's, if there is one."""
+    found = re.search(r"[A-Z][A-Za-z ]+ \(os error \d+\)", str(error))
+    return found.group() if found else re.sub(r" at \S+\.rs:\d+\S*", "", str(error).splitlines()[0])[:200]

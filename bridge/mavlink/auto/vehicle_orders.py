@@ -1,0 +1,338 @@
+"""What becomes of an order to a vehicle: decided as a robot decides, done by its autopilot, and then stored.
+
+The journal never says what the vehicle has not shown. While an order is carried out the journal says so, and
+whoever watches does not take for somebody else's what the vehicle does meanwhile.
+"""
+
+from __future__ import annotations
+
+import math
+import uuid
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import msgspec
+
+from bridge.link.clock import Clock
+from bridge.mavlink.auto.confirmed_commands import Denied, Hands
+from bridge.mavlink.auto.logbook import Logbook, Ordered
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.transfer.download import download
+from bridge.robot.answers import answer_to, answered, remember_answer
+from mission.document import Mission
+from mission.events import Pose
+from mission.mavlink.autopilots.kind import AUTO, HOLD, why_no_rover
+from mission.mavlink.following import steps as progress
+from mission.mavlink.following.listed_mission import ListedMission
+from mission.mavlink.following.observer import Observer
+from mission.mavlink.following.resuming import ON_WAY_M, resume_place, way
+from mission.mavlink.following.steps import Observation
+from mission.mavlink.local_frame import apart
+from mission.mavlink.read_back import differences
+from mission.run import states as runs
+from mission.run.decision import Decision, Situation, decide, handed_over
+from mission.run.lease import Lease
+from mission.run.orders import DRIVING, FREE_VERBS, Answer, Order, Refused
+from mission.run.states import Change, Run
+
+ORDERING_NS = 20 * 10**9
+"""One step of an order takes no longer; then what the vehicle does counts as somebody else's again."""
+NOWHERE = Pose(x=math.inf, y=math.inf, heading=0.0)
+UNREMEMBERED = (
+    "nothing is remembered of a mission pushed to this vehicle; push one by this very URL,"
+    " or name the folder of that push with --state"
+)
+CLEARED = "the vehicle says that it holds no mission: somebody has cleared it; push it again"
+HOMEWARD = (
+    "an autopilot in AUTO drives its list forward only, and nobody planned a way back from here; the"
+    " return of a mission is driven at its end. Run by stopgo robot --controller mavlink:URL it can"
+)
+
+
+@dataclass(frozen=True)
+class Consent:
+    """What the order may do, or overlook, only if it says so."""
+
+    arm: bool = False
+    disarm: bool = False
+    any_origin: bool = False
+    """The vehicle finds its place by satellites, whatever its metres count from."""
+
+
+class Orders:
+    """Carries out orders to one vehicle."""
+
+    def __init__(
+        self, book: Logbook, peer: Peer, observer: Observer, hands: Hands, wall: Clock, consent: Consent
+    ) -> None:
+        self._book = book
+        self._peer = peer
+        self._observer = observer
+        self._hands = hands
+        self._wall = wall
+        self._consent = consent
+
+    def obey(self, order: Order) -> Answer:
+        """Carry out an order once, and remember what was answered.
+
+        Raises
+        ------
+        OutcomeUnknown
+            If the vehicle was told and does not show what it does; nothing is stored then.
+        """
+        before = answered(self._book.journal, order, self._book.run)
+        if before is not None:
+            return before
+        decision = self._in_the_way(order) or self._decided(order)
+        if isinstance(decision, Refused):
+            return self._refused(order, decision)
+        listed = self._book.listed
+        assert listed is not None  # without a mission nothing is decided
+        with self._ordering(order):
+            try:
+                change = VERBS[order.verb](self, order, listed, decision)
+            except Denied as denied:
+                return self._stored(order, denied.refused, None)
+            return self._stored(order, change, decision.lease)
+
+    def _refused(self, order: Order, refused: Refused) -> Answer:
+        """A pause that the run has no use for still stops a vehicle that drives, whoever started it."""
+        drives = self._observer.mode == AUTO and self._observer.armed
+        if order.verb != "pause" or not drives or refused.reason not in ("wrong_state", "no_mission"):
+            return self._stored(order, refused, None)
+        with self._ordering(order):
+            try:
+                self._hands.hold()
+            except Denied as denied:
+                return self._stored(order, denied.refused, None)
+            return self._stored(order, Change(self._book.run), None)
+
+    def _in_the_way(self, order: Order) -> Refused | None:
+        """Only one order at a time, but for those that stop."""
+        other = self._book.ordered
+        if other is None or order.verb in FREE_VERBS or other.until_ns <= self._book.clock.now_ns():
+            return None
+        return Refused("wrong_state", f"{other.verb} by {other.by} is being carried out; wait for its end")
+
+    def _elsewhere(self, listed: ListedMission) -> Refused | None:
+        """Where the vehicle stands means something only if it counts from the mission's origin."""
+        if self._consent.any_origin:
+            return None
+        origin = self._peer.origin()
+        if origin is None:
+            return Refused(
+                "wrong_origin",
+                "the vehicle has no origin (GPS_GLOBAL_ORIGIN), so its metres count from nowhere, or does not"
+                " tell it; set it to the mission's (stopgo push --set-origin)",
+            )
+        wrong = apart(listed.sent.origin, origin)
+        satellites = "; or add --any-origin, if it finds its place by satellites"
+        return Refused("wrong_origin", wrong + satellites) if wrong else None
+
+    def _decided(self, order: Order) -> Decision | Refused:
+        listed, run, here = self._book.listed, self._book.run, self._pose
+        if listed is None:
+            return Refused("no_mission", UNREMEMBERED)
+        if order.verb in DRIVING and self._observer.items == 0:
+            return Refused("no_mission", CLEARED)
+        elsewhere = self._elsewhere(listed) if order.verb in DRIVING else None
+        if elsewhere is not None:
+            return elsewhere
+        if here is None and order.verb not in FREE_VERBS:
+            return Refused("no_position", "the vehicle does not tell where it is; does its navigation run?")
+        if here is not None and order.verb != "start":
+            here = on_way(run, listed, here)
+        return decide(order, self._situation(run, listed.mission, here or NOWHERE))
+
+    def _situation(self, run: Run, mission: Mission, pose: Pose) -> Situation:
+        journal = self._book.journal
+        return Situation(
+            run=run, mission=mission,
+            has_run=journal.has_run(mission.id, mission.revision),
+            pose=pose, now_ns=self._book.clock.now_ns(), command_ns=self._wall.now_ns(),
+            new_run_id=uuid.uuid4().hex[:12], lease=journal.fact("lease", Lease),
+            battery=self._observer.battery, endurance_s=None,
+        )  # fmt: skip
+
+    # What each verb does
+
+    def _start(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+        run = decision.change.run
+        observed = self._observe(run, listed)
+        self._ready(listed)
+        first = 0 if run.at == 0 else resume_place(run, listed, replace(observed, place=-1), self._here())
+        self._go(listed, first, None)
+        return decision.change
+
+    def _resume(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+        run = self._book.run
+        observed = self._observe(run, listed)
+        self._ready(listed)
+        lost = run.stop_state == "SCANNING" and not self._keeps_scan(run, listed, observed)
+        run = runs.changed(run, stop_state="WAITING") if lost else run
+        self._go(listed, resume_place(run, listed, observed, self._here()), observed)
+        return self._resumed(run, order, decision)
+
+    def _resumed(self, run: Run, order: Order, decision: Decision) -> Change:
+        """The run goes on, in whoever's hands it is now."""
+        before = self._book.journal.fact("lease", Lease)
+        change = runs.resumed(run, order.commander)
+        return Change(change.run, (*handed_over(before, decision.lease), *change.events))
+
+    def _keeps_scan(self, run: Run, listed: ListedMission, observed: Observation) -> bool:
+        items = listed.stops[run.at]
+        return items.at < observed.place < items.after
+
+    def _retry(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+        """Once more to the stop; the vehicle stands on the way to it, or beside it."""
+        run = runs.changed(self._book.run, stop_state="WAITING", approaches=0)
+        observed = self._observe(run, listed)
+        self._ready(listed)
+        self._go(listed, resume_place(run, listed, observed, self._here()), observed)
+        return self._resumed(run, order, decision)
+
+    def _pause(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+        self._hands.hold()
+        return runs.paused(self._book.run, f"pause by {order.commander}")
+
+    def _skip(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+        """The way to the stop is still driven; the vehicle is led past its waits once it is there."""
+        before, after = self._book.run, decision.change.run
+        observed = self._observe(after, listed)
+        beyond = progress.passed_by(after, listed, observed)
+        if after.over:
+            self._hands.hold()
+        elif before.state == "HELD":
+            elsewhere = self._elsewhere(listed)
+            if elsewhere is not None:
+                raise Denied(elsewhere)
+            self._ready(listed)
+            self._go(listed, resume_place(after, listed, observed, self._here()), observed)
+        elif before.state == "RUNNING" and beyond is not None:
+            self._hands.jump(listed.sequence(beyond))
+        return decision.change
+
+    def _abort(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+        self._hands.hold()
+        if self._consent.disarm:
+            self._hands.arm(False)
+        return decision.change
+
+    def _home(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
+        raise Denied(Refused("unsupported", HOMEWARD))
+
+    # What several of them need
+
+    def _observe(self, run: Run, listed: ListedMission) -> Observation:
+        observed = self._observer.observe(run, listed)
+        if observed is None:
+            raise Denied(Refused("no_position", "the vehicle does not tell which item it works on"))
+        return observed
+
+    @property
+    def _pose(self) -> Pose | None:
+        return self._observer.pose(self._book.clock.now_ns())
+
+    def _here(self) -> Pose:
+        return self._pose or NOWHERE
+
+    def _ready(self, listed: ListedMission) -> None:
+        """Whether the vehicle may drive this mission: it holds it, and is armed.
+
+        In AUTO it would drive off as soon as it is armed, and a mode that is on is not begun anew.
+        """
+        unfit = why_no_rover(self._peer.heartbeat.type)
+        if unfit:
+            raise Denied(Refused("unsupported", unfit))
+        self._check_mission(listed)
+        armed = self._observer.armed
+        if not armed and not self._consent.arm:
+            raise Denied(Refused("not_armed", "the vehicle is disarmed; arm it, or add --arm"))
+        if self._observer.mode == AUTO:
+            self._hands.hold()
+        if not armed:
+            self._hands.arm()
+
+    def _check_mission(self, listed: ListedMission) -> None:
+        found = differences(listed.sent, download(self._peer))
+        if found:
+            more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+            raise Denied(
+                Refused("mission_differs", f"not what was pushed: {found[0]}{more}; push the mission again")
+            )
+
+    def _go(self, listed: ListedMission, place: int, observed: Observation | None) -> None:
+        """AUTO, from an item on; where that leaves the first ones out, at the speed that they would set."""
+        anew = observed is None or observed.place >= listed.end
+        jumps = anew or observed is None or place != observed.place
+        if jumps:
+            self._hands.jump(listed.sequence(place), anew=anew)
+        self._hands.auto()
+        if jumps and place > 0 and listed.speed is not None:
+            self._hands.speed(listed.speed)
+
+    # Storing
+
+    def _ordering(self, order: Order) -> _Ordering:
+        mode = HOLD if order.verb in FREE_VERBS else AUTO
+        ordered = Ordered(verb=order.verb, by=order.commander, mode=mode, until_ns=0)
+        return _Ordering(self._book, self._hands, ordered)
+
+    def _stored(self, order: Order, outcome: Change | Refused, lease: Lease | None) -> Answer:
+        """The answer, stored together with what the order has changed."""
+        refused = outcome if isinstance(outcome, Refused) else None
+        journal = self._book.journal
+        with journal.transaction():
+            if isinstance(outcome, Change):
+                self._book.move(lambda run: (outcome,) if run != outcome.run else ())
+                journal.forget_fact("owed")
+            if lease is not None:
+                journal.store_fact("lease", lease)
+            answer = answer_to(order, refused, self._book.run)
+            remember_answer(journal, order, answer)
+        return answer
+
+
+class _Ordering:
+    """Shows in the journal that an order is being carried out; one whose outcome is unknown stays there."""
+
+    def __init__(self, book: Logbook, hands: Hands, ordered: Ordered) -> None:
+        self._book = book
+        self._hands = hands
+        self._ordered = ordered
+
+    def __enter__(self) -> None:
+        self._hands.working = lambda: self._last(ORDERING_NS)
+        self._hands.working()
+
+    def __exit__(self, kind: object, *exception: object) -> None:
+        self._hands.working = lambda: None
+        if kind is None:
+            self._book.journal.forget_fact("ordered")
+        else:
+            self._last(0)
+
+    def _last(self, ns: int) -> None:
+        """It is being carried out for so much longer."""
+        until_ns = self._book.clock.now_ns() + ns
+        self._book.journal.store_fact("ordered", msgspec.structs.replace(self._ordered, until_ns=until_ns))
+
+
+VERBS: dict[str, Callable[[Orders, Order, ListedMission, Decision], Change]] = {
+    "start": Orders._start,
+    "pause": Orders._pause,
+    "resume": Orders._resume,
+    "skip": Orders._skip,
+    "retry": Orders._retry,
+    "abort": Orders._abort,
+    "home": Orders._home,
+}
+
+
+def on_way(run: Run, listed: ListedMission, pose: Pose) -> Pose:
+    """The pose, or the nearest point of the way if that is so near that the vehicle is on it."""
+    near = min(way(run, listed), key=lambda piece: piece.away(pose), default=None)
+    if near is None or near.away(pose) > ON_WAY_M:
+        return pose
+    x, y = near.nearest(pose)
+    return Pose(x=x, y=y, heading=pose.heading)

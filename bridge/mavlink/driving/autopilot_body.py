@@ -1,0 +1,64 @@
+"""An autopilot as what a robot's controller drives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from bridge.link.clock import Clock
+from bridge.mavlink.driving.mavlink_base import MavlinkBase
+from bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, Trigger
+from bridge.mavlink.driving.onboard_autopilot import on_board
+from bridge.mavlink.line.wire import read_line
+from bridge.robot.bodies import Body
+from mission.document import Mission
+from mission.errors import InputError
+
+MAVLINK = "mavlink:"
+
+
+@dataclass(frozen=True)
+class AutopilotBody:
+    """A rover whose autopilot is on the robot's own wire."""
+
+    url: str
+    arm: bool = False
+    trigger: Trigger = "camera"
+    signing_key: Path | None = None
+    vehicle: int | None = None
+    """Its system id, if several are heard."""
+    insecure: bool = False
+    patience_s: float = 30.0
+    """How long to wait for it, and for its position."""
+
+    @contextmanager
+    def __call__(self, clock: Clock) -> Iterator[Body]:
+        url, key = read_line(self.url, self.signing_key, insecure=self.insecure, option="--controller")
+        with on_board(url, signing_key=key, vehicle=self.vehicle, timeout_s=self.patience_s) as autopilot:
+            base = MavlinkBase(autopilot, clock=clock, arm=self.arm)
+            scanner = MavlinkScanner(autopilot, clock=clock, trigger=self.trigger)
+
+            def take(mission: Mission) -> None:
+                base.take(mission)
+                scanner.take(mission)
+
+            yield Body(base, scanner, take)
+
+
+def autopilot_url(controller: str) -> str | None:
+    """The URL in `mavlink:URL`; `None` for `sim`.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    if controller == "sim":
+        return None
+    if not controller.startswith(MAVLINK):
+        raise InputError(
+            f"--controller {controller}: sim, or mavlink: and a URL, as mavlink:udpin:127.0.0.1:14550"
+        )
+    return controller.removeprefix(MAVLINK)

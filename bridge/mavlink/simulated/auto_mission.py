@@ -1,0 +1,222 @@
+"""The mission as it is driven in AUTO, item by item.
+
+A command that is no NAV command runs together with the start of the NAV command after it: at once, in order,
+without waiting for anything. A NAV command takes its time and is then told as reached.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from bridge.mavlink.simulated.camera import Camera
+from bridge.mavlink.simulated.rover import Rover
+from bridge.mavlink.simulated.vehicle_faults import Mishaps
+from bridge.mavlink.simulated.vehicle_store import Items, Store
+from mission.document import Point
+from mission.mavlink import recognise as recognised
+from mission.mavlink.autopilots.kind import Autopilot
+from mission.mavlink.items import Command, Item
+from mission.mavlink.recognise import TRIGGERS, WAITS
+
+STAYS, HOMES = 17, 20
+"""NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH."""
+PLACES = recognised.PLACES | {STAYS}
+NAV = PLACES | WAITS | {HOMES}
+"""Commands that take time; every other one is done at once or skipped."""
+State = Literal["idle", "active", "complete"]
+Phase = Literal["driving", "holding", "waiting", "script", "lost", "rebooting"]
+
+
+@dataclass(frozen=True)
+class Tells:
+    """Whom the course tells what happens, with the time in nanoseconds."""
+
+    current: Callable[[int], None]
+    reached: Callable[[int], None]
+    trigger: Callable[[int, float, int], None]
+    """A scan: the number its item carries, its seconds (0: not said), and when."""
+    finished: Callable[[int], None]
+    reboot: Callable[[], None]
+    text: Callable[[str], None]
+
+
+class Course:
+    """Where in the mission the vehicle is, and when the next thing happens."""
+
+    def __init__(
+        self,
+        autopilot: Autopilot,
+        store: Store,
+        rover: Rover,
+        camera: Camera,
+        mishaps: Mishaps,
+        tells: Tells,
+    ) -> None:
+        self._autopilot, self._store, self._rover = autopilot, store, rover
+        self._camera, self._mishaps, self._tells = camera, mishaps, tells
+        self._first = 1 if autopilot.home_first else 0
+        self._phase: Phase = "lost"
+        self._item: Item | None = None
+        self.state: State = "idle"
+        self.current = 0
+        self.due_ns: int | None = None
+        """When the next thing happens; None while nothing will."""
+
+    @property
+    def total(self) -> int:
+        """Items without home."""
+        return max(0, len(self._store.kept.mission) - self._first)
+
+    def go_on(self, now_ns: int) -> None:
+        """Begin, or go on with the item that was left off; a finished mission begins anew."""
+        number = self._first if self.state == "complete" else max(self.current, self._first)
+        self._go(number, now_ns)
+
+    def stand(self, now_ns: int) -> None:
+        """Leave off; the item stays the current one."""
+        if self.state == "active":
+            self.state = "idle"
+            self._rover.brake(now_ns)
+        self.due_ns = None
+
+    def reset(self) -> None:
+        self.state, self.current, self.due_ns = "idle", 0, None
+
+    def jump(self, number: int, now_ns: int) -> bool:
+        """Make an item the current one; false if there is none of that number."""
+        if not 0 <= number < len(self._store.kept.mission):
+            return False
+        active = self.state == "active"
+        self.state, self.current = "idle", number
+        self._tells.current(number)
+        if active:
+            self._go(max(number, self._first), now_ns)
+        return True
+
+    def replaced(self, marked: int | None, now_ns: int) -> None:
+        """Another list has come, or none."""
+        keeps = self._autopilot.habits.restarts_item and self.current < len(self._store.kept.mission)
+        number = self.current if keeps else (marked or 0)
+        active, self.state = self.state == "active", "idle"
+        self.current = number
+        if active and self.total:
+            self._go(max(number, self._first), now_ns)
+        elif active:
+            self.due_ns = None
+            self._rover.brake(now_ns)
+
+    def step(self) -> None:
+        """What is due happens."""
+        assert self.due_ns is not None
+        now_ns, self.due_ns = self.due_ns, None
+        if self._phase == "rebooting":
+            self._tells.reboot()
+        elif self._phase == "driving" and (hold_s := self._hold_s()) > 0:
+            self._phase, self.due_ns = "holding", now_ns + _ns(hold_s)
+        elif self._phase == "driving" and self._item and self._item.command == STAYS:
+            return  # stays there until told otherwise
+        else:
+            self._tells.reached(self.current)
+            self._go(self.current + 1, now_ns)
+
+    def scan_over(self, now_ns: int) -> None:
+        """The scan that a script waits for is over."""
+        if self.state == "active" and self._phase == "script":
+            self.due_ns = now_ns
+
+    def _go(self, number: int, now_ns: int) -> None:
+        """Do what is done at once, and begin the first item that takes time."""
+        items = self._store.kept.mission
+        self.state = "active"
+        while number < len(items):
+            if items[number].command in NAV:
+                self.current, self._item = number, items[number]
+                self._tells.current(number)
+                return self._begin(items[number], now_ns)
+            self._act(items, number, now_ns)
+            number += 1
+        self.state, self.due_ns = "complete", None
+        self._rover.brake(now_ns)
+        self._tells.finished(now_ns)
+
+    def _act(self, items: Items, number: int, now_ns: int) -> None:
+        item = items[number]
+        if item.command == Command.DO_CHANGE_SPEED:
+            self._rover.set_speed(item.params[1])
+        elif item.command in TRIGGERS:
+            self._tells.trigger(*_scan_of(items, number), now_ns)
+
+    def _begin(self, item: Item, now_ns: int) -> None:
+        if item.command in PLACES or item.command == HOMES:
+            self._drive(item, now_ns)
+        elif item.command == Command.NAV_DELAY:
+            self._phase, self.due_ns = "waiting", now_ns + _ns(item.params[0])
+        else:
+            self._phase = "script"
+            self.due_ns = now_ns + _ns(item.params[1]) if item.params[1] else None
+            if self._camera.under_way is None:
+                self._tells.trigger(max(0, item.x), item.params[2], now_ns)
+
+    def _drive(self, item: Item, now_ns: int) -> None:
+        to = self._rover.point(item.x, item.y) if item.command in PLACES else (0.0, 0.0)
+        if to is None:
+            self._phase, self.due_ns = "lost", None
+            why = "no global origin" if self._rover.origin is None else "too far away"
+            return self._tells.text(f"Item {self.current}: {why}")
+        finish = self._mishaps.due("finish", self.current)
+        to_spare, heading = (finish.amount or 1.0, None) if finish else (0.0, self._heading(item))
+        ends_ns = self._rover.drive(self._beside(to, now_ns), now_ns, heading=heading, to_spare=to_spare)
+        self._phase, self.due_ns = "driving", ends_ns
+        if self._mishaps.once("reboot-mission", self.current):
+            self._phase, self.due_ns = "rebooting", (now_ns + ends_ns) // 2
+
+    def _beside(self, to: Point, now_ns: int) -> Point:
+        fault = self._mishaps.due("beside", self.current)
+        if not fault:
+            return to
+        here = self._rover.at(now_ns)[0]
+        left = math.atan2(to[1] - here.y, to[0] - here.x) + math.pi / 2
+        return to[0] + fault.amount * math.cos(left), to[1] + fault.amount * math.sin(left)
+
+    def _heading(self, item: Item) -> float | None:
+        """Counter-clockwise from east, if the vehicle turns to it and the item says it."""
+        yaw = item.params[3]
+        turns = self._autopilot.turns and item.command == Command.NAV_WAYPOINT
+        return math.pi / 2 - math.radians(yaw) if turns and math.isfinite(yaw) else None
+
+    def _hold_s(self) -> float:
+        item = self._item
+        if item is None or item.command not in (Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME):
+            return 0.0
+        if self._mishaps.due("finish", self.current):
+            return 0.0
+        hold = item.params[0]
+        return 0.0 if hold > self._autopilot.longest_hold_s else hold
+
+
+def _scan_of(items: Items, number: int) -> tuple[int, float]:
+    """The number that a trigger carries, and how many seconds its scan takes (0: not said).
+
+    A script message says it in param3. A camera command has no field for it: param2, the interval, if it is
+    not 0, else the wait that comes next.
+    """
+    item = items[number]
+    if item.command == Command.DO_SEND_SCRIPT_MESSAGE:
+        return _number(item.params[1]), item.params[2]
+    carried = _number(item.params[3]) if item.command == Command.IMAGE_START_CAPTURE else 0
+    said = item.params[1] if item.command == Command.IMAGE_START_CAPTURE else 0.0
+    after = items[number + 1] if number + 1 < len(items) else None
+    waits = after is not None and after.command == Command.NAV_DELAY
+    return carried, said if said > 0 else (after.params[0] if after and waits else 0.0)
+
+
+def _number(value: float) -> int:
+    return int(value) if math.isfinite(value) and 0 <= value < 2**31 else 0
+
+
+def _ns(seconds: float) -> int:
+    """Never negative, and never so long that it overflows."""
+    return round(min(seconds, 1e9) * 1e9) if seconds > 0 else 0

@@ -1,0 +1,314 @@
+"""What the vehicle obeys: COMMAND_LONG and COMMAND_INT, and the messages that are orders themselves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bridge.mavlink.line.frames import Message
+from bridge.mavlink.line.wire import Who
+from bridge.mavlink.simulated import replies
+from bridge.mavlink.simulated import vehicle_telemetry as telemetry
+from bridge.mavlink.simulated.rover import FAR_M
+from bridge.mavlink.simulated.vehicle import Handlers, Vehicle
+from mission.document import SiteOrigin
+from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.autopilots.kind import Mode, ModeName
+from mission.mavlink.enums import CommandResult, MessageId, ModeFlag
+from mission.mavlink.items import Command, Frame
+
+ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
+REJECTED, UNSUPPORTED = CommandResult.TEMPORARILY_REJECTED, CommandResult.UNSUPPORTED
+FAILED = CommandResult.FAILED
+IGNORE_X_Y, IGNORE_YAW = 0b11, 1 << 10
+LOCAL_NED, LOCAL_OFFSET_NED = Frame.LOCAL_NED, Frame.LOCAL_OFFSET_NED
+NORTHMOST = 89.0
+"""Degrees; at the poles there is no east."""
+CHANGE_MODE = 1
+"""MAV_DO_REPOSITION_FLAGS."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """A command with its numbers; `x` and `y` are steps of 1e-7 degrees where it has a place."""
+
+    command: int
+    params: tuple[float, float, float, float]
+    x: int
+    y: int
+    exact: bool
+    """Its place is good to a centimetre: it came in a COMMAND_INT."""
+    again: bool
+    """Sent again by a station that has heard no answer."""
+
+    def whole(self, index: int, default: int = -1) -> int:
+        """A param as a whole number; `default` if it is none."""
+        value = self.params[index]
+        return int(value) if math.isfinite(value) and abs(value) < 2**31 else default
+
+
+def handlers(vehicle: Vehicle) -> Handlers:
+    """What to do with each message that is an order."""
+    return {
+        "COMMAND_LONG": lambda who, message: _answer(vehicle, who, _long(message)),
+        "COMMAND_INT": lambda who, message: _answer(vehicle, who, _int(message)),
+        "SET_MODE": lambda who, message: _set_mode_message(vehicle, who, message),
+        "MISSION_SET_CURRENT": lambda who, message: _set_current_message(vehicle, message),
+        "SET_GPS_GLOBAL_ORIGIN": lambda who, message: _set_origin(vehicle, message),
+        "SET_POSITION_TARGET_LOCAL_NED": lambda who, message: _target_local(vehicle, message),
+        "SET_POSITION_TARGET_GLOBAL_INT": lambda who, message: _target_global(vehicle, message),
+    }
+
+
+def _long(message: Message) -> Order:
+    params = (message.param1, message.param2, message.param3, message.param4)
+    x, y = (_steps(value) for value in (message.param5, message.param6))
+    return Order(message.command, params, x, y, exact=False, again=message.confirmation > 0)
+
+
+def _int(message: Message) -> Order:
+    params = (message.param1, message.param2, message.param3, message.param4)
+    return Order(message.command, params, message.x, message.y, exact=True, again=False)
+
+
+def _steps(degrees: float) -> int:
+    return round(degrees * STEPS_PER_DEGREE) if math.isfinite(degrees) and abs(degrees) < 200 else 2**31 - 1
+
+
+def _answer(vehicle: Vehicle, who: Who, order: Order) -> None:
+    """Obey and acknowledge; an order that makes the vehicle silent is acknowledged first."""
+    if order.command == Command.PREFLIGHT_REBOOT_SHUTDOWN:
+        return _reboot(vehicle, who, order)
+    obey = OBEYED.get(order.command)
+    _acknowledge(vehicle, who, order.command, UNSUPPORTED if obey is None else obey(vehicle, order))
+    if order.command == Command.REQUEST_MESSAGE:
+        vehicle.requested(order.whole(0), order.whole(1))
+
+
+def _acknowledge(vehicle: Vehicle, who: Who, command: int, result: int) -> None:
+    vehicle.say(replies.command_ack(who, command, result))
+
+
+def _reboot(vehicle: Vehicle, who: Who, order: Order) -> None:
+    refused = vehicle.armed or order.whole(0) != 1
+    _acknowledge(vehicle, who, order.command, _no(vehicle) if refused else ACCEPTED)
+    if not refused:
+        vehicle.reboot()
+
+
+def _no(vehicle: Vehicle) -> int:
+    """How the autopilot says no to what it could do at other times."""
+    return int(vehicle.autopilot.habits.says_no)
+
+
+def _arm(vehicle: Vehicle, order: Order) -> int:
+    wanted = order.params[0]
+    if wanted not in (0.0, 1.0):
+        return int(DENIED)
+    (vehicle.arm if wanted else vehicle.disarm)()
+    return int(ACCEPTED)
+
+
+def _set_mode(vehicle: Vehicle, order: Order) -> int:
+    main, sub = order.whole(1), order.whole(2)
+    return _change_mode(vehicle, order.whole(0, 0), vehicle.autopilot.modes.custom(Mode(main, sub)))
+
+
+def _change_mode(vehicle: Vehicle, flags: int, custom: int) -> int:
+    mode = _mode_of(vehicle, flags, custom)
+    if mode is None:
+        return _no(vehicle)
+    return int(ACCEPTED) if vehicle.set_mode(mode) else _no(vehicle)
+
+
+def _mode_of(vehicle: Vehicle, flags: int, custom: int) -> ModeName | None:
+    """By its custom number; without one by the flags alone, which only the specification's vehicle knows."""
+    modes = vehicle.autopilot.modes
+    if flags & ModeFlag.CUSTOM_MODE_ENABLED:
+        return next((name for name, mode in modes.numbers.items() if modes.custom(mode) == custom), None)
+    if not vehicle.autopilot.habits.modes_by_flags:
+        return None
+    if flags & ModeFlag.AUTO_ENABLED:
+        return "auto"
+    return "guided" if flags & ModeFlag.GUIDED_ENABLED else "manual"
+
+
+def _set_mode_message(vehicle: Vehicle, who: Who, message: Message) -> None:
+    result = _change_mode(vehicle, message.base_mode, message.custom_mode)
+    if vehicle.autopilot.habits.acknowledges_set_mode:
+        _acknowledge(vehicle, who, MessageId.SET_MODE, result)
+
+
+def _set_current(vehicle: Vehicle, order: Order) -> int:
+    """-1 means: stay; param2 1 means: count everything anew."""
+    number = order.whole(0, -2)
+    if number == -1:
+        number = vehicle.course.current
+    return int(ACCEPTED if vehicle.course.jump(number, vehicle.now_ns) else DENIED)
+
+
+def _set_current_message(vehicle: Vehicle, message: Message) -> None:
+    if not vehicle.course.jump(message.seq, vehicle.now_ns):
+        vehicle.text(f"Item {message.seq}: not in the mission")
+
+
+def _start(vehicle: Vehicle, order: Order) -> int:
+    first, habits = order.whole(0, 0), vehicle.autopilot.habits
+    if first > 0 and not (habits.start_takes_item and vehicle.course.jump(first, vehicle.now_ns)):
+        return int(DENIED)
+    if not vehicle.set_mode("auto"):
+        return _no(vehicle)
+    if habits.start_arms:
+        vehicle.arm()
+    return int(ACCEPTED)
+
+
+def _pause(vehicle: Vehicle, order: Order) -> int:
+    if not vehicle.autopilot.habits.pauses_by_command:
+        return int(UNSUPPORTED)
+    return int(ACCEPTED) if vehicle.set_mode("auto" if order.params[0] == 1 else "hold") else int(DENIED)
+
+
+def _reposition(vehicle: Vehicle, order: Order) -> int:
+    """param1 is a speed (-1: as it is), param2 1 allows the change of mode, param4 is radians from north."""
+    if not order.exact:
+        return int(CommandResult.COMMAND_INT_ONLY)
+    point, mode = vehicle.rover.point(order.x, order.y), vehicle.autopilot.driving.reposition_mode
+    allowed = vehicle.mode == mode or order.whole(1, 0) & CHANGE_MODE
+    if point is None or not vehicle.armed or not allowed:
+        return int(DENIED)
+    vehicle.set_mode(mode)
+    vehicle.rover.set_speed(order.params[0])
+    vehicle.lead.go(point, _heading(vehicle, order.params[3]), vehicle.now_ns)
+    return int(ACCEPTED)
+
+
+def _heading(vehicle: Vehicle, yaw: float) -> float | None:
+    """Counter-clockwise from east, of radians from north; None if it is none, or none that it turns to."""
+    turns = vehicle.autopilot.turns and math.isfinite(yaw) and abs(yaw) < 100
+    return math.pi / 2 - yaw if turns else None
+
+
+def _change_speed(vehicle: Vehicle, order: Order) -> int:
+    drives = vehicle.course.state == "active" or vehicle.lead.goes_somewhere
+    if vehicle.autopilot.habits.speed_while_driving and not drives:
+        return int(FAILED)
+    if not vehicle.rover.set_speed(order.params[1]):
+        return int(DENIED)
+    vehicle.lead.again(vehicle.now_ns)
+    return int(ACCEPTED)
+
+
+def _interval(vehicle: Vehicle, order: Order) -> int:
+    return int(ACCEPTED) if vehicle.streams.set(order.whole(0), order.params[1]) else _no(vehicle)
+
+
+def _tell_interval(vehicle: Vehicle, order: Order) -> int:
+    number = order.whole(0)
+    if not 0 <= number < 2**16:
+        return int(DENIED)
+    vehicle.say(replies.message_interval(number, vehicle.streams.interval_us(number)))
+    return int(ACCEPTED)
+
+
+def _request(vehicle: Vehicle, order: Order) -> int:
+    maker = telemetry.MAKERS.get(order.whole(0))
+    return int(UNSUPPORTED) if maker is None else int(DENIED if maker(vehicle) is None else ACCEPTED)
+
+
+def _tell_version(vehicle: Vehicle, order: Order) -> int:
+    vehicle.tell(MessageId.AUTOPILOT_VERSION)
+    return int(ACCEPTED)
+
+
+def _tell_home(vehicle: Vehicle, order: Order) -> int:
+    return int(ACCEPTED) if vehicle.tell(MessageId.HOME_POSITION) else _no(vehicle)
+
+
+def _capture(vehicle: Vehicle, order: Order) -> int:
+    """IMAGE_START_CAPTURE: param4 is the number; param2, the interval, which one picture has not, seconds."""
+    return _scan(vehicle, order, order.whole(3, 0), order.params[1])
+
+
+def _script_message(vehicle: Vehicle, order: Order) -> int:
+    """DO_SEND_SCRIPT_MESSAGE: param2 is the number, param3 the seconds."""
+    if Command.DO_SEND_SCRIPT_MESSAGE not in vehicle.autopilot.commands:
+        return int(UNSUPPORTED)
+    return _scan(vehicle, order, order.whole(1, 0), order.params[2])
+
+
+def _stop_capture(vehicle: Vehicle, order: Order) -> int:
+    """The scan under way is broken off; nothing is said of it."""
+    vehicle.break_off()
+    return int(ACCEPTED)
+
+
+def _scan(vehicle: Vehicle, order: Order, number: int, seconds: float) -> int:
+    """A trigger that comes again for the scan it began does not begin another."""
+    same = number == vehicle.camera.under_way or (order.again and number == vehicle.camera.last)
+    if number > 0 and same:
+        return int(ACCEPTED)
+    return int(ACCEPTED if vehicle.camera.begin(max(0, number), seconds, vehicle.now_ns) else REJECTED)
+
+
+OBEYED: dict[int, Callable[[Vehicle, Order], int]] = {
+    Command.COMPONENT_ARM_DISARM: _arm,
+    Command.DO_SET_MODE: _set_mode,
+    Command.DO_SET_MISSION_CURRENT: _set_current,
+    Command.MISSION_START: _start,
+    Command.DO_PAUSE_CONTINUE: _pause,
+    Command.DO_REPOSITION: _reposition,
+    Command.DO_CHANGE_SPEED: _change_speed,
+    Command.SET_MESSAGE_INTERVAL: _interval,
+    Command.GET_MESSAGE_INTERVAL: _tell_interval,
+    Command.REQUEST_MESSAGE: _request,
+    Command.REQUEST_AUTOPILOT_CAPABILITIES: _tell_version,
+    Command.GET_HOME_POSITION: _tell_home,
+    Command.IMAGE_START_CAPTURE: _capture,
+    Command.IMAGE_STOP_CAPTURE: _stop_capture,
+    Command.DO_SEND_SCRIPT_MESSAGE: _script_message,
+}
+"""Each gives the MAV_RESULT with which it is acknowledged."""
+
+
+def _set_origin(vehicle: Vehicle, message: Message) -> None:
+    """What is no place on the earth is ignored."""
+    lat, lon = message.latitude / STEPS_PER_DEGREE, message.longitude / STEPS_PER_DEGREE
+    if abs(lat) <= NORTHMOST and abs(lon) <= 180:
+        vehicle.set_origin(SiteOrigin(lat=lat, lon=lon, alt=message.altitude / 1000, heading_deg=0.0))
+
+
+def _target_local(vehicle: Vehicle, message: Message) -> None:
+    vehicle.lead.hear()
+    if message.type_mask & IGNORE_X_Y == IGNORE_X_Y:
+        return _turn(vehicle, message)
+    east, north = message.y, message.x
+    here = vehicle.motion()[0]
+    if message.coordinate_frame == LOCAL_OFFSET_NED:
+        east, north = east + here.x, north + here.y
+    elif message.coordinate_frame != LOCAL_NED:
+        return
+    if math.isfinite(east) and math.isfinite(north) and math.hypot(east, north) <= FAR_M:
+        _guide(vehicle, message, (east, north))
+
+
+def _target_global(vehicle: Vehicle, message: Message) -> None:
+    vehicle.lead.hear()
+    point = vehicle.rover.point(message.lat_int, message.lon_int)
+    if point is not None:
+        _guide(vehicle, message, point)
+
+
+def _turn(vehicle: Vehicle, message: Message) -> None:
+    """To a yaw without a place. Speeds and accelerations, which may come instead, are not followed."""
+    leads = vehicle.mode == "guided" and vehicle.armed and vehicle.autopilot.driving.turns
+    if leads and not message.type_mask & IGNORE_YAW and math.isfinite(message.yaw) and abs(message.yaw) < 100:
+        vehicle.lead.turn(math.pi / 2 - message.yaw, vehicle.now_ns)
+
+
+def _guide(vehicle: Vehicle, message: Message, point: tuple[float, float]) -> None:
+    if vehicle.mode != "guided" or not vehicle.armed or message.type_mask & IGNORE_X_Y:
+        return
+    heading = None if message.type_mask & IGNORE_YAW else _heading(vehicle, message.yaw)
+    vehicle.lead.go(point, heading, vehicle.now_ns)

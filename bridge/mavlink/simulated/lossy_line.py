@@ -1,0 +1,81 @@
+"""A line to the vehicle that loses, doubles and delays frames by chance."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import random
+import threading
+import time
+
+from bridge.mavlink.line.transport import Address, Transport
+from bridge.mavlink.simulated.vehicle_faults import FaultKind, VehicleFaults
+
+
+class RoughLine:
+    """A transport whose frames are lost, doubled and delayed by chance, in both directions.
+
+    Two threads use it: one reads, another writes.
+    """
+
+    def __init__(self, transport: Transport, faults: VehicleFaults) -> None:
+        self.datagrams, self.gone = transport.datagrams, transport.gone
+        self._transport = transport
+        self._loss = _share(faults, "loss")
+        self._twice = _share(faults, "duplicates")
+        self._late_s = _share(faults, "jitter") / 10
+        seed = sum(int(fault.amount) for fault in faults.all if fault.kind in LINE)
+        self._coming, self._going = random.Random(2 * seed), random.Random(2 * seed + 1)
+        self._count = itertools.count()
+        self._waiting: list[tuple[float, int, Address, bytes]] = []
+        self._leaving: list[tuple[float, int, Address | None, bytes]] = []
+        self._lock = threading.Lock()
+
+    def read(self, timeout_s: float) -> list[tuple[Address, bytes]]:
+        """What has come and is due; what waits to leave is sent on the way."""
+        pause = timeout_s if not self._late_s else min(timeout_s, 0.01)
+        for address, data in self._transport.read(pause):
+            for due in self._times(self._coming):
+                heapq.heappush(self._waiting, (due, next(self._count), address, data))
+        self._send_due()
+        self.gone = self._transport.gone
+        came = []
+        while self._waiting and self._waiting[0][0] <= time.monotonic():
+            _, _, address, data = heapq.heappop(self._waiting)
+            came.append((address, data))
+        return came
+
+    def write(self, data: bytes, to: Address | None = None) -> None:
+        with self._lock:
+            for due in self._times(self._going):
+                heapq.heappush(self._leaving, (due, next(self._count), to, data))
+        self._send_due()
+
+    def close(self) -> None:
+        self._transport.close()
+
+    def _send_due(self) -> None:
+        with self._lock:
+            while self._leaving and self._leaving[0][0] <= time.monotonic():
+                _, _, to, data = heapq.heappop(self._leaving)
+                self._transport.write(data, to)
+
+    def _times(self, chance: random.Random) -> list[float]:
+        """When each copy of a frame arrives; none if it is lost."""
+        if chance.random() < self._loss:
+            return []
+        copies = 2 if chance.random() < self._twice else 1
+        return [time.monotonic() + chance.uniform(0.0, self._late_s) for _ in range(copies)]
+
+
+LINE: frozenset[FaultKind] = frozenset({"loss", "duplicates", "jitter"})
+
+
+def on_line(transport: Transport, faults: VehicleFaults) -> Transport:
+    """The transport, made rough where the faults say so."""
+    return RoughLine(transport, faults) if any(fault.kind in LINE for fault in faults.all) else transport
+
+
+def _share(faults: VehicleFaults, kind: FaultKind) -> float:
+    fault = faults.any(kind)
+    return fault.at / 100 if fault else 0.0

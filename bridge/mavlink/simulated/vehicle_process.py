@@ -1,0 +1,148 @@
+"""The simulated vehicle on a wire: one thread that hears, lets time pass, and speaks."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bridge.link.clock import WallClock
+from bridge.mavlink.line.transport import open_transport
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.line.wire import Who, Wire, read_line
+from bridge.mavlink.simulated.command_handlers import NORTHMOST
+from bridge.mavlink.simulated.complete_vehicle import complete_vehicle
+from bridge.mavlink.simulated.lossy_line import on_line
+from bridge.mavlink.simulated.profiles import profile_named
+from bridge.mavlink.simulated.rover import to_east
+from bridge.mavlink.simulated.vehicle import Setting, Vehicle
+from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from mission.document import SiteOrigin
+from mission.errors import InputError
+from mission.events import Pose
+
+OPTION = "--mavlink-vehicle"
+VEHICLE = Who(1, 1)
+STEP_S = 0.02
+"""How often the time is looked at while nothing comes in."""
+
+
+@dataclass(frozen=True)
+class VehicleOptions:
+    """What the command line says."""
+
+    url: str
+    profile: str = "strict"
+    state: Path | None = None
+    speed_up: float = 1.0
+    signing_key: Path | None = None
+    insecure: bool = False
+    origin: str | None = None
+    at: Pose | None = None
+    """In the site's frame, whose +y bears what the origin says."""
+    faults: tuple[str, ...] = field(default=())
+
+
+def run_vehicle(options: VehicleOptions, ready: Callable[[Url], None]) -> None:
+    """Be a vehicle until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
+    signal.signal(signal.SIGTERM, _leave)
+    url, key = read_line(options.url, options.signing_key, insecure=options.insecure, option=OPTION)
+    with vehicle_on(url, setting_of(options), speed_up=options.speed_up, signing_key=key) as stopped:
+        ready(url)
+        stopped.wait()
+    if stopped.error is not None:
+        raise stopped.error
+    raise SystemExit(1)  # its thread has told why
+
+
+class Stopped(threading.Event):
+    """Set when a vehicle has stopped, by itself or because it was to."""
+
+    error: OSError | None = None
+    """What the disk said when its state could not be kept."""
+
+
+@contextmanager
+def vehicle_on(
+    url: Url, setting: Setting, *, speed_up: float = 1.0, signing_key: bytes | None = None
+) -> Iterator[Stopped]:
+    """A vehicle at `url` while the block runs; the event tells that it has stopped by itself.
+
+    Raises
+    ------
+    InputError
+        If it cannot be opened there.
+    """
+    signs = setting.faults.any("unsigned") is None
+    line = on_line(open_transport(url), setting.faults)
+    with closing(Wire(line, me=VEHICLE, signing_key=signing_key, signs=signs)) as wire:
+        vehicle = complete_vehicle(
+            setting, clock=WallClock(speed_up=speed_up), wall=WallClock(), say=wire.send
+        )
+        stop, stopped = threading.Event(), Stopped()
+        thread = threading.Thread(target=_live, args=(vehicle, wire, stop, stopped), daemon=True)
+        thread.start()
+        try:
+            yield stopped
+        finally:
+            stop.set()
+            thread.join()
+
+
+def _live(vehicle: Vehicle, wire: Wire, stop: threading.Event, stopped: Stopped) -> None:
+    try:
+        with wire.box() as box:
+            while not stop.is_set():
+                message = box.get(STEP_S)
+                if message is None:
+                    vehicle.advance()
+                else:
+                    vehicle.receive(message)
+        vehicle.rest()
+    except OSError as error:
+        stopped.error = error
+    finally:
+        stopped.set()
+
+
+def setting_of(options: VehicleOptions) -> Setting:
+    """What the options mean.
+
+    Raises
+    ------
+    InputError
+        Naming the option.
+    """
+    origin = None if options.origin is None else read_origin(options.origin)
+    heading = 0.0 if origin is None else origin.heading_deg
+    level = (
+        None if origin is None else SiteOrigin(lat=origin.lat, lon=origin.lon, alt=origin.alt, heading_deg=0)
+    )
+    return Setting(
+        autopilot=profile_named(options.profile),
+        state=options.state,
+        origin=level,
+        at=None if options.at is None else to_east(options.at, heading),
+        faults=VehicleFaults(tuple(read_vehicle_fault(text) for text in options.faults)),
+    )
+
+
+def read_origin(text: str) -> SiteOrigin:
+    """LAT,LON,ALT or LAT,LON,ALT,HEADING: degrees, metres, and the bearing of the site's +y."""
+    numbers = text.split(",")
+    try:
+        lat, lon, alt, heading = (float(number) for number in (*numbers, "0")[:4])
+    except ValueError:
+        lat = float("nan")
+    if not (len(numbers) in (3, 4) and abs(lat) <= NORTHMOST and abs(lon) <= 180 and abs(alt) < 1e5):
+        raise InputError(
+            f"--origin {text}: write LAT,LON,ALT or LAT,LON,ALT,HEADING in degrees and metres, as 47,8,400"
+        )
+    return SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=heading)
+
+
+def _leave(signum: int, frame: object) -> None:
+    raise SystemExit(0)

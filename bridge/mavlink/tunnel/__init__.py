@@ -1,0 +1,1 @@
+"""Raw MAVLink frames over a link, and which of them may pass."""

@@ -1,0 +1,226 @@
+"""MAVLink frames over a link: what a vehicle says to stations' ground programs, and what those say to it.
+
+Each end reads whole frames at its MAVLink side and tells them on one key, and writes what it hears on the
+other. Both ways go through queues of their own that lose the oldest when they are full: neither a slow link
+nor a stuck listener holds up the robot. Frames pass unchanged, with their signatures, and in their order.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import Counter, OrderedDict, deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from bridge.link.link import Link
+from bridge.mavlink.line.frames import Frames, Message, dialect
+from bridge.mavlink.line.messages import on_board_beat
+from bridge.mavlink.line.transport import Transport
+from mission.mavlink.enums import Component
+
+QUEUE = 500
+"""Frames that wait in one direction: some seconds of a talkative vehicle."""
+OLDEST_S = 2.0
+"""An order or a place that has waited so long is worth nothing, or worse."""
+SAMPLE_BYTES = 1200
+"""Frames go together up to this: fewer samples on a slow link, and no datagram that must be cut."""
+READ_S = 0.1
+ECHOES = 512
+"""Frames that were written lately; one that comes back at once is an echo."""
+KNOCKING = (252, Component.UDP_BRIDGE)
+"""Who knocks: not the gateway (253), by whose heartbeats a vehicle may tell that it is alive."""
+
+
+class Waiting:
+    """Frames that wait for their turn; the oldest are dropped if there are too many, or they are too old."""
+
+    def __init__(self, dropped: Counter[str], what: str) -> None:
+        self._dropped, self._what = dropped, what
+        self._frames: deque[tuple[float, bytes]] = deque()
+        self._ready = threading.Condition()
+        self._closed = False
+
+    def put(self, frame: bytes) -> None:
+        with self._ready:
+            if len(self._frames) >= QUEUE:
+                self._frames.popleft()
+                self._dropped[f"{self._what}, too many"] += 1
+            self._frames.append((time.monotonic(), frame))
+            self._ready.notify()
+
+    def sample(self) -> bytes:
+        """The next frames that go together; waits for one, and is empty once closed."""
+        with self._ready:
+            self._ready.wait_for(lambda: self._fresh() or self._closed)
+            taken = b""
+            while self._frames and len(taken) + len(self._frames[0][1]) <= SAMPLE_BYTES:
+                taken += self._frames.popleft()[1]
+            return taken
+
+    def close(self) -> None:
+        with self._ready:
+            self._closed = True
+            self._frames.clear()
+            self._ready.notify_all()
+
+    def _fresh(self) -> bool:
+        while self._frames and self._frames[0][0] < time.monotonic() - OLDEST_S:
+            self._frames.popleft()
+            self._dropped[f"{self._what}, too old"] += 1
+        return bool(self._frames)
+
+
+class Echoes:
+    """What was written lately: a frame that comes back must not go round for ever."""
+
+    def __init__(self) -> None:
+        self._frames: OrderedDict[bytes, float] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def wrote(self, frame: bytes) -> None:
+        with self._lock:
+            self._frames[frame] = time.monotonic()
+            while len(self._frames) > ECHOES:
+                self._frames.popitem(last=False)
+
+    def knows(self, frame: bytes) -> bool:
+        with self._lock:
+            return self._frames.get(frame, -OLDEST_S) > time.monotonic() - OLDEST_S
+
+
+class Tunnel:
+    """One end: `tells` and `hears` are keys of the link.
+
+    `sees` looks at what comes from the MAVLink side, `passes` judges what goes there, `wrote` looks at what
+    went there, and `refused` gives the
+    frame, if any, by which those who sent what does not pass are told so. An end that `knocks` sends a
+    heartbeat of its own, for one that listens on UDP answers only whom it has heard.
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        transport: Transport,
+        *,
+        tells: str | None,
+        hears: str,
+        sees: Callable[[Message], None] = lambda message: None,
+        passes: Callable[[Message], bool] = lambda message: True,
+        wrote: Callable[[Message], None] = lambda message: None,
+        refused: Callable[[Message], bytes] = lambda message: b"",
+        knocks: bool = False,
+        bulk: bool = False,
+    ) -> None:
+        self.carried: Counter[str] = Counter()
+        """Frames by direction."""
+        self.dropped: Counter[str] = Counter()
+        """Frames that did not pass, by reason."""
+        self._transport = transport
+        self._sees, self._passes, self._wrote, self._refused = sees, passes, wrote, refused
+        self._knocks = knocks
+        self._echoes = Echoes()
+        self._out = Waiting(self.dropped, "to the link")
+        self._in = Waiting(self.dropped, "from the link")
+        self._read_frames = Frames(self.dropped)
+        self._heard = Frames(self.dropped)
+        self._ended = threading.Event()
+        self._error: Exception | None = None
+        self._publish = None if tells is None else link.publisher(tells, bulk=bulk)
+        link.hear(hears, self._hear)
+        works = (self._read, self._tell, self._write)
+        self._threads = [threading.Thread(target=self._watched, args=(work,), daemon=True) for work in works]
+        for thread in self._threads:
+            thread.start()
+
+    def wait(self) -> None:
+        """Wait until the tunnel ends, which it does only by an error; that is raised here."""
+        self._ended.wait()
+        if self._error is not None:
+            raise self._error
+
+    def close(self) -> None:
+        self._ended.set()
+        self._out.close()
+        self._in.close()
+        for thread in self._threads:
+            thread.join()
+
+    def _watched(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 (the end of a thread)
+            self._error = error
+            self._ended.set()
+
+    def _read(self) -> None:
+        coder = dialect.MAVLink(None, *KNOCKING)
+        knocked_s = -math.inf
+        while not self._ended.is_set():
+            if self._knocks and time.monotonic() - knocked_s >= 1.0:
+                knocked_s = time.monotonic()
+                self._transport.write(bytes(on_board_beat().pack(coder)))
+                coder.seq = (coder.seq + 1) % 256
+            for address, data in self._transport.read(READ_S):
+                for frame, message in self._read_frames.whole(
+                    data, datagram=self._transport.datagrams, sender=address
+                ):
+                    self._take(frame, message)
+
+    def _take(self, frame: bytes, message: Message) -> None:
+        self._sees(message)
+        if self._echoes.knows(frame):
+            self.dropped["echo"] += 1
+        elif self._publish is None:
+            self.dropped["from a viewer"] += 1
+        else:
+            self._out.put(frame)
+
+    def _tell(self) -> None:
+        while not self._ended.is_set():
+            sample = self._out.sample()
+            if sample and self._publish is not None:
+                self._publish(sample)
+                self.carried["to the link"] += 1
+
+    def _write(self) -> None:
+        while not self._ended.is_set():
+            for frame, message in self._heard.whole(self._in.sample(), datagram=True):
+                if self._passes(message):
+                    self._echoes.wrote(frame)
+                    self._transport.write(frame)
+                    self._wrote(message)
+                    self.carried["from the link"] += 1
+                else:
+                    self.dropped["refused"] += 1
+                    self._say_back(self._refused(message))
+
+    def _hear(self, key: str, payload: bytes) -> None:
+        if len(payload) <= SAMPLE_BYTES:
+            self._in.put(payload)
+        else:
+            self.dropped["too large"] += 1
+
+    def _say_back(self, frame: bytes) -> None:
+        if frame:
+            self._out.put(frame)
+
+
+@contextmanager
+def open_tunnel(link: Link, transport: Transport, **details: Any) -> Iterator[Tunnel]:
+    """A tunnel's end at work until the block ends; its transport is closed then."""
+    tunnel = Tunnel(link, transport, **details)
+    try:
+        yield tunnel
+    finally:
+        tunnel.close()
+        transport.close()
+
+
+def told(carried: Counter[str], dropped: Counter[str]) -> Sequence[str]:
+    """What a tunnel has done, a line for what passed and one for what did not."""
+    passed = ", ".join(f"{number} {what}" for what, number in sorted(carried.items())) or "nothing"
+    lost = ", ".join(f"{number} {what}" for what, number in sorted(dropped.items()) if number)
+    return (f"carried {passed}", *((f"dropped {lost}",) if lost else ()))

@@ -1,0 +1,267 @@
+"""The robot's end of the link: answers what stations ask, and tells what happens.
+
+Presence is a token, health is the age of the last state: a robot tells its state on every change and at
+least every second, its pose many times a second, and every event as soon as the journal has it.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from typing import TYPE_CHECKING, TypeVar
+
+import msgspec
+
+from bridge.link.clock import Clock
+from bridge.link.keys import Untrusted, verified_holder
+from bridge.link.link import Link, Request
+from bridge.link.protocol import (
+    CHUNK_BYTES,
+    MAX_DOCUMENT_BYTES,
+    VERSION,
+    Commit,
+    Info,
+    Keys,
+    Malformed,
+    Rejected,
+    Reply,
+    decode,
+    encode,
+)
+from bridge.robot.base import Base, Scanner
+from bridge.robot.controller import Controller
+from bridge.robot.inbox import Inbox
+from bridge.robot.journal import Journal
+from bridge.robot.pages import POSES_KEPT, events_page, poses_page
+from mission import __version__
+from mission.document import Transform
+from mission.events import PoseReport
+from mission.run.orders import Order
+
+if TYPE_CHECKING:
+    from cryptography import x509
+
+STATE_EVERY_S = 1.0
+POSE_EVERY_S = 0.05
+LEAST_POSE_PAUSE_S = 0.02
+"""However fast the simulated clock runs, poses go out at most fifty times a second."""
+
+
+Signed = TypeVar("Signed", Order, Commit)
+Trust = Callable[[Request, str], None]
+"""Raises `Untrusted` unless the request was signed by the commander whose name it bears."""
+
+
+def trusting(authority: x509.Certificate, now: Callable[[], datetime]) -> Trust:
+    """Trust in stations that the site's authority has issued keys to."""
+
+    def trust(request: Request, commander: str) -> None:
+        holder = verified_holder(authority, request.key, request.payload, request.signature, now=now())
+        if holder.role != "station":
+            raise Untrusted(f"{holder.name} is a {holder.role}; only stations give orders")
+        if holder.name != commander:
+            raise Untrusted(f"signed by {holder.name}, not by {commander}")
+
+    return trust
+
+
+class Agent:
+    """One robot on a link."""
+
+    def __init__(
+        self,
+        *,
+        keys: Keys,
+        link: Link,
+        journal: Journal,
+        controller: Controller,
+        base: Base,
+        scanner: Scanner,
+        clock: Clock,
+        command_clock: Clock,
+        speed_up: float = 1.0,
+        trust: Trust | None = None,
+        to_map: Transform | None = None,
+    ) -> None:
+        self._keys = keys
+        self._link = link
+        self._journal = journal
+        self._controller = controller
+        self._base = base
+        self._clock = clock
+        self._command_clock = command_clock
+        self._profiles = scanner.profiles
+        self._pose_pause_s = max(POSE_EVERY_S / speed_up, LEAST_POSE_PAUSE_S)
+        self._inbox = Inbox(journal, controller, scanner.profiles)
+        self._trust = trust
+        self._to_map = to_map
+        self._closing = threading.Event()
+        self._news = threading.Event()
+        self._failed = threading.Event()
+        self._error: Exception | None = None
+        self._threads: list[threading.Thread] = []
+        self._watchers: set[str] = set()
+        self._poses: deque[PoseReport] = deque(maxlen=POSES_KEPT)
+        self._heard_ns = command_clock.now_ns()
+
+    def serve(self) -> None:
+        """Answer on every key."""
+        keys, link = self._keys, self._link
+        link.serve(keys.info, self._info)
+        link.serve(keys.log, self._log)
+        link.serve(keys.poses, self._past_poses, bulk=True)
+        link.serve(keys.mission("*", "**"), self._mission, bulk=True)
+        link.serve(keys.command("*"), self._command)
+        link.watch_presence(keys.watcher("*"), self._watcher)
+
+    def open(self) -> None:
+        """Answer, begin to work and to tell, and announce the robot."""
+        self.serve()
+        keys, link = self._keys, self._link
+        self._tell_state = link.publisher(keys.state)
+        self._tell_event = link.publisher(keys.event)
+        self._tell_pose = link.publisher(keys.pose, bulk=True)
+        self._controller.changed = self._news.set
+        for work in (self._controller.serve, self._tell_news, self._tell_poses):
+            thread = threading.Thread(target=self._watched, args=(work,), name=work.__name__, daemon=True)
+            self._threads.append(thread)
+            thread.start()
+        link.announce(keys.alive)
+
+    def wait(self) -> None:
+        """Wait until the robot's work ends, which it does only by an error; that is raised here.
+
+        A robot whose controller has died must not look alive: its process ends, and the next boot finds
+        the run paused.
+        """
+        self._failed.wait()
+        if self._error is not None:
+            raise self._error
+
+    def _watched(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 (the end of a thread)
+            self._error = error
+            self._failed.set()
+
+    def close(self) -> None:
+        self._controller.close()
+        self._closing.set()
+        self._news.set()
+        for thread in self._threads:
+            thread.join()
+        self._base.stop()
+
+    def _watcher(self, key: str, alive: bool) -> None:
+        self._contact()
+        (self._watchers.add if alive else self._watchers.discard)(key)
+
+    def _contact(self) -> None:
+        self._heard_ns = self._command_clock.now_ns()
+
+    def _silent_s(self) -> float:
+        """How long no station has watched or asked."""
+        if self._watchers:
+            self._contact()
+        return (self._command_clock.now_ns() - self._heard_ns) / 1e9
+
+    def _mission(self, request: Request) -> bytes:
+        self._contact()
+        if request.key.endswith("/commit"):
+            return self._ordered(request, Commit, self._commit)
+        return encode(self._inbox.receive(request))
+
+    def _commit(self, request: Request, commit: Commit) -> Reply:
+        return self._inbox.receive(request)
+
+    def _ordered(
+        self, request: Request, kind: type[Signed], carry_out: Callable[[Request, Signed], Reply]
+    ) -> bytes:
+        """Carry out what only a commander may order, if it is from the one it says it is from."""
+        try:
+            order = decode(request.payload, kind)
+            if self._trust is not None:
+                self._trust(request, order.commander)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            return encode(Malformed(message=f"{kind.__name__}: {error}"))
+        except Untrusted as error:
+            return encode(Rejected(reason="untrusted", messages=(str(error),)))
+        return encode(carry_out(request, order))
+
+    def _info(self, request: Request) -> bytes:
+        self._contact()
+        info = Info(
+            protocol=VERSION,
+            stopgo=__version__,
+            robot=self._keys.robot,
+            boot_id=self._controller.boot_id,
+            clock_ns=self._command_clock.now_ns(),
+            state=self._controller.report(),
+            lease=self._controller.lease,
+            chunk_bytes=CHUNK_BYTES,
+            document_bytes=MAX_DOCUMENT_BYTES,
+            profiles=self._profiles,
+            to_map=self._to_map,
+        )
+        return encode(info)
+
+    def _command(self, request: Request) -> bytes:
+        self._contact()
+        return self._ordered(request, Order, self._obey)
+
+    def _obey(self, request: Request, order: Order) -> Reply:
+        if not request.key.endswith(f"/cmd/{order.verb}"):
+            return Malformed(message=f"command {order.verb} on {request.key}")
+        return self._controller.obey(order)
+
+    def _log(self, request: Request) -> bytes:
+        self._contact()
+        return encode(events_page(self._journal, request))
+
+    def _past_poses(self, request: Request) -> bytes:
+        self._contact()
+        # A copy: meanwhile the robot goes on writing.
+        return encode(poses_page(self._poses.copy(), self._controller.boot_id, request))
+
+    def _tell_news(self) -> None:
+        """State on every change and every second; each event once, in order."""
+        told = self._journal.newest
+        while not self._closing.is_set():
+            self._news.wait(STATE_EVERY_S)
+            self._news.clear()
+            self._controller.hear_of_link(self._silent_s())
+            for event in self._journal.events(since=told):
+                self._tell_event(encode(event))
+                told = event.number
+            self._tell_state(encode(self._controller.report()))
+
+    def _tell_poses(self) -> None:
+        seq = 0
+        while not self._closing.wait(self._pose_pause_s):
+            seq += 1
+            report = self._pose_report(seq)
+            self._poses.append(report)
+            self._tell_pose(encode(report))
+
+    def _pose_report(self, seq: int) -> PoseReport:
+        run, now_ns = self._controller.run, self._clock.now_ns()
+        return PoseReport(
+            robot=self._keys.robot, boot_id=self._controller.boot_id, seq=seq, robot_ns=now_ns,
+            run_id=run.run_id,
+            mission_time_s=(now_ns - run.started_ns) / 1e9 if run.run_id else None,
+            pose=self._base.pose(), speed=self._base.speed(),
+        )  # fmt: skip
+
+
+@contextmanager
+def on_link(agent: Agent) -> Iterator[Agent]:
+    """The agent at work, until the block ends."""
+    agent.open()
+    try:
+        yield agent
+    finally:
+        agent.close()

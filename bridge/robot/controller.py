@@ -1,0 +1,470 @@
+"""Drives a mission stop by stop: every step is stored before it is taken, so that a crash repeats none.
+
+Each stop goes WAITING, NAVIGATING, SETTLING, SCANNING, VERIFYING, DONE; `run` says what each outcome leads
+to, `commands` what each order does. This module is where they meet the robot, the journal and the clock.
+"""
+
+from __future__ import annotations
+
+import math
+import sqlite3
+import threading
+import uuid
+from collections.abc import Callable
+
+import msgspec
+
+from bridge.link.clock import Clock
+from bridge.link.protocol import Commit, Rejected
+from bridge.robot.answers import answer_to, answered, remember_answer
+from bridge.robot.base import Base, Rest, Scanner
+from bridge.robot.journal import Journal
+from mission.document import Mission
+from mission.events import Pose, StateReport
+from mission.run import revision, way
+from mission.run import states as runs
+from mission.run.battery import what_is_missing
+from mission.run.decision import Decision, Situation, decide, handed_over
+from mission.run.lease import Lease, claimed, lasting_ns
+from mission.run.orders import Answer, Order, Refused
+from mission.run.revision import RevisionPolicy
+from mission.run.states import Change, Run
+
+SETTLE_SAMPLE_S = 0.1
+SETTLE_LIMIT_S = 30.0
+"""How much longer than `settle_s` a robot may take to stand still."""
+
+
+class Controller:
+    """The robot's run, its journal, and the base and scanner that carry it out.
+
+    `step` does one piece of work; `serve` calls it until `close`. Orders come from other threads: they
+    change the run under the lock and interrupt the piece of work that no longer belongs to it.
+    """
+
+    def __init__(
+        self,
+        *,
+        robot: str,
+        journal: Journal,
+        base: Base,
+        scanner: Scanner,
+        clock: Clock,
+        command_clock: Clock | None = None,
+        mission_taken: Callable[[Mission], None] = lambda mission: None,
+        revisions: RevisionPolicy = "next-stop",
+    ) -> None:
+        self.robot = robot
+        self.boot_id = uuid.uuid4().hex[:12]
+        self.changed: Callable[[], None] = lambda: None
+        """Called after every stored change."""
+        self._journal = journal
+        self._base = base
+        self._scanner = scanner
+        self._clock = clock
+        self._command_clock = command_clock or clock
+        self._mission_taken = mission_taken
+        self._revisions = revisions
+        self._lock = threading.RLock()
+        self._interrupt = threading.Event()
+        self._wake = threading.Event()
+        self._closing = False
+        self._silent_s = 0.0
+        self._seq = 0
+        self._mission: Mission | None = None
+        self._run = Run()
+        self._recover()
+
+    @property
+    def run(self) -> Run:
+        return self._run
+
+    @property
+    def lease(self) -> Lease | None:
+        """Who commands the robot, or was the last to."""
+        return self._journal.fact("lease", Lease)
+
+    def _recover(self) -> None:
+        """Stand still, and wait where the journal says the run was."""
+        self._base.stop()
+        self._mend_lease()
+        kept = self._journal.fact("run", Run)
+        if kept is None:
+            return
+        self._run = kept
+        self._hold(self._stored(kept.mission_id, kept.revision))
+        change = runs.rebooted(kept)
+        if change.events:
+            self._keep(change)
+
+    def _mend_lease(self) -> None:
+        """A lease from a time when the date was far ahead would last until then."""
+        lease = self.lease
+        until_ns = self._command_clock.now_ns() + lasting_ns()
+        if lease is not None and lease.until_ns > until_ns:
+            self._store_lease(msgspec.structs.replace(lease, until_ns=until_ns))
+
+    def _hold(self, mission: Mission | None) -> None:
+        self._mission = mission
+        if mission is not None:
+            self._mission_taken(mission)
+
+    def _stored(self, mission_id: str | None, revision: int | None) -> Mission | None:
+        held = None if mission_id is None else self._journal.mission(mission_id, revision or 0)
+        return None if held is None else msgspec.json.decode(held[1], type=Mission)
+
+    # Orders and missions, from the link's threads
+
+    def obey(self, order: Order) -> Answer:
+        """Carry out an order once, however often it comes, and remember what was answered."""
+        with self._lock:
+            before = answered(self._journal, order, self._run)
+            if before is not None:
+                return before
+            decision = decide(order, self._situation())
+            answer = self._answer(order, decision)
+            try:
+                run = self._store_decision(order, decision, answer)
+            except sqlite3.OperationalError as error:
+                return self._answer(order, self._halt_unstored(error))
+            if isinstance(decision, Decision):
+                self._adopt(run, ordered=True)
+            return answer
+
+    def _store_decision(self, order: Order, decision: Decision | Refused, answer: Answer) -> Run:
+        run = self._run
+        with self._journal.transaction():
+            if isinstance(decision, Decision):
+                run = self._write(decision.change)
+                self._store_lease(decision.lease)
+            remember_answer(self._journal, order, answer)
+        return run
+
+    def _store_lease(self, lease: Lease | None) -> None:
+        if lease is not None:
+            self._journal.store_fact("lease", lease)
+
+    def _situation(self) -> Situation:
+        mission = self._mission
+        return Situation(
+            run=self._run,
+            mission=mission,
+            has_run=mission is not None and self._journal.has_run(mission.id, mission.revision),
+            pose=self._base.pose(),
+            now_ns=self._clock.now_ns(),
+            command_ns=self._command_clock.now_ns(),
+            new_run_id=uuid.uuid4().hex[:12],
+            lease=self.lease,
+            battery=self._base.battery(),
+            endurance_s=self._base.endurance_s(),
+            not_ready=self._base.not_ready(),
+        )
+
+    def _answer(self, order: Order, decision: Decision | Refused) -> Answer:
+        refused = decision if isinstance(decision, Refused) else None
+        run = decision.change.run if isinstance(decision, Decision) else self._run
+        return answer_to(order, refused, run)
+
+    def take(self, commit: Commit, mission: Mission) -> Rejected | None:
+        """Store a whole mission and make it the one to be run, or to be followed from the next stop on."""
+        with self._lock:
+            before = self.lease
+            lease = claimed(
+                before, commit.commander,
+                fence=commit.fence, take_over=commit.take_over, now_ns=self._command_clock.now_ns(),
+            )  # fmt: skip
+            if isinstance(lease, Refused):
+                return Rejected(reason=lease.reason, messages=(lease.message,))
+            known = self._follows(mission)
+            refused = self._out_of_time(commit, known) or (None if known else self._unfit(mission))
+            if refused:
+                return Rejected(reason=refused.reason, messages=(refused.message,))
+            change = Change(self._run) if known else self._taking(mission)
+            with self._journal.transaction():
+                self._journal.keep_transfer(commit.manifest)
+                self._journal.store_nonce(commit.nonce, mission.digest)
+                self._store_lease(lease)
+                run = self._write(Change(change.run, (*handed_over(before, lease), *change.events)))
+            if not known and run.over:
+                self._hold(mission)
+            if not known:
+                self._adopt(run, ordered=run.over)
+        return None
+
+    def waits(self, mission: Mission) -> bool:
+        """Whether the mission is to be followed from the next stop on."""
+        run = self._run
+        return (run.mission_id, run.next_revision) == (mission.id, mission.revision)
+
+    def _follows(self, mission: Mission) -> bool:
+        """Whether this is the mission to be run already, now or from the next stop on."""
+        run = self._run
+        return run.mission_id == mission.id and mission.revision in (run.revision, run.next_revision)
+
+    def _taking(self, mission: Mission) -> Change:
+        run = self._run
+        return Change(runs.installed(run, mission)) if run.over else revision.waits(run, mission)
+
+    def _out_of_time(self, commit: Commit, known: bool) -> Refused | None:
+        """Why a commit comes too late, or once more."""
+        if self._command_clock.now_ns() > commit.not_after_ns:
+            return Refused("expired", "the commit is older than it allows; push again")
+        if not known and self._journal.nonce(commit.nonce) is not None:
+            return Refused("replayed", "this commit was taken before, and another mission since; push again")
+        return None
+
+    def _unfit(self, mission: Mission) -> Refused | None:
+        """Why a mission cannot be taken: by this base, during the present run, or with this battery."""
+        unfit = self._base.unfit(mission)
+        if unfit:
+            return Refused("infeasible", unfit)
+        run, held = self._run, self._mission
+        if run.over or held is None:
+            return self._too_long(mission, first=0)
+        return self._unfit_now(run, held, mission) or self._too_long(mission, first=run.at)
+
+    def _unfit_now(self, run: Run, held: Mission, mission: Mission) -> Refused | None:
+        """Why the run cannot go on by `mission` from the next stop on."""
+        if mission.id != held.id:
+            return Refused("running", f"the robot is {run.state} with mission {held.id}")
+        if self._revisions == "refuse":
+            return Refused("running", f"the robot is {run.state} and takes no revision during a run")
+        if run.homing and run.then != "PAUSED":
+            return Refused("running", "the robot is on its way home for good")
+        differs = revision.what_differs(run, held, mission)
+        return Refused("way_differs", f"revision {mission.revision}: {differs}") if differs else None
+
+    def _too_long(self, mission: Mission, *, first: int) -> Refused | None:
+        battery, endurance_s = self._base.battery(), self._base.endurance_s()
+        missing = what_is_missing(mission, battery=battery, endurance_s=endurance_s, first=first)
+        return Refused("infeasible", missing) if missing else None
+
+    def hear_of_link(self, silent_s: float) -> None:
+        """Told how long no station has been heard; the mission's policy may want something of it."""
+        with self._lock:
+            self._silent_s = silent_s
+            run, mission = self._run, self._mission
+            if mission is None or not self._link_is_lost(mission) or run.state != "RUNNING":
+                return
+            at_once = mission.policy.link_loss in ("hold", "home")
+            if at_once and run.stop_state in ("WAITING", "NAVIGATING", "SETTLING"):
+                change = runs.link_lost(run, mission, silent_s)
+                self._adopt(self._write(change), ordered=True)
+
+    def _link_is_lost(self, mission: Mission) -> bool:
+        """Whether it is, and matters."""
+        policy = mission.policy
+        return policy.link_loss != "continue" and self._silent_s >= policy.link_loss_after_s
+
+    # The work, in the controller's own thread
+
+    def serve(self) -> None:
+        """Work until closed."""
+        while not self._closing:
+            self._wake.clear()
+            try:
+                worked = self.step()
+            except sqlite3.OperationalError as error:
+                self._halt_unstored(error)
+                worked = False
+            if not worked:
+                self._wake.wait()
+
+    def close(self) -> None:
+        """Stop where the robot is; the next boot finds the run as it was."""
+        with self._lock:
+            self._closing = True
+            self._interrupt.set()
+            self._wake.set()
+
+    def step(self) -> bool:
+        """The next piece of work; false if there is none."""
+        with self._lock:
+            run, mission = self._run, self._mission
+            if self._closing or mission is None or not has_work(run):
+                return False
+            self._interrupt.clear()
+        if run.state == "HOMING":
+            self._drive_home(run, mission)
+        else:
+            WORK[run.stop_state](self, run, mission)
+        return True
+
+    def _leave(self, run: Run, mission: Mission) -> None:
+        battery, silent_s = self._base.battery(), self._silent_s
+        if self._link_is_lost(mission):
+            self._advance(run, lambda now: runs.link_lost(now, mission, silent_s))
+        elif battery < mission.policy.battery_min:
+            reason = f"battery at {battery:.0%}, below {mission.policy.battery_min:.0%}"
+            self._advance(run, lambda now: runs.sent_home(now, mission, then="PAUSED", reason=reason))
+        else:
+            self._advance(run, runs.leaving)
+
+    def _navigate(self, run: Run, mission: Mission) -> None:
+        """Drive what is left of the leg, or the correction to the stop."""
+        stop, pose = mission.stops[run.at], self._base.pose()
+        at_stop = run.leg > run.at
+        path = ((stop.x, stop.y),) if at_stop else way.forward(mission.stops[run.leg].approach, pose)
+        outcome = "arrived"
+        if not (at_stop and runs.deviation(pose, stop) <= stop.tolerance_m):
+            heading = stop.heading if run.leg >= run.at else None
+            outcome = self._base.goto(path, heading=heading, limits=mission.robot, interrupt=self._interrupt)
+        here = self._base.pose()
+        if outcome == "blocked":
+            reason = self._blocked(f"the way to {stop.id}", here)
+            self._advance(run, lambda now: runs.held(now, reason))
+        elif outcome == "arrived":
+            self._advance(run, lambda now: runs.reached(now, mission, here, runs.deviation(here, stop)))
+
+    def _settle(self, run: Run, mission: Mission) -> None:
+        stop = mission.stops[run.at]
+        still = self._stands_still(stop.settle_s)
+        if still is None:
+            return
+        if not still:
+            reason = f"not still within {stop.settle_s + SETTLE_LIMIT_S:g} s"
+            self._advance(run, lambda now: runs.failed(now, mission, reason))
+            return
+        here = self._base.pose()
+        self._advance(run, lambda now: runs.settled(now, mission, here, runs.deviation(here, stop)))
+
+    def _stands_still(self, settle_s: float) -> bool | None:
+        """Whether the robot came to a stand for `settle_s`; `None` if interrupted."""
+        waited, still_for, resting = 0.0, 0.0, self._base.pose()
+        while still_for < settle_s:
+            if waited > settle_s + SETTLE_LIMIT_S:
+                return False
+            pause = min(SETTLE_SAMPLE_S, settle_s - still_for)
+            if self._clock.wait(pause, self._interrupt):
+                return None
+            waited, still_for, pose = waited + pause, still_for + pause, self._base.pose()
+            if moved(resting, pose, self._base.rest()):
+                still_for, resting = 0.0, pose
+        return True
+
+    def _scan(self, run: Run, mission: Mission) -> None:
+        stop = mission.stops[run.at]
+        label = f"{run.run_id}-{stop.id}-{run.attempt + 1}"
+        result = self._scanner.scan(label, stop.scan, interrupt=self._interrupt)
+        self._advance(run, lambda now: runs.scan_ended(now, mission, result))
+
+    def _verify(self, run: Run, mission: Mission) -> None:
+        here = self._base.pose()
+        self._advance(run, lambda now: runs.verified(now, mission, here))
+
+    def _drive_home(self, run: Run, mission: Mission) -> None:
+        legs, pose = way.legs_of(mission), self._base.pose()
+        returning = run.leg == len(mission.stops)
+        leg = legs[run.leg]
+        path = way.forward(leg, pose) if returning else way.backward(leg, pose)
+        outcome = self._base.goto(path, heading=None, limits=mission.robot, interrupt=self._interrupt)
+        if outcome == "blocked":
+            here = self._base.pose()
+            reason = self._blocked("the way home", here)
+            self._advance(run, lambda now: runs.held(now, reason))
+        elif outcome == "arrived":
+            self._advance(run, lambda now: runs.came_home_by(now, mission))
+
+    def _blocked(self, way: str, here: Pose) -> str:
+        why = self._base.blocked_by()
+        return f"{way} is blocked at ({here.x:.2f}, {here.y:.2f})" + (f": {why}" if why else "")
+
+    # Storing
+
+    def _advance(self, run: Run, move: Callable[[Run], Change]) -> None:
+        """Store what the work led to, unless an order has meanwhile made it meaningless."""
+        with self._lock:
+            if self._closing or not same_work(run, self._run):
+                return
+            self._keep(move(self._run))
+
+    def _keep(self, change: Change) -> None:
+        self._adopt(self._write(change))
+
+    def _write(self, change: Change) -> Run:
+        """Store the change, and the one to a revision that waited for it; the run that is then."""
+        change = revision.dropped(change)
+        run = change.run
+        with self._journal.transaction():
+            self._put(change)
+            if run.next_revision is None or run.at <= self._run.at:
+                return run
+            mission = self._stored(run.mission_id, run.next_revision)
+            assert mission is not None
+            revised = revision.taken(run, mission)
+            self._put(revised)
+        return revised.run
+
+    def _put(self, change: Change) -> None:
+        now_ns = self._clock.now_ns()
+        with self._journal.transaction():
+            self._journal.store_fact("run", change.run)
+            for event in runs.told_of(change, robot=self.robot, boot_id=self.boot_id, now_ns=now_ns):
+                self._journal.append(event)
+
+    def _adopt(self, run: Run, *, ordered: bool = False) -> None:
+        """What is stored is now what is; an order interrupts the work, except a scan that may end."""
+        self._run = run
+        held = self._mission
+        if (run.mission_id, run.revision) != (held and held.id, held and held.revision):
+            self._hold(self._stored(run.mission_id, run.revision))
+        if ordered and run.stop_state != "SCANNING":
+            self._interrupt.set()
+        self._wake.set()
+        self.changed()
+
+    def _halt_unstored(self, error: sqlite3.OperationalError) -> Refused:
+        """Stand still, for what cannot be stored must not be done; held until the journal takes it again."""
+        reason = f"the journal cannot be written: {error}"
+        with self._lock:
+            self._base.stop()
+            if not self._run.over:
+                self._adopt(runs.held(self._run, reason).run, ordered=True)
+        return Refused("storage", reason)
+
+    # What others may know
+
+    def report(self) -> StateReport:
+        with self._lock:
+            self._seq += 1
+            run, stop = self._run, runs.stop_of(self._run, self._mission)
+            return StateReport(
+                robot=self.robot, boot_id=self.boot_id, seq=self._seq, robot_ns=self._clock.now_ns(),
+                state=run.state, run_id=run.run_id, mission_id=run.mission_id, revision=run.revision,
+                stop=stop.id if stop else None, stop_state=run.stop_state if stop else None,
+                done=run.done, skipped=run.skipped, battery=self._base.battery(),
+                last_event=self._journal.newest, next_revision=run.next_revision,
+            )  # fmt: skip
+
+
+WORK: dict[str, Callable[[Controller, Run, Mission], None]] = {
+    "WAITING": Controller._leave,
+    "NAVIGATING": Controller._navigate,
+    "SETTLING": Controller._settle,
+    "SCANNING": Controller._scan,
+    "VERIFYING": Controller._verify,
+}
+
+
+def has_work(run: Run) -> bool:
+    """A paused robot still ends the scan it was in."""
+    if run.state == "PAUSED":
+        return run.stop_state in ("SCANNING", "VERIFYING")
+    return run.state in ("RUNNING", "HOMING")
+
+
+def same_work(then: Run, now: Run) -> bool:
+    """Whether what was begun in `then` still counts: nothing has changed, or the same scan goes on."""
+    if now is then:
+        return True
+    if now.next_revision != then.next_revision:  # a revision that waits changes nothing of the present work
+        return runs.changed(now, next_revision=then.next_revision) == then
+    scanning = then.stop_state == now.stop_state == "SCANNING"
+    return scanning and (then.run_id, then.at, then.attempt) == (now.run_id, now.at, now.attempt)
+
+
+def moved(before: Pose, after: Pose, rest: Rest) -> bool:
+    """Whether the robot moved by more than one that stands still seems to."""
+    if math.hypot(after.x - before.x, after.y - before.y) > rest.metres:
+        return True
+    return abs(math.remainder(after.heading - before.heading, math.tau)) > rest.radians

@@ -1,0 +1,178 @@
+"""Where a mission arrives on the robot: announced, in pieces, and then taken whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import sqlite3
+from collections.abc import Iterator
+from itertools import islice
+
+import msgspec
+
+from bridge.link.link import Request
+from bridge.link.protocol import (
+    MAX_CHUNK_BYTES,
+    MAX_DOCUMENT_BYTES,
+    Accepted,
+    ChunkHeld,
+    Commit,
+    Malformed,
+    Manifest,
+    Ready,
+    Rejected,
+    Reply,
+    count_of,
+    decode,
+)
+from bridge.robot.controller import Controller
+from bridge.robot.journal import Journal
+from bridge.robot.pages import address_of, mission_part
+from mission.document import Mission, digest_of
+from mission.problems import problems_of
+from mission.run.orders import Reason
+
+MOST_REASONS = 20
+"""Reasons told of one mission that cannot be run."""
+
+
+class Inbox:
+    """Receives missions for one controller."""
+
+    def __init__(self, journal: Journal, controller: Controller, profiles: tuple[str, ...] | None) -> None:
+        self._journal = journal
+        self._controller = controller
+        self._profiles = profiles
+
+    def receive(self, request: Request) -> Reply:
+        """Answer one question on `…/mission/<id>/<step>`."""
+        mission_id, step = address_of(request.key)
+        try:
+            return self._step(mission_id, step, request)
+        except (msgspec.DecodeError, ValueError) as error:
+            return Malformed(message=f"{'/'.join(step)}: {error}")
+        except sqlite3.OperationalError as error:
+            return _no("storage", f"the journal cannot be written: {error}")
+
+    def _step(self, mission_id: str, step: list[str], request: Request) -> Reply:
+        match step:
+            case ["begin"]:
+                return self._begin(mission_id, decode(request.payload, Manifest))
+            case ["chunk", number]:
+                return self._chunk(mission_id, count_of(number), request)
+            case ["commit"]:
+                return self._commit(mission_id, decode(request.payload, Commit))
+            case ["part", number]:
+                revision = count_of(request.parameters.get("revision", ""))
+                return mission_part(self._journal, mission_id, count_of(number), revision)
+        return Malformed(message=f"no such step: {'/'.join(step)}")
+
+    def _begin(self, mission_id: str, manifest: Manifest) -> Reply:
+        refusal = self._unwelcome(mission_id, manifest)
+        if refusal:
+            return refusal
+        if self._holds(manifest):
+            return Ready(held=tuple(range(manifest.chunks)))
+        if self._journal.transfer(mission_id) != manifest:
+            self._journal.begin_transfer(manifest)
+        return Ready(held=self._journal.chunks_held(manifest.sha256))
+
+    def _unwelcome(self, mission_id: str, manifest: Manifest) -> Rejected | None:
+        if manifest.mission_id != mission_id:
+            return _no("wrong_mission", f"the manifest is for mission {manifest.mission_id}")
+        if not 0 < manifest.size <= MAX_DOCUMENT_BYTES:
+            return _no("too_large", f"{manifest.size} bytes; 1 to {MAX_DOCUMENT_BYTES} are taken")
+        if not 1024 <= manifest.chunk_bytes <= MAX_CHUNK_BYTES:
+            return _no(
+                "too_large", f"chunks of {manifest.chunk_bytes} bytes; 1024 to {MAX_CHUNK_BYTES} are taken"
+            )
+        held = self._journal.newest_revision(mission_id)
+        if held is None or held.revision < manifest.revision or self._holds(manifest):
+            return None
+        if held.revision > manifest.revision:
+            return _no(
+                "older_revision", f"the robot holds revision {held.revision}, newer than {manifest.revision}"
+            )
+        return _no(
+            "revision_taken",
+            f"the robot holds revision {held.revision} with digest {held.digest[:12]},"
+            f" not {manifest.digest[:12]}; push the change as revision {held.revision + 1}",
+        )
+
+    def _holds(self, manifest: Manifest) -> bool:
+        """Whether this very mission is stored; its bytes may have been written with other spaces."""
+        stored = self._journal.mission(manifest.mission_id, manifest.revision)
+        return stored is not None and stored[0].digest == manifest.digest
+
+    def _chunk(self, mission_id: str, number: int, request: Request) -> Reply:
+        manifest = self._journal.transfer(mission_id)
+        if manifest is None or request.parameters.get("of") != manifest.sha256:
+            return _no("incomplete", "no such transfer is under way; begin it again")
+        if number >= manifest.chunks:
+            return _no("incomplete", f"chunk {number}: there are {manifest.chunks}")
+        last = manifest.size - manifest.chunk_bytes * (manifest.chunks - 1)
+        expected = last if number == manifest.chunks - 1 else manifest.chunk_bytes
+        if len(request.payload) != expected:
+            return _no("incomplete", f"chunk {number} has {len(request.payload)} bytes, not {expected}")
+        self._journal.store_chunk(manifest.sha256, number, request.payload)
+        return ChunkHeld(index=number, sha256=hashlib.sha256(request.payload).hexdigest())
+
+    def _commit(self, mission_id: str, commit: Commit) -> Reply:
+        manifest = commit.manifest
+        refusal = self._unwelcome(mission_id, manifest)
+        if refusal:
+            return refusal
+        already = self._holds(manifest)
+        mission = self._stored(manifest) if already else self._received(manifest)
+        if isinstance(mission, Rejected):
+            return mission
+        refusal = self._controller.take(commit, mission)
+        return refusal or Accepted(
+            mission_id=mission.id, revision=mission.revision, digest=mission.digest,
+            already=already, waits=self._controller.waits(mission),
+        )  # fmt: skip
+
+    def _stored(self, manifest: Manifest) -> Mission | Rejected:
+        stored = self._journal.mission(manifest.mission_id, manifest.revision)
+        assert stored is not None
+        return self._read(stored[1], manifest)
+
+    def _received(self, manifest: Manifest) -> Mission | Rejected:
+        """The mission that has arrived in chunks, if they are all there and give the right hash."""
+        document = self._journal.chunks(manifest.sha256)
+        if len(document) != manifest.size:
+            return _no("incomplete", f"{len(document)} of {manifest.size} bytes have arrived")
+        if hashlib.sha256(document).hexdigest() != manifest.sha256:
+            self._journal.end_transfer(manifest)
+            return _no("digest", "what arrived has another sha256 than the manifest; push it again")
+        return self._read(document, manifest)
+
+    def _read(self, document: bytes, manifest: Manifest) -> Mission | Rejected:
+        # Not mission_json.parse: a tenth of its time, and what it refuses besides (keys given twice) the
+        # digest shows, which is of what was read.
+        try:
+            mission = msgspec.json.decode(document, type=Mission)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            return _no("malformed", f"the document: {error}")
+        except RecursionError:
+            return _no("malformed", "the document is nested too deeply")
+        if digest_of(mission) != mission.digest:
+            return _no("digest", "the document does not have the digest it claims")
+        if (mission.id, mission.revision, mission.digest) != (
+            manifest.mission_id, manifest.revision, manifest.digest,
+        ):  # fmt: skip
+            return _no("digest", "the document's id, revision or digest is not the manifest's")
+        wrong = tuple(islice(what_is_wrong(mission, self._profiles), MOST_REASONS))
+        return Rejected(reason="infeasible", messages=wrong) if wrong else mission
+
+
+def what_is_wrong(mission: Mission, profiles: tuple[str, ...] | None) -> Iterator[str]:
+    """Why this robot cannot run the mission; nothing if it can."""
+    yield from map(str, problems_of(mission))
+    for stop in mission.stops:
+        if profiles is not None and stop.scan.profile not in profiles:
+            known = ", ".join(profiles)
+            yield f"stop {stop.id}: scan profile {stop.scan.profile!r} is unknown; known: {known}"
+
+
+def _no(reason: Reason, message: str) -> Rejected:
+    return Rejected(reason=reason, messages=(message,))

@@ -1,0 +1,320 @@
+"""The robot's memory: what happened, what was ordered and answered, what it holds and where it stands.
+
+One SQLite file. What belongs together is written in one transaction and is on disk before anybody is told.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import sqlite3
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, TypeVar
+
+import msgspec
+
+from bridge.link.protocol import Manifest
+from mission.errors import InputError
+from mission.events import AnyEvent
+from mission.run.orders import Answer
+
+TABLES = """
+CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS events (
+    number INTEGER PRIMARY KEY AUTOINCREMENT, kind TEXT NOT NULL, run_id TEXT NOT NULL,
+    mission_id TEXT NOT NULL, revision INTEGER NOT NULL, robot_ns INTEGER NOT NULL, body BLOB NOT NULL);
+CREATE INDEX IF NOT EXISTS events_of_run ON events (run_id, number);
+CREATE TABLE IF NOT EXISTS answers (cmd_id TEXT PRIMARY KEY, order_sha TEXT NOT NULL, body BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS missions (
+    mission_id TEXT NOT NULL, revision INTEGER NOT NULL, manifest BLOB NOT NULL, document BLOB NOT NULL,
+    PRIMARY KEY (mission_id, revision));
+CREATE TABLE IF NOT EXISTS nonces (nonce TEXT PRIMARY KEY, digest TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS transfers (mission_id TEXT PRIMARY KEY, manifest BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS chunks (
+    sha256 TEXT NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL, PRIMARY KEY (sha256, number));
+"""
+
+ANSWERS_KEPT = 10_000
+
+S = TypeVar("S", bound=msgspec.Struct)
+
+
+class Journal:
+    """An open journal; every method may be called from any thread."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._connection = connection
+        self._lock = threading.RLock()
+        self.edge: Callable[[str], None] = lambda moment: None
+        """Called just before and just after every commit; where tests let the power or the disk fail."""
+        connection.executescript(TABLES)
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """All that is written inside comes to be, or none of it; nested ones join the outer."""
+        with self._lock:
+            if self._connection.in_transaction:
+                yield
+                return
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self.edge("commit")
+                self._connection.execute("COMMIT")
+            except BaseException:
+                if self._connection.in_transaction:
+                    self._connection.execute("ROLLBACK")
+                raise
+            self.edge("committed")
+
+    def fact(self, name: str, kind: type[S]) -> S | None:
+        rows = self._rows("SELECT value FROM facts WHERE name = ?", name)
+        return msgspec.json.decode(rows[0][0], type=kind) if rows else None
+
+    def store_fact(self, name: str, value: msgspec.Struct) -> None:
+        self._write("INSERT OR REPLACE INTO facts VALUES (?, ?)", name, msgspec.json.encode(value))
+
+    def append(self, event: AnyEvent) -> AnyEvent:
+        """The event with its number, which is the next one."""
+        with self.transaction():
+            number = self.newest + 1
+            numbered = msgspec.structs.replace(event, number=number)
+            self._write(
+                "INSERT INTO events VALUES (?, ?, ?, ?, ?, ?, ?)",
+                *(number, type(event).__name__, event.run_id, event.mission_id, event.revision),
+                *(event.robot_ns, msgspec.json.encode(numbered)),
+            )
+        return numbered
+
+    def events(
+        self, *, since: int = 0, run_id: str | None = None, limit: int = 10**9
+    ) -> tuple[AnyEvent, ...]:
+        """Events with a number above `since`, in order."""
+        rows = self._rows(
+            "SELECT body FROM events WHERE number > ? AND (? IS NULL OR run_id = ?) ORDER BY number LIMIT ?",
+            *(since, run_id, run_id, limit),
+        )
+        decoder = msgspec.json.Decoder(AnyEvent)
+        return tuple(decoder.decode(body) for (body,) in rows)
+
+    @property
+    def newest(self) -> int:
+        """Number of the newest event, 0 if there is none."""
+        return int(self._rows("SELECT COALESCE(MAX(number), 0) FROM events")[0][0])
+
+    @property
+    def newest_ns(self) -> int:
+        """Time of the newest event, 0 if there is none."""
+        return int(self._rows("SELECT COALESCE(MAX(robot_ns), 0) FROM events")[0][0])
+
+    def has_run(self, mission_id: str, revision: int) -> bool:
+        """Whether a run of this mission has begun and ended."""
+        return bool(
+            self._rows(
+                "SELECT 1 FROM events WHERE mission_id = ? AND revision = ?"
+                " AND kind IN ('Finished', 'Aborted') LIMIT 1",
+                *(mission_id, revision),
+            )
+        )
+
+    def last_event(self, run_id: str, kind: str) -> AnyEvent | None:
+        """The newest event of a kind in a run."""
+        statement = "SELECT body FROM events WHERE run_id = ? AND kind = ? ORDER BY number DESC LIMIT 1"
+        rows = self._rows(statement, run_id, kind)
+        return msgspec.json.decode(rows[0][0], type=AnyEvent) if rows else None
+
+    def forget_fact(self, name: str) -> None:
+        self._write("DELETE FROM facts WHERE name = ?", name)
+
+    def answer(self, cmd_id: str) -> tuple[str, Answer] | None:
+        """The stored answer of a command, and the hash of the order it belongs to."""
+        rows = self._rows("SELECT order_sha, body FROM answers WHERE cmd_id = ?", cmd_id)
+        return (rows[0][0], msgspec.json.decode(rows[0][1], type=Answer)) if rows else None
+
+    def store_answer(self, order_sha: str, answer: Answer) -> None:
+        self._write(
+            "INSERT INTO answers VALUES (?, ?, ?)", answer.cmd_id, order_sha, msgspec.json.encode(answer)
+        )
+
+    def forget_answers(self, *, keep: int) -> None:
+        """Drop all but the newest answers; orders that old have long expired and are refused anyway."""
+        self._write("DELETE FROM answers WHERE rowid <= (SELECT MAX(rowid) FROM answers) - ?", keep)
+
+    def mission(self, mission_id: str, revision: int) -> tuple[Manifest, bytes] | None:
+        rows = self._rows(
+            "SELECT manifest, document FROM missions WHERE mission_id = ? AND revision = ?",
+            *(mission_id, revision),
+        )
+        return (msgspec.json.decode(rows[0][0], type=Manifest), bytes(rows[0][1])) if rows else None
+
+    def store_mission(self, manifest: Manifest, document: bytes) -> None:
+        """Keep a mission that came by another way than in pieces."""
+        key = (manifest.mission_id, manifest.revision)
+        encoded = msgspec.json.encode(manifest)
+        self._write("INSERT OR REPLACE INTO missions VALUES (?, ?, ?, ?)", *key, encoded, document)
+
+    def newest_revision(self, mission_id: str) -> Manifest | None:
+        rows = self._rows(
+            "SELECT manifest FROM missions WHERE mission_id = ? ORDER BY revision DESC LIMIT 1", mission_id
+        )
+        return msgspec.json.decode(rows[0][0], type=Manifest) if rows else None
+
+    def keep_transfer(self, manifest: Manifest) -> None:
+        """What has arrived becomes a stored mission, unless it is one already; the transfer is over."""
+        with self.transaction():
+            if self.mission(manifest.mission_id, manifest.revision) is None:
+                self._write(
+                    "INSERT INTO missions VALUES (?, ?, ?, ?)",
+                    *(manifest.mission_id, manifest.revision, msgspec.json.encode(manifest)),
+                    self.chunks(manifest.sha256),
+                )
+            self.end_transfer(manifest)
+
+    def nonce(self, nonce: str) -> str | None:
+        """The digest of the mission that was committed with it before."""
+        rows = self._rows("SELECT digest FROM nonces WHERE nonce = ?", nonce)
+        return str(rows[0][0]) if rows else None
+
+    def store_nonce(self, nonce: str, digest: str) -> None:
+        self._write("INSERT OR IGNORE INTO nonces VALUES (?, ?)", nonce, digest)
+
+    def transfer(self, mission_id: str) -> Manifest | None:
+        """What is being received of this mission."""
+        rows = self._rows("SELECT manifest FROM transfers WHERE mission_id = ?", mission_id)
+        return msgspec.json.decode(rows[0][0], type=Manifest) if rows else None
+
+    def begin_transfer(self, manifest: Manifest) -> None:
+        """Receive this and forget what was being received, but for pieces of the same document and size."""
+        with self.transaction():
+            before = self.transfer(manifest.mission_id)
+            self._write("DELETE FROM transfers")
+            if before is None or _cut(before) != _cut(manifest):
+                self._write("DELETE FROM chunks")
+            self._write(
+                "INSERT INTO transfers VALUES (?, ?)", manifest.mission_id, msgspec.json.encode(manifest)
+            )
+
+    def end_transfer(self, manifest: Manifest) -> None:
+        with self.transaction():
+            self._write("DELETE FROM transfers WHERE mission_id = ?", manifest.mission_id)
+            self._write("DELETE FROM chunks WHERE sha256 = ?", manifest.sha256)
+
+    def store_chunk(self, sha256: str, number: int, data: bytes) -> None:
+        self._write("INSERT OR REPLACE INTO chunks VALUES (?, ?, ?)", sha256, number, data)
+
+    def chunks_held(self, sha256: str) -> tuple[int, ...]:
+        rows = self._rows("SELECT number FROM chunks WHERE sha256 = ? ORDER BY number", sha256)
+        return tuple(number for (number,) in rows)
+
+    def chunks(self, sha256: str) -> bytes:
+        rows = self._rows("SELECT data FROM chunks WHERE sha256 = ? ORDER BY number", sha256)
+        return b"".join(data for (data,) in rows)
+
+    def _rows(self, statement: str, *values: object) -> list[tuple]:
+        with self._lock:
+            return self._connection.execute(statement, values).fetchall()
+
+    def _write(self, statement: str, *values: object) -> None:
+        with self.transaction():
+            self._connection.execute(statement, values)
+
+
+def _cut(manifest: Manifest) -> tuple[str, int]:
+    """Which document is sent, in pieces of which size."""
+    return manifest.sha256, manifest.chunk_bytes
+
+
+class Owner(msgspec.Struct, frozen=True):
+    """Which robot a state directory belongs to."""
+
+    robot: str
+
+
+@contextmanager
+def open_journal(directory: Path, robot: str) -> Iterator[Journal]:
+    """The journal of `robot` in `directory`, which no other process uses meanwhile.
+
+    Raises
+    ------
+    InputError
+        If the directory cannot be used, is in use, or belongs to another robot.
+    """
+    with _lock_file(directory, "lock") as lock:
+        _take(lock.fileno(), directory)
+        os.ftruncate(lock.fileno(), 0)
+        os.pwrite(lock.fileno(), str(os.getpid()).encode(), 0)
+        with _opened(directory, robot) as journal:
+            yield journal
+
+
+@contextmanager
+def shared_journal(directory: Path, robot: str) -> Iterator[Journal]:
+    """The same, while other processes may use it too; only `open_journal` excludes them, and is excluded.
+
+    Whoever writes from what was read does both in one `transaction`.
+    """
+    with _lock_file(directory, "lock") as lock, _lock_file(directory, "opening") as opening:
+        _take(lock.fileno(), directory, fcntl.LOCK_SH)
+        # Two at once cannot make the tables, or change how the file is written.
+        fcntl.flock(opening.fileno(), fcntl.LOCK_EX)
+        with _opened(directory, robot) as journal:
+            fcntl.flock(opening.fileno(), fcntl.LOCK_UN)
+            yield journal
+
+
+def _lock_file(directory: Path, name: str) -> IO[str]:
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        return (directory / name).open("a+")
+    except OSError as error:
+        raise InputError(f"--state {directory}: cannot be used ({error.strerror})") from None
+
+
+@contextmanager
+def _opened(directory: Path, robot: str) -> Iterator[Journal]:
+    path = directory / "journal.sqlite"
+    connection = _connect(path)
+    try:
+        journal = Journal(connection)
+        _claim(journal, directory, robot)
+        yield journal
+    except sqlite3.DatabaseError as error:
+        raise InputError(f"{path}: {error}; is the disk full, read-only or damaged?") from None
+    finally:
+        connection.close()
+
+
+def memory_journal() -> Journal:
+    """A journal that is gone when it is let go."""
+    return Journal(sqlite3.connect(":memory:", isolation_level=None, check_same_thread=False))
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    try:
+        connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = FULL")
+    except sqlite3.DatabaseError as error:
+        raise InputError(f"{path}: {error}; move it away to begin anew") from None
+    return connection
+
+
+def _take(lock: int, directory: Path, how: int = fcntl.LOCK_EX) -> None:
+    try:
+        fcntl.flock(lock, how | fcntl.LOCK_NB)
+    except BlockingIOError:
+        holder = os.pread(lock, 32, 0).decode(errors="replace").strip() or "unknown"
+        raise InputError(
+            f"--state {directory}: in use by another robot process (pid {holder}); give each its own"
+        ) from None
+
+
+def _claim(journal: Journal, directory: Path, robot: str) -> None:
+    owner = journal.fact("owner", Owner)
+    if owner is None:
+        journal.store_fact("owner", Owner(robot))
+    elif owner.robot != robot:
+        raise InputError(f"--state {directory}: belongs to robot {owner.robot}, not {robot}")

@@ -1,0 +1,84 @@
+"""Turns the poses of a robot's own map into the mission's frame, and paths the other way.
+
+A building's drawing and the map a robot has made of it share scale but not origin or direction. Everything
+behind this edge speaks the mission's frame; only the base itself speaks the map's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from threading import Event
+
+from bridge.robot.base import Base, Outcome, Rest
+from mission import turning
+from mission.document import Mission, Point, RobotSpec, Transform
+from mission.events import Pose
+from mission.turning import SAME
+
+
+class OnMap:
+    """A base that is driven in the mission's frame and drives in its own map."""
+
+    def __init__(self, base: Base, own: Transform | None = None) -> None:
+        self._base = base
+        self._own = own
+        self.to_map = own or SAME
+
+    def take(self, mission: Mission) -> None:
+        """Turn as the mission says, unless the robot was told how to turn."""
+        self.to_map = self._own or mission.frame.to_map or SAME
+
+    def pose(self) -> Pose:
+        return turned_back(self._base.pose(), self.to_map)
+
+    def speed(self) -> float:
+        return self._base.speed()
+
+    def battery(self) -> float:
+        return self._base.battery()
+
+    def endurance_s(self) -> float | None:
+        return self._base.endurance_s()
+
+    def rest(self) -> Rest:
+        return self._base.rest()
+
+    def goto(
+        self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
+    ) -> Outcome:
+        points = [turned_point(point, self.to_map) for point in path]
+        onward = None if heading is None else heading + self.to_map.heading
+        return self._base.goto(points, heading=onward, limits=limits, interrupt=interrupt)
+
+    def stop(self) -> None:
+        self._base.stop()
+
+    def unfit(self, mission: Mission) -> str:
+        return self._base.unfit(mission)
+
+    def not_ready(self) -> str:
+        return self._base.not_ready()
+
+    def blocked_by(self) -> str:
+        return self._base.blocked_by()
+
+
+def turned_point(point: Point, to_map: Transform) -> Point:
+    """Site to map: turned by `heading`, then shifted."""
+    return turning.turned(to_map, point)
+
+
+def turned(pose: Pose, to_map: Transform) -> Pose:
+    """A pose of the site on the map."""
+    x, y = turned_point((pose.x, pose.y), to_map)
+    return Pose(x=x, y=y, heading=math.remainder(pose.heading + to_map.heading, math.tau))
+
+
+def turned_back(pose: Pose, to_map: Transform) -> Pose:
+    """A pose of the map in the site's frame; exactly itself where there is nothing to turn."""
+    if to_map == SAME:
+        return pose
+    x, y = turning.turned_back(to_map, (pose.x, pose.y))
+    heading = math.remainder(pose.heading - to_map.heading, math.tau)
+    return Pose(x=x, y=y, heading=heading)

@@ -1,0 +1,64 @@
+"""What is asked for page by page: past events, past poses, and the pieces of a stored mission."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import islice
+
+from bridge.link.link import Request
+from bridge.link.protocol import (
+    CHUNK_BYTES,
+    LOG_PAGE,
+    POSE_PAGE,
+    LogPage,
+    Malformed,
+    MissionPart,
+    PosePage,
+    Rejected,
+    Reply,
+    count_of,
+)
+from bridge.robot.journal import Journal
+from mission.events import PoseReport
+
+POSES_KEPT = 3000
+"""For stations that come late or were cut off."""
+
+
+def events_page(journal: Journal, request: Request) -> Reply:
+    """Events since a number, of one run if the request names it."""
+    try:
+        since = count_of(request.parameters.get("since", "0"))
+    except ValueError as error:
+        return Malformed(message=f"since: {error}")
+    run_id = request.parameters.get("run")
+    return LogPage(events=journal.events(since=since, run_id=run_id, limit=LOG_PAGE), newest=journal.newest)
+
+
+def poses_page(poses: Iterable[PoseReport], boot_id: str, request: Request) -> Reply:
+    """Poses since a number, of one run if the request names it."""
+    try:
+        since = count_of(request.parameters.get("since", "0"))
+    except ValueError as error:
+        return Malformed(message=f"since: {error}")
+    run_id = request.parameters.get("run")
+    later = (pose for pose in poses if pose.seq > since and run_id in (None, pose.run_id))
+    return PosePage(boot_id=boot_id, poses=tuple(islice(later, POSE_PAGE)))
+
+
+def mission_part(journal: Journal, mission_id: str, number: int, revision: int) -> Reply:
+    """A piece of a stored mission."""
+    stored = journal.mission(mission_id, revision)
+    if stored is None:
+        message = f"mission {mission_id} revision {revision} is not on this robot"
+        return Rejected(reason="no_mission", messages=(message,))
+    manifest, document = stored
+    data = document[number * CHUNK_BYTES : (number + 1) * CHUNK_BYTES]
+    return MissionPart(manifest=manifest, index=number, data=data)
+
+
+def address_of(key: str) -> tuple[str, list[str]]:
+    """Mission id and step of `…/mission/<id>/<step…>`."""
+    parts = key.split("/")
+    at = len(parts) - 1 - parts[::-1].index("mission")
+    return parts[at + 1], parts[at + 2 :]

@@ -1,0 +1,294 @@
+"""A robot and a scanner that exist only as numbers, but keep time, drift, and what they did on disk."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+from typing import Literal
+
+import msgspec
+
+from bridge.link.clock import Clock
+from bridge.robot.base import Outcome, Rest
+from bridge.robot.motion import Brake, Motion, along
+from mission.document import Mission, Point, RobotSpec, Scan
+from mission.errors import InputError
+from mission.events import Pose
+from mission.run.scans import ScanFailed, ScanResult
+
+SLICE_S = 0.5
+"""How often a moving robot's place is written down: what a crash can cost."""
+SHAKE_M = 0.005
+ENDURANCE_S = 6 * 3600.0
+POINTS_PER_S = 360_000
+"""What a simulated scanner takes, here and on a simulated vehicle."""
+BYTES_PER_POINT = 16
+
+
+class World(msgspec.Struct, frozen=True, kw_only=True):
+    """What stays as it is when the robot's program dies: where it stands, and its battery."""
+
+    pose: Pose = Pose(x=0.0, y=0.0, heading=0.0)
+    battery: float = 1.0
+    placed: bool = False
+    """Whether somebody said where it stands, or it has driven."""
+
+
+@dataclass(frozen=True)
+class Wear:
+    """What the simulated robot gets wrong and uses up."""
+
+    noise_m: float = 0.004
+    """Standard deviation of where it ends up, each axis; never more than two of them."""
+    noise_rad: float = 0.002
+    battery_per_s: float = 1.0 / ENDURANCE_S
+    """While it drives; 0 for a battery that does not run down."""
+
+
+FaultKind = Literal["slip", "blocked", "shaking", "drain", "scanner", "empty", "crash", "crashed"]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something that goes wrong once, at the n-th drive, scan or journal entry of this process."""
+
+    kind: FaultKind
+    at: int
+    amount: float = 0.0
+
+
+FAULTS: dict[FaultKind, str] = {
+    "slip": "drive N ends AMOUNT metres to the left of where it should",
+    "blocked": "drive N meets an obstacle halfway",
+    "shaking": "after drive N the robot shakes for AMOUNT seconds",
+    "drain": "after drive N the battery is at AMOUNT (0 to 1)",
+    "scanner": "scan N fails",
+    "empty": "scan N holds no points",
+    "crash": "the process dies just before journal entry N is stored",
+    "crashed": "the process dies just after journal entry N is stored",
+}
+
+
+def read_fault(text: str) -> Fault:
+    """A fault from KIND@N or KIND@N=AMOUNT, such as `slip@2=0.2`."""
+    kind, _, rest = text.partition("@")
+    at, _, amount = rest.partition("=")
+    try:
+        return Fault(msgspec.convert(kind, FaultKind), int(at), float(amount or 0.0))
+    except (ValueError, msgspec.ValidationError):
+        kinds = ", ".join(FAULTS)
+        raise InputError(f"--fault {text}: write it KIND@N or KIND@N=AMOUNT, KIND of {kinds}") from None
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What is to go wrong."""
+
+    all: tuple[Fault, ...] = ()
+
+    def due(self, kind: FaultKind, at: int) -> Fault | None:
+        return next((fault for fault in self.all if (fault.kind, fault.at) == (kind, at)), None)
+
+
+NO_FAULTS = Faults()
+
+
+class SimulatedBase:
+    """A differential drive on an empty floor."""
+
+    def __init__(
+        self,
+        *,
+        clock: Clock,
+        keep: Path | None = None,
+        wear: Wear = Wear(),
+        faults: Faults = NO_FAULTS,
+        seed: int = 1,
+    ) -> None:
+        self._clock = clock
+        self._faults = faults
+        self._drives = 0
+        self._shakes_until_ns = 0
+        self._keep = keep
+        self._wear = wear
+        self._chance = random.Random(seed)
+        self._world = read_world(keep)
+        self._began_ns = clock.now_ns()
+        self._motion = Motion(self._world.pose)
+
+    def pose(self) -> Pose:
+        return self._now()[0]
+
+    def speed(self) -> float:
+        return self._now()[1]
+
+    def battery(self) -> float:
+        return self._world.battery
+
+    def endurance_s(self) -> float | None:
+        used = self._wear.battery_per_s
+        return 1.0 / used if used > 0 else None
+
+    def rest(self) -> Rest:
+        return Rest()
+
+    def goto(
+        self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
+    ) -> Outcome:
+        self._drives += 1
+        path, heading = self._missed(path, heading)
+        motion = along(
+            self.pose(), path, heading,
+            speed=limits.speed, turn_rate=limits.turn_rate, acceleration=limits.acceleration,
+        )  # fmt: skip
+        if self._faults.due("blocked", self._drives):
+            self._follow(motion, interrupt, share=0.5)
+            self._brake(limits.acceleration)
+            return "blocked"
+        if not self._follow(motion, interrupt):
+            self._brake(limits.acceleration)
+            return "interrupted"
+        self._stand(motion.at(motion.duration)[0])
+        self._suffer()
+        return "arrived"
+
+    def stop(self) -> None:
+        if self._world.placed:  # to stop is not to say where the robot stands
+            self._stand(self.pose())
+
+    def unfit(self, mission: Mission) -> str:
+        return ""
+
+    def not_ready(self) -> str:
+        return ""
+
+    def blocked_by(self) -> str:
+        return ""
+
+    def stand_at(self, pose: Pose) -> None:
+        """Put the robot there by hand."""
+        self._stand(pose)
+
+    def charge(self) -> None:
+        """Fill the battery."""
+        self._world = msgspec.structs.replace(self._world, battery=1.0)
+
+    def stand_at_start(self, start: Pose) -> None:
+        """Put the robot at a mission's start, if nobody ever said where it stands."""
+        if not self._world.placed:
+            self._stand(start)
+
+    def _missed(self, path: Sequence[Point], heading: float | None) -> tuple[Sequence[Point], float | None]:
+        """Path and heading as they will be driven, a little beside what was asked."""
+        if not path:
+            return path, heading
+        x, y = path[-1]
+        slip = self._faults.due("slip", self._drives)
+        if slip:
+            before = path[-2] if len(path) > 1 else (self.pose().x, self.pose().y)
+            left = math.atan2(y - before[1], x - before[0]) + math.pi / 2
+            x, y = x + slip.amount * math.cos(left), y + slip.amount * math.sin(left)
+        beside = (x + self._error(self._wear.noise_m), y + self._error(self._wear.noise_m))
+        turned = None if heading is None else heading + self._error(self._wear.noise_rad)
+        return (*path[:-1], beside), turned
+
+    def _error(self, deviation: float) -> float:
+        return max(-2 * deviation, min(2 * deviation, self._chance.gauss(0.0, deviation)))
+
+    def _follow(self, motion: Motion, interrupt: Event, *, share: float = 1.0) -> bool:
+        """Let the motion, or its first share, take its time; false if it was interrupted."""
+        self._motion, self._began_ns = motion, self._clock.now_ns()
+        end_ns = self._began_ns + round(motion.duration * share * 1e9)
+        while (left := (end_ns - self._clock.now_ns()) / 1e9) > 0:
+            if self._clock.wait(min(left, SLICE_S), interrupt):
+                return False
+            self._remember(self._now()[0], self._wear.battery_per_s * SLICE_S)
+        return True
+
+    def _brake(self, deceleration: float) -> None:
+        pose, speed = self._now()
+        braking = Motion(pose, (Brake(pose, speed, deceleration),))
+        self._follow(braking, Event())
+        self._stand(braking.at(braking.duration)[0])
+
+    def _suffer(self) -> None:
+        """What befalls the robot once it has arrived."""
+        drain, shaking = self._faults.due("drain", self._drives), self._faults.due("shaking", self._drives)
+        if drain:
+            self._world = msgspec.structs.replace(self._world, battery=drain.amount)
+        if shaking:
+            self._shakes_until_ns = self._clock.now_ns() + round(shaking.amount * 1e9)
+
+    def _stand(self, pose: Pose) -> None:
+        self._motion, self._began_ns = Motion(pose), self._clock.now_ns()
+        self._remember(pose, 0.0)
+
+    def _now(self) -> tuple[Pose, float]:
+        motion, now_ns = self._motion, self._clock.now_ns()
+        pose, speed = motion.at((now_ns - self._began_ns) / 1e9)
+        if now_ns < self._shakes_until_ns:
+            pose = msgspec.structs.replace(pose, x=pose.x + SHAKE_M * math.sin(now_ns / 1e8))
+        return pose, speed
+
+    def _remember(self, pose: Pose, used: float) -> None:
+        battery = max(0.0, self._world.battery - used)
+        self._world = World(pose=pose, battery=battery, placed=True)
+        if self._keep is not None:
+            write_world(self._keep, self._world)
+
+
+class SimulatedScanner:
+    """Takes its time and answers with a file that was never written; `record` counts what it did."""
+
+    profiles: tuple[str, ...] | None = None
+
+    def __init__(self, *, clock: Clock, record: Path | None = None, faults: Faults = NO_FAULTS) -> None:
+        self._clock = clock
+        self._record = record
+        self._faults = faults
+        self._scans = 0
+
+    def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
+        self._scans += 1
+        self._note(f"begin {label}")
+        if self._clock.wait(min(scan.duration_s, scan.timeout_s), interrupt):
+            return ScanFailed(reason="interrupted")
+        if scan.duration_s > scan.timeout_s:
+            return ScanFailed(reason=f"no result within {scan.timeout_s:g} s")
+        if self._faults.due("scanner", self._scans):
+            return ScanFailed(reason="the scanner reported an error")
+        self._note(f"end {label}")
+        empty = self._faults.due("empty", self._scans)
+        points = 0 if empty else round(POINTS_PER_S * max(scan.duration_s, 0.1))
+        digest = hashlib.sha256(label.encode()).hexdigest()
+        return ScanResult(file=f"{label}.e57", size=points * BYTES_PER_POINT, sha256=digest, points=points)
+
+    def _note(self, line: str) -> None:
+        if self._record is not None:
+            with self._record.open("a", encoding="utf-8") as record:
+                record.write(line + "\n")
+
+
+def read_world(keep: Path | None) -> World:
+    if keep is None or not keep.exists():
+        return World()
+    try:
+        return msgspec.json.decode(keep.read_bytes(), type=World)
+    except (OSError, msgspec.DecodeError) as error:
+        raise InputError(
+            f"{keep}: does not say where the simulated robot stands ({error}); "
+            "remove it to start at the mission's start"
+        ) from None
+
+
+def write_world(keep: Path, world: World) -> None:
+    """Replace the file in one step, so that a crash leaves the old or the new."""
+    beside = keep.with_suffix(".new")
+    beside.write_bytes(msgspec.json.encode(world))
+    os.replace(beside, keep)

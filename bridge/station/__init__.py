@@ -1,0 +1,1 @@
+"""The station's end: it pushes a mission, gives orders, and follows a run."""

@@ -1,0 +1,388 @@
+"""This end of the link: pushes a mission, gives orders, asks for the state, and follows a run.
+
+Every request may be sent again with the same effect, so it is, until it is answered or the time is up;
+an answer that never came is reported as unknown, never as failed.
+"""
+
+from __future__ import annotations
+
+import getpass
+import hashlib
+import socket
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from bridge.link.keys import Keys as HeldKeys
+from bridge.link.keys import now_utc, read_keys
+from bridge.link.link import Link
+from bridge.link.protocol import (
+    CHUNK_BYTES,
+    VERSION,
+    Accepted,
+    ChunkHeld,
+    Commit,
+    Info,
+    Keys,
+    Malformed,
+    Manifest,
+    MissionPart,
+    Ready,
+    Rejected,
+    Reply,
+    decode,
+    encode,
+)
+from bridge.station import follow
+from mission.document import Mission, sealed
+from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from mission.events import AnyEvent, StateReport
+from mission.files.mission_json import parse
+from mission.run.orders import FREE_VERBS, LONGEST_VALID_S, Answer, Order, Verb
+
+TRY_S = 1.0
+"""How long one try waits for its answer."""
+BULK_TRY_S = 6.0
+"""The same for pieces of a document: asked again too early, they would fill a slow line with copies."""
+COMMIT_BYTES_PER_S = 1e6
+"""How fast, at least, a robot reads and stores a document."""
+LEAST_S = 0.5
+"""Left for an order itself when finding the robot took nearly all its time."""
+PAUSE_S = 0.05
+"""Between tries: a query just after a reconnect may come back empty at once."""
+GATHER_S = 0.3
+"""Once one robot of a fleet has shown itself, the others get this long."""
+COMMIT_VALID_S = 60.0
+PATIENCE_S = 20.0
+"""How long a push goes on without an answer: on a line that loses much, the link may be opened anew."""
+
+Progress = Callable[[int, int], None]
+"""Called with bytes held by the robot and bytes in all."""
+
+
+@contextmanager
+def connect(
+    endpoint: str,
+    *,
+    robot: str,
+    site: str | None = None,
+    commander: str | None = None,
+    timeout_s: float = 5.0,
+    patience_s: float = PATIENCE_S,
+    insecure: bool = False,
+    keys: Path | None = None,
+) -> Iterator[Station]:
+    """A robot that has been reached at `endpoint`, such as `tcp/127.0.0.1:7447`.
+
+    With `keys`, a folder made by `stopgo keys`, the commander is the one they were issued to.
+
+    Raises
+    ------
+    RobotUnreachable
+        If the robot did not show itself within `timeout_s`; nothing was sent.
+    """
+    from bridge.link.zenoh_link import Guard, connecting
+
+    held = None if keys is None else read_keys(keys, now=now_utc())
+    who = commander or (held.holder.name if held else whoami())
+    if held and who != held.holder.name:
+        raise InputError(f"--as {who}: the keys in {keys} are those of {held.holder.name}")
+    with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
+        station = Station(
+            link, Keys(robot, site), commander=who, timeout_s=timeout_s, patience_s=patience_s, held=held
+        )
+        station.reach(endpoint)
+        yield station
+
+
+def fleet(
+    endpoint: str,
+    *,
+    site: str | None = None,
+    timeout_s: float = 5.0,
+    insecure: bool = False,
+    keys: Path | None = None,
+) -> tuple[StateReport, ...]:
+    """The state of every robot of the site that can be reached through `endpoint`, by name.
+
+    Raises
+    ------
+    RobotUnreachable
+        If not a single robot showed itself within `timeout_s`.
+    """
+    from bridge.link.zenoh_link import Guard, connecting
+
+    held = None if keys is None else read_keys(keys, now=now_utc())
+    with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
+        station = Station(link, Keys.of_every_robot(site), commander=whoami(), timeout_s=timeout_s)
+        station.reach(endpoint)
+        time.sleep(GATHER_S)
+        infos = [decode(reply, Info) for reply in link.ask_all(station.keys.info, timeout_s=TRY_S)]
+    return tuple(sorted((info.state for info in infos), key=lambda state: state.robot))
+
+
+def whoami() -> str:
+    """Who gives orders, unless said otherwise: user@host."""
+    return f"{getpass.getuser()}@{socket.gethostname()}"
+
+
+class Station:
+    """One robot, seen from here."""
+
+    def __init__(
+        self,
+        link: Link,
+        keys: Keys,
+        *,
+        commander: str,
+        timeout_s: float = 5.0,
+        patience_s: float = PATIENCE_S,
+        held: HeldKeys | None = None,
+    ) -> None:
+        self.link = link
+        self.held = held
+        self.keys = keys
+        self.commander = commander
+        self.timeout_s = timeout_s
+        """For a question or an order."""
+        self.patience_s = max(patience_s, timeout_s)
+        """For each piece of a mission."""
+
+    def reach(self, endpoint: str) -> None:
+        """Wait until the robot shows itself: a question sent before comes back empty at once."""
+        seen = threading.Event()
+        self.link.watch_presence(self.keys.alive, lambda key, alive: seen.set() if alive else None)
+        if not seen.wait(self.timeout_s):
+            who = "no robot showed" if self.keys.every else f"robot {self.keys.robot} did not show"
+            raise RobotUnreachable(
+                f"{endpoint}: {who} itself within {self.timeout_s:g} s"
+                f" (key {self.keys.alive}); nothing was sent. Is it running, under this name and site?"
+            )
+
+    def info(self, *, within_s: float | None = None) -> Info:
+        """What the robot says of itself."""
+        within_s = self.timeout_s if within_s is None else within_s
+        reply = self._insist(self.keys.info, b"", within_s)
+        if reply is None:
+            raise OutcomeUnknown(f"{self.keys.robot} did not tell its state within {within_s:.1f} s")
+        info = self._answered(reply, Info, "info")
+        if info.protocol != VERSION:
+            raise InputError(
+                f"robot {info.robot} speaks protocol {info.protocol}, this stopgo {VERSION}; update the older"
+            )
+        return info
+
+    def status(self) -> StateReport:
+        return self.info().state
+
+    def push(
+        self,
+        mission: Mission,
+        *,
+        progress: Progress = lambda held, size: None,
+        take_over: bool = False,
+    ) -> Accepted:
+        """Transfer a mission and see it stored on the robot; only what is missing is sent.
+
+        Raises
+        ------
+        AnswerIsNo
+            If the robot rejects it; it holds what it held before.
+        OutcomeUnknown
+            If the robot stopped answering; pushing again goes on where this ended.
+        """
+        self._may_order("push")
+        # A file may have 0 for 0.0, and the digest of that; the robot reads numbers, and so is told theirs.
+        mission = sealed(mission)
+        document = msgspec.json.encode(mission)
+        manifest = Manifest(
+            mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
+            sha256=hashlib.sha256(document).hexdigest(), chunk_bytes=CHUNK_BYTES,
+        )  # fmt: skip
+        begun = self._step(manifest, "begin", encode(manifest), Ready)
+        self._send_chunks(manifest, document, set(begun.held), progress)
+        info = self.info(within_s=self.patience_s)
+        commit = Commit(
+            manifest=manifest, commander=self.commander, take_over=take_over, nonce=uuid.uuid4().hex,
+            not_after_ns=info.clock_ns + round(max(COMMIT_VALID_S, self.patience_s) * 1e9),
+            fence=info.lease.fence if info.lease else None,
+        )  # fmt: skip
+        accepted = self._step(manifest, "commit", encode(commit), Accepted)
+        self._read_back(manifest)
+        return accepted
+
+    def _send_chunks(self, manifest: Manifest, document: bytes, held: set[int], progress: Progress) -> None:
+        for number in range(manifest.chunks):
+            data = document[number * manifest.chunk_bytes : (number + 1) * manifest.chunk_bytes]
+            if number not in held:
+                got = self._step(manifest, f"chunk/{number}", data, ChunkHeld, of=manifest.sha256)
+                if got.sha256 != hashlib.sha256(data).hexdigest():
+                    raise AnswerIsNo(f"chunk {number} arrived damaged at {self.keys.robot}; push again")
+            progress(min(manifest.size, (number + 1) * manifest.chunk_bytes), manifest.size)
+
+    def _read_back(self, manifest: Manifest) -> None:
+        state = self.info(within_s=self.patience_s).state
+        # The piece beyond the last holds nothing but the manifest, which is soon here on a slow line too.
+        kept = self._part(manifest.mission_id, manifest.revision, manifest.chunks).manifest
+        told = state.mission_id == manifest.mission_id and manifest.revision in (
+            state.revision, state.next_revision,
+        )  # fmt: skip
+        if not told or kept.digest != manifest.digest:
+            raise OutcomeUnknown(
+                f"{self.keys.robot} accepted the mission, but tells of mission {state.mission_id}"
+                f" revision {state.revision}; has somebody else pushed meanwhile?"
+            )
+
+    def mission(self, mission_id: str, revision: int) -> Mission:
+        """The mission as the robot holds it."""
+        parts: list[bytes] = []
+        while True:
+            part = self._part(mission_id, revision, len(parts))
+            parts.append(part.data)
+            if sum(map(len, parts)) >= part.manifest.size or not part.data:
+                break
+        return parse(b"".join(parts), f"mission {mission_id} on {self.keys.robot}")
+
+    def command(self, verb: Verb, **details: Any) -> Answer:
+        """Give an order, once, and return the robot's answer; `details` are fields of `Order`.
+
+        Raises
+        ------
+        AnswerIsNo
+            If the robot refuses.
+        OutcomeUnknown
+            If no answer came: the order may or may not have been carried out.
+        RobotUnreachable
+            If the robot did not even tell its state: the order was not sent.
+        """
+        self._may_order(verb)
+        deadline = time.monotonic() + self.timeout_s
+        try:
+            order = self.order(verb, **details)
+        except OutcomeUnknown as error:
+            raise RobotUnreachable(f"{error}; {verb} was not sent") from None
+        return self.give(order, within_s=max(LEAST_S, deadline - time.monotonic()))
+
+    def _may_order(self, what: str) -> None:
+        """Viewers are told here; the robot would not even answer them."""
+        if self.held is not None and self.held.holder.role != "station":
+            holder = self.held.holder
+            raise AnswerIsNo(f"{what}: {holder.name} is a {holder.role}, and only stations give orders")
+
+    def give(self, order: Order, *, within_s: float | None = None) -> Answer:
+        """Give an order that was written before; given again it is still carried out once."""
+        within_s = self.timeout_s if within_s is None else within_s
+        reply = self._insist(self.keys.command(order.verb), encode(order), within_s)
+        answer = self._answered(reply, Answer, order.verb)
+        if answer.outcome == "refused":
+            why = f"{answer.reason}: {answer.message}"
+            raise AnswerIsNo(f"{self.keys.robot} refused {order.verb}: {why}", reason=answer.reason)
+        return answer
+
+    def order(self, verb: Verb, **details: Any) -> Order:
+        """An order for the robot as it is just now: late, it meets another state and is refused."""
+        info = self.info()
+        state, cautious = info.state, verb not in FREE_VERBS
+        meant: dict[str, Any] = {
+            "commander": self.commander,
+            "valid_for_s": min(self.timeout_s, LONGEST_VALID_S),
+            "run_id": None if verb == "start" else state.run_id,
+            "mission_id": state.mission_id,
+            # A pause is meant for the run, also if it has just gone on by a new revision.
+            "revision": state.revision if cautious else None,
+            "expect_state": (state.state,) if cautious else None,
+            "fence": info.lease.fence if info.lease and cautious else None,
+            "stop": state.stop if verb in ("skip", "retry") else None,
+        }
+        given = {key: value for key, value in details.items() if value is not None}
+        return Order(cmd_id=uuid.uuid4().hex, verb=verb, issued_ns=info.clock_ns, **(meant | given))
+
+    def log(self, *, since: int = 0, run_id: str | None = None) -> tuple[AnyEvent, ...]:
+        """All events of the journal above number `since`, of one run if given."""
+        told: list[AnyEvent] = []
+        while True:
+            page = follow.log_page(self.link, self.keys, since=since, run_id=run_id, timeout_s=self.timeout_s)
+            if page is None:
+                raise OutcomeUnknown(f"{self.keys.robot} stopped answering; its log was not read to the end")
+            told += page.events
+            if not page.events:
+                return tuple(told)
+            since = page.events[-1].number
+
+    def reports(self) -> Iterator[follow.Report]:
+        """States, poses and events of the robot's run as they come, gaps filled, until the run is over.
+
+        If the robot's mission has not been run yet, the next run is waited for.
+        """
+        return follow.reports(self.link, self.keys)
+
+    def _part(self, mission_id: str, revision: int, number: int) -> MissionPart:
+        key = self.keys.mission(mission_id, f"part/{number}")
+        reply = self._insist(key, b"", self.patience_s, try_s=BULK_TRY_S, revision=str(revision))
+        return self._answered(reply, MissionPart, "reading the mission back")
+
+    def _step(self, manifest: Manifest, step: str, payload: bytes, kind: type[Any], **parameters: str) -> Any:
+        key = self.keys.mission(manifest.mission_id, step)
+        bulk = step.startswith("chunk")
+        try_s, within_s = BULK_TRY_S if bulk else TRY_S, self.patience_s
+        if step == "commit":
+            # The robot reads and stores a large document before it answers.
+            reading_s = manifest.size / COMMIT_BYTES_PER_S
+            try_s, within_s = try_s + reading_s, within_s + 2 * reading_s
+        reply = self._insist(key, payload, within_s, try_s=try_s, bulk=bulk, **parameters)
+        return self._answered(reply, kind, f"push ({step})")
+
+    def _insist(
+        self,
+        key: str,
+        payload: bytes,
+        within_s: float,
+        *,
+        try_s: float = TRY_S,
+        bulk: bool = False,
+        **parameters: str,
+    ) -> bytes | None:
+        """Ask the same thing until it is answered or the time is up."""
+        deadline = time.monotonic() + within_s
+        signature = b"" if self.held is None or bulk else self.held.sign(key, payload)
+        while (left := deadline - time.monotonic()) > 0:
+            reply = self.link.ask(
+                key,
+                payload,
+                timeout_s=min(try_s, left),
+                parameters=parameters,
+                bulk=bulk,
+                signature=signature,
+            )
+            if reply is not None:
+                return reply
+            time.sleep(min(PAUSE_S, left))
+        return None
+
+    def _answered(self, reply: bytes | None, kind: type[Any], what: str) -> Any:
+        """The reply if it is of `kind`; every other is an error that says what it means."""
+        robot = self.keys.robot
+        if reply is None:
+            raise OutcomeUnknown(
+                f"{robot} did not answer {what} in time: whether it was carried out is unknown;"
+                " see stopgo status"
+            )
+        try:
+            message: Reply = msgspec.json.decode(reply, type=Reply)
+        except msgspec.DecodeError as error:
+            raise OutcomeUnknown(
+                f"{robot} answered {what} in words this stopgo does not know ({error}); update the older one"
+            ) from None
+        if isinstance(message, Rejected):
+            why = f"{message.reason}: {'; '.join(message.messages)}"
+            raise AnswerIsNo(f"{robot} rejected {what}: {why}", reason=message.reason)
+        if not isinstance(message, kind):
+            said = message.message if isinstance(message, Malformed) else type(message).__name__
+            raise AnswerIsNo(f"{robot} could not make sense of {what}: {said}")
+        return message

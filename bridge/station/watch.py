@@ -1,0 +1,229 @@
+"""Watches one run: shows it to a person, and hands everything to a recording."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from bridge.station.follow import Report, Silence
+from bridge.station.station import Station
+from mission.document import Mission
+from mission.errors import OutcomeUnknown
+from mission.events import (
+    AnyEvent,
+    Arrived,
+    PoseReport,
+    RevisionDropped,
+    RevisionTaken,
+    RevisionWaits,
+    Scanned,
+    StateReport,
+)
+from mission.schedule import schedule
+from mission.table import printable
+
+REDRAW_S = 0.2
+LAST_EVENTS = 8
+
+
+class Recording(Protocol):
+    """What a recording of a run takes; the field recording in `recordings` is one."""
+
+    def mission(self, mission: Mission) -> None: ...
+
+    def state(self, report: StateReport) -> None: ...
+
+    def pose(self, report: PoseReport) -> None: ...
+
+    def event(self, event: AnyEvent) -> None: ...
+
+
+class Showing(Protocol):
+    """How a person sees the run."""
+
+    def mission(self, mission: Mission) -> None: ...
+
+    def show(self, report: Report) -> None: ...
+
+
+def watch_run(station: Station, record: Recording | None, *, say: Callable[[str], None]) -> StateReport:
+    """Follow the run to its end, told line by line, and return the last state."""
+    return watch_showing(station, record, Lines(say))
+
+
+def watch_showing(station: Station, record: Recording | None, showing: Showing) -> StateReport:
+    """Follow the run to its end and return the last state.
+
+    Raises
+    ------
+    OutcomeUnknown
+        If the run is over and the robot's last state was never heard.
+    """
+    state: StateReport | None = None
+    known: tuple[str | None, int | None] = (None, None)
+    for report in station.reports():
+        plan = _plan_of(report)
+        if plan is not None and plan != known:
+            known = plan
+            _introduce(station, report, record, showing)
+        if isinstance(report, StateReport):
+            state = report
+        if record is not None:
+            hand_over(record, report)
+        showing.show(report)
+    if state is None:
+        raise OutcomeUnknown(f"{station.keys.robot}: the run ended and no state was heard")
+    return state
+
+
+def _plan_of(report: Report) -> tuple[str | None, int | None] | None:
+    """Run and revision that a state or an event is of; none before a run.
+
+    Events tell of every revision in turn; a state may come when two have passed.
+    """
+    if isinstance(report, PoseReport | Silence) or not report.run_id:
+        return None
+    return report.run_id, report.revision
+
+
+def _introduce(station: Station, report: Any, record: Recording | None, showing: Showing) -> None:
+    """Fetch the mission that is run, so that it can be drawn and counted down."""
+    mission = station.mission(report.mission_id or "", report.revision or 0)
+    showing.mission(mission)
+    if record is not None:
+        record.mission(mission)
+
+
+def hand_over(record: Recording, report: Report) -> None:
+    """Give a report to the recording's method for it."""
+    if isinstance(report, StateReport):
+        record.state(report)
+    elif isinstance(report, PoseReport):
+        record.pose(report)
+    elif not isinstance(report, Silence):
+        record.event(report)
+
+
+class Lines:
+    """One line for every event, for a log or a pipe."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._greeted = False
+
+    def mission(self, mission: Mission) -> None:
+        self._say(f"{mission.name}: {len(mission.stops)} stops")
+
+    def show(self, report: Report) -> None:
+        if isinstance(report, StateReport):
+            if not self._greeted and report.run_id is None:
+                self._say(f"{report.robot} is {report.state}; waiting for a run")
+            self._greeted = True
+        elif isinstance(report, Silence):
+            self._say(f"no word for {report.seconds:.0f} s")
+        elif not isinstance(report, PoseReport):
+            self._say(event_line(report))
+
+
+class Table:
+    """A table that is drawn anew in place, for a terminal."""
+
+    def __init__(self, write: Callable[[str], object] = sys.stderr.write) -> None:
+        self._write = write
+        self._mission: Mission | None = None
+        self._state: StateReport | None = None
+        self._pose: PoseReport | None = None
+        self._events: deque[AnyEvent] = deque(maxlen=LAST_EVENTS)
+        self._silent_s = 0.0
+        self._drawn = 0
+        self._next = 0.0
+
+    def mission(self, mission: Mission) -> None:
+        self._mission = mission
+
+    def show(self, report: Report) -> None:
+        self._silent_s = report.seconds if isinstance(report, Silence) else 0.0
+        if isinstance(report, StateReport):
+            self._state = report
+        elif isinstance(report, PoseReport):
+            self._pose = report
+        elif not isinstance(report, Silence):
+            self._events.append(report)
+        if time.monotonic() >= self._next or not isinstance(report, PoseReport):
+            self._next = time.monotonic() + REDRAW_S
+            self._draw()
+
+    def _draw(self) -> None:
+        lines = table_lines(self._mission, self._state, self._pose, tuple(self._events), self._silent_s)
+        up = f"\x1b[{self._drawn}A" if self._drawn else ""
+        self._write(up + "".join(f"\x1b[2K{printable(line)}\n" for line in lines))
+        # Lines of a longer table drawn before would stay below: the table never shrinks.
+        self._drawn = max(self._drawn, len(lines))
+
+
+def table_lines(
+    mission: Mission | None,
+    state: StateReport | None,
+    pose: PoseReport | None,
+    events: tuple[AnyEvent, ...],
+    silent_s: float,
+) -> list[str]:
+    """The run as a table of fixed height."""
+    if state is None:
+        return ["waiting for the robot's state"]
+    of = f" of {len(mission.stops)}" if mission else ""
+    stop = f"{state.stop} {state.stop_state}" if state.stop else "-"
+    elapsed = pose.mission_time_s if pose and pose.mission_time_s is not None else 0.0
+    left = None if mission is None else remaining_s(mission, state, events, elapsed)
+    rows = [
+        ("robot", f"{state.robot}  run {state.run_id or 'none yet'}"),
+        ("state", f"{state.state}  {stop}"),
+        ("stops", f"{len(state.done)} done, {len(state.skipped)} skipped{of}"),
+        ("place", f"{pose.pose.x:.2f}, {pose.pose.y:.2f} m at {pose.speed:.2f} m/s" if pose else "-"),
+        ("battery", f"{state.battery:.0%}"),
+        ("time", f"{clock(elapsed)} run, {'-' if left is None else clock(left)} left as planned"),
+        ("link", "no word for " + f"{silent_s:.0f} s, asking" if silent_s else "alive"),
+    ]
+    told = [event_line(event) for event in events]
+    return [f"  {name:8} {value}" for name, value in rows] + told + [""] * (LAST_EVENTS - len(told))
+
+
+def remaining_s(
+    mission: Mission, state: StateReport, events: tuple[AnyEvent, ...], elapsed_s: float
+) -> float:
+    """Seconds left if all goes as planned from the stop that is worked on."""
+    plan = schedule(mission)
+    ids = [stop.id for stop in mission.stops]
+    behind = len(state.done) + len(state.skipped) if state.stop is None else ids.index(state.stop)
+    if behind == 0:
+        begun = 0.0
+    else:
+        last = mission.stops[behind - 1]
+        begun = float(plan.arrival_s[behind - 1]) + last.settle_s + last.scan.duration_s
+    since = max((event.mission_time_s for event in events if isinstance(event, Scanned)), default=0.0)
+    return max(0.0, plan.total_s - begun - max(0.0, elapsed_s - since))
+
+
+def clock(seconds: float) -> str:
+    """Seconds as hours, minutes and seconds."""
+    minutes, rest = divmod(int(max(0.0, seconds)), 60)
+    return f"{minutes // 60}:{minutes % 60:02}:{rest:02}"
+
+
+def event_line(event: AnyEvent) -> str:
+    """An event as one line a person reads."""
+    name = type(event).__name__
+    about = getattr(event, "stop", None) or ""
+    detail = getattr(event, "reason", "") or getattr(event, "commander", "")
+    if isinstance(event, RevisionWaits | RevisionDropped):
+        detail = f"revision {event.waiting}"
+    if isinstance(event, RevisionTaken):
+        detail = f"revision {event.revision} after {event.before}"
+    if isinstance(event, Arrived):
+        detail = f"{event.deviation_m * 1000:.0f} mm beside"
+    if isinstance(event, Scanned):
+        detail = f"{event.file}, {event.points / 1e6:.1f} million points"
+    return f"{event.mission_time_s:8.1f} s  {name:15} {about:6} {detail}".rstrip()

@@ -1,0 +1,302 @@
+"""A site's keys: who is let in, who may order, and what is refused before anything is opened."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.link import keys as site_keys
+from bridge.link.keys import Holder, Signature, Untrusted, holders, init_site, issue, now_utc, read_keys
+from bridge.link.link import Link, Request
+from bridge.link.protocol import Keys, Reply, encode
+from bridge.link.zenoh_link import Guard, check_endpoint, connecting
+from bridge.robot.agent import trusting
+from bridge.station.station import Station, connect
+from mission.errors import AnswerIsNo, InputError, RobotUnreachable
+from mission.events import PoseReport, Scanned
+from mission.run.orders import Order
+from tests.bridge.link.test_zenoh import stopgo
+from tests.bridge.station.test_fleet import router
+from tests.bridge.world import corridor
+
+NOW = now_utc()
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A site with a robot, two stations, a viewer, and a stranger's keys from another authority."""
+    folder = tmp_path_factory.mktemp("keys")
+    init_site(folder / "site", now=NOW)
+    init_site(folder / "other", now=NOW)
+    for role, name in (("robot", "r1"), ("station", "alice"), ("station", "bob"), ("viewer", "vera")):
+        issue(folder / "site", role, name, now=NOW)  # type: ignore[arg-type]
+    issue(folder / "other", "station", "stranger", now=NOW)
+    return folder
+
+
+def signed(site: Path, who: str, key: str, payload: bytes) -> bytes:
+    return read_keys(site / who, now=NOW).sign(key, payload)
+
+
+def holder_of(site: Path, key: str, payload: bytes, signature: bytes, *, now: datetime = NOW) -> Holder:
+    authority = read_keys(site / "site" / "r1", now=NOW).authority
+    return site_keys.verified_holder(authority, key, payload, signature, now=now)
+
+
+def test_a_signature_tells_who_signed(site: Path) -> None:
+    holder = holder_of(site, "k", b"m", signed(site, "site/alice", "k", b"m"))
+    assert (holder.role, holder.name) == ("station", "alice")
+
+
+def test_a_changed_message_another_key_or_another_authority_is_not_trusted(site: Path) -> None:
+    good = signed(site, "site/alice", "k", b"m")
+    for key, payload, signature in (
+        ("k", b"n", good),
+        ("other", b"m", good),
+        ("k", b"m", signed(site, "other/stranger", "k", b"m")),
+        ("k", b"m", b""),
+        ("k", b"m", b"{}"),
+        ("k", b"m", good[:-40] + b'AAAA"}'),
+        ("k", b"m", encode(Signature(certificate=b"\x30\x00", signature=b""))),
+    ):
+        with pytest.raises(Untrusted):
+            holder_of(site, key, payload, signature)
+
+
+def test_an_expired_certificate_is_not_trusted(site: Path) -> None:
+    with pytest.raises(Untrusted, match="ends"):
+        holder_of(site, "k", b"m", signed(site, "site/alice", "k", b"m"), now=NOW + timedelta(days=91))
+
+
+def test_only_stations_order_and_only_under_their_own_name(site: Path) -> None:
+    trust = trusting(read_keys(site / "site" / "r1", now=NOW).authority, lambda: NOW)
+
+    def request(who: str) -> Request:
+        return Request("k", b"m", {}, signed(site, f"site/{who}", "k", b"m"))
+
+    trust(request("alice"), "alice")
+    with pytest.raises(Untrusted, match="signed by bob, not by alice"):
+        trust(request("bob"), "alice")
+    with pytest.raises(Untrusted, match="vera is a viewer"):
+        trust(request("vera"), "vera")
+
+
+def test_keys_that_do_not_fit_are_named(site: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        read_keys(tmp_path, now=NOW)
+    with pytest.raises(InputError, match=r"valid from .* issue new keys for alice"):
+        read_keys(site / "site" / "alice", now=NOW + timedelta(days=91))
+    files = site_keys.KeyFiles(tmp_path)
+    for name in ("ca.pem", "cert.pem", "key.pem"):
+        (tmp_path / name).write_bytes((site / "site" / "alice" / name).read_bytes())
+    files.key.chmod(0o644)
+    with pytest.raises(InputError, match="chmod 600"):
+        read_keys(tmp_path, now=NOW)
+    files.key.chmod(0o600)
+    files.key.write_bytes((site / "site" / "bob" / "key.pem").read_bytes())
+    with pytest.raises(InputError, match="is not the key of"):
+        read_keys(tmp_path, now=NOW)
+    files.authority.write_bytes((site / "other" / "authority" / "ca.pem").read_bytes())
+    with pytest.raises(InputError, match="not issued by"):
+        read_keys(tmp_path, now=NOW)
+
+
+def test_the_private_key_is_for_its_owner_alone(site: Path) -> None:
+    assert (site / "site" / "alice" / "key.pem").stat().st_mode & 0o777 == 0o600
+
+
+def test_nothing_is_overwritten(site: Path) -> None:
+    with pytest.raises(InputError, match="has an authority already"):
+        init_site(site / "site", now=NOW)
+    with pytest.raises(InputError, match="exists"):
+        issue(site / "site", "viewer", "alice", now=NOW)
+    assert [holder.name for holder in holders(site / "site")] == ["alice", "bob", "r1", "vera"]
+
+
+def test_an_endpoint_must_be_guarded_as_it_should(site: Path) -> None:
+    keys = Guard(read_keys(site / "site" / "alice", now=NOW))
+    check_endpoint("tls/10.0.0.1:7447", keys, option="--connect")
+    with pytest.raises(InputError, match="tcp cannot carry keys"):
+        check_endpoint("tcp/10.0.0.1:7447", keys, option="--connect")
+    with pytest.raises(InputError, match="tls needs --keys"):
+        check_endpoint("tls/10.0.0.1:7447", Guard(insecure=True), option="--connect")
+
+
+def issue_until(folder: Path, role: site_keys.Role, name: str, *, seconds: float) -> None:
+    """Keys that were issued for a day, which ends in so many seconds."""
+    issue(folder, role, name, now=now_utc() + timedelta(seconds=seconds, days=-1), days=1)
+
+
+class Presence:
+    """When a robot was seen to come and go on a link."""
+
+    def __init__(self, link: Link, robot: str) -> None:
+        self.changes: list[bool] = []
+        self.came, self.went = threading.Event(), threading.Event()
+        link.watch_presence(Keys(robot).alive, self.changed)
+
+    def changed(self, key: str, alive: bool) -> None:
+        self.changes.append(alive)
+        (self.came if alive else self.went).set()
+
+
+@contextmanager
+def guarded_robot(site: Path, state: Path) -> Iterator[str]:
+    endpoint = f"tls/127.0.0.1:{free_port()}"
+    extra = ("--keys", str(site / "site" / "r1"))
+    robot = start_robot("r1", state, listen=endpoint, speed_up=100, extra=extra)
+    try:
+        yield endpoint
+    finally:
+        end_robot(robot)
+
+
+def test_a_station_with_keys_runs_a_mission_and_a_viewer_watches(site: Path, tmp_path: Path) -> None:
+    with guarded_robot(site, tmp_path) as endpoint:
+        with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
+            station.push(corridor())
+            station.command("start")
+            assert station.commander == "alice"
+        with connect(endpoint, robot="r1", keys=site / "site" / "vera") as viewer:
+            reports = list(viewer.reports())
+            assert [report.stop for report in reports if isinstance(report, Scanned)] == ["s1", "s2", "s3"]
+            poses = [report for report in reports if isinstance(report, PoseReport)]
+            assert poses[0].mission_time_s is not None
+            assert poses[0].mission_time_s < 20, "the poses from before the viewer came are missing"
+            assert viewer.mission(corridor().id, 1) == corridor()
+            for order in (lambda: viewer.command("abort"), lambda: viewer.push(corridor(revision=2))):
+                with pytest.raises(AnswerIsNo, match="vera is a viewer"):
+                    order()
+        status = stopgo("status", "--connect", endpoint, "--keys", str(site / "site" / "vera"), "--json")
+        assert '"state": "FINISHED"' in status.stdout, status.stderr
+
+
+def test_strangers_and_plain_links_do_not_reach_the_robot(site: Path, tmp_path: Path) -> None:
+    with guarded_robot(site, tmp_path) as endpoint:
+        stranger = connect(endpoint, robot="r1", keys=site / "other" / "stranger", timeout_s=1.5)
+        with pytest.raises(RobotUnreachable), stranger:
+            pass
+        plain = connect(endpoint.replace("tls/", "tcp/"), robot="r1", timeout_s=1.5)
+        with pytest.raises(RobotUnreachable), plain:
+            pass
+        with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
+            assert station.status().state == "IDLE"
+
+
+def test_a_link_is_closed_when_the_stations_certificate_ends(site: Path, tmp_path: Path) -> None:
+    with guarded_robot(site, tmp_path) as endpoint:
+        issue_until(site / "site", "station", "brief", seconds=5)
+        brief = read_keys(site / "site" / "brief", now=now_utc())
+        with connecting(endpoint, Guard(brief)) as link:
+            seen = Presence(link, "r1")
+            assert seen.came.wait(5)
+            assert seen.went.wait(20), "the link outlives the certificate"
+            # Another station is let in meanwhile, and what it does takes longer than a reconnect.
+            with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
+                station.push(corridor())
+                station.command("start")
+                assert len([1 for report in station.reports() if isinstance(report, Scanned)]) == 3
+            assert link.ask(Keys("r1").info, timeout_s=1) is None
+        with pytest.raises(InputError, match="issue new keys for brief"):
+            read_keys(site / "site" / "brief", now=now_utc())
+
+
+def test_a_link_is_closed_when_the_robots_certificate_ends(site: Path, tmp_path: Path) -> None:
+    issue_until(site / "site", "robot", "r9", seconds=8)
+    endpoint = f"tls/127.0.0.1:{free_port()}"
+    robot = start_robot("r9", tmp_path, listen=endpoint, extra=("--keys", str(site / "site" / "r9")))
+    try:
+        with connecting(endpoint, Guard(read_keys(site / "site" / "alice", now=NOW))) as link:
+            seen = Presence(link, "r9")
+            assert seen.came.wait(10)
+            assert seen.went.wait(20), "the link outlives the certificate"
+            # In its very last second a certificate is still taken for a new link.
+            over = read_keys(site / "site" / "r9", now=NOW).holder.not_after + timedelta(seconds=1)
+            time.sleep(max(0.0, (over - now_utc()).total_seconds()))
+            late = connect(endpoint, robot="r9", keys=site / "site" / "alice", timeout_s=3)
+            with pytest.raises(RobotUnreachable), late:
+                pass
+            assert link.ask(Keys("r9").info, timeout_s=1) is None
+        # A link that was opened anew in the last second is one that the robot has left.
+        assert seen.changes in ([True, False], [True, False, True, False])
+        assert robot.poll() is None
+    finally:
+        end_robot(robot)
+
+
+def test_a_viewer_that_forges_is_not_heard_and_a_forged_name_is_not_believed(
+    site: Path, tmp_path: Path
+) -> None:
+    keys = Keys("r1")
+    with guarded_robot(site, tmp_path) as endpoint:
+        with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
+            station.push(corridor())
+            order = station.order("start")
+        key = keys.command("start")
+        vera = read_keys(site / "site" / "vera", now=NOW)
+        with connecting(endpoint, Guard(vera)) as link:
+            assert link.ask(key, encode(order), timeout_s=1, signature=vera.sign(key, encode(order))) is None
+        bob = read_keys(site / "site" / "bob", now=NOW)
+        with connect(endpoint, robot="r1", keys=site / "site" / "bob") as other:
+            forged = other.link.ask(key, encode(order), timeout_s=1, signature=bob.sign(key, encode(order)))
+            unsigned = other.link.ask(key, encode(order), timeout_s=1)
+            assert other.status().state == "READY"
+    for reply in (forged, unsigned):
+        assert reply is not None
+        assert getattr(msgspec.json.decode(reply, type=Reply), "reason", None) == "untrusted"
+
+
+def test_the_commands_make_keys(tmp_path: Path) -> None:
+    folder = str(tmp_path / "site")
+    assert stopgo("keys", "init", folder).returncode == 0
+    assert stopgo("keys", "issue", "station", "alice", "--in", folder).returncode == 0
+    assert "alice" in stopgo("keys", "show", "--in", folder).stdout
+    assert "alice" in stopgo("keys", "show", folder).stdout
+    assert stopgo("keys", "show").returncode == stopgo("keys", "show", folder, "--in", folder).returncode == 2
+    assert stopgo("keys", "issue", "king", "bob", "--in", folder).returncode == 2
+    assert stopgo("keys", "show", "--in", str(tmp_path / "nowhere")).returncode == 2
+    wrong = stopgo(
+        "robot", "--name", "r1", "--listen", f"tls/127.0.0.1:{free_port()}",
+        "--state", str(tmp_path / "state"), "--keys", str(tmp_path / "site" / "alice"),
+    )  # fmt: skip
+    assert wrong.returncode == 2
+    assert "not of robot r1" in wrong.stderr
+
+
+def test_a_command_is_signed_for_one_robot_only(site: Path) -> None:
+    command = Order(cmd_id="c", verb="abort", commander="alice", issued_ns=0, valid_for_s=1.0)
+    signature = signed(site, "site/alice", Keys("r1").command("abort"), encode(command))
+    with pytest.raises(Untrusted):
+        holder_of(site, Keys("r2").command("abort"), encode(command), signature)
+
+
+def test_behind_a_router_signatures_tell_who_orders(site: Path, tmp_path: Path) -> None:
+    """The router's link is let in whole; a viewer's order comes through it, and is not trusted."""
+    endpoint = f"tls/127.0.0.1:{free_port()}"
+    issue(site / "site", "robot", "router", now=NOW)
+    extra = ("--connect", endpoint, "--keys", str(site / "site" / "r1"))
+    with router(endpoint, str(site / "site" / "router")):
+        robot = start_robot("r1", tmp_path, listen=None, speed_up=100, extra=extra)
+        try:
+            with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
+                station.push(corridor())
+                order = station.order("start", commander="vera")
+                vera = read_keys(site / "site" / "vera", now=NOW)
+                key = Keys("r1").command("start")
+                with connecting(endpoint, Guard(vera)) as link:
+                    Station(link, Keys("r1"), commander="vera").reach(endpoint)
+                    reply = link.ask(key, encode(order), timeout_s=2, signature=vera.sign(key, encode(order)))
+                assert reply is not None
+                assert "vera is a viewer" in msgspec.json.decode(reply, type=Reply).messages[0]
+                assert station.command("start").outcome == "ok"
+                assert len([1 for report in station.reports() if isinstance(report, Scanned)]) == 3
+        finally:
+            end_robot(robot)

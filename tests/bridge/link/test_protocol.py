@@ -1,0 +1,67 @@
+"""docs/protocol.md tells people what the code says to machines."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from msgspec import Struct
+
+from bridge.link import protocol
+from bridge.link.protocol import Keys, Tagged
+from mission.errors import InputError
+from mission.events import AnyEvent, State, StopState
+from mission.run.decision import STATES
+from mission.run.orders import Answer, Order, Reason
+
+TEXT = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("reason", get_args(Reason))
+def test_every_reason_is_explained(reason: str) -> None:
+    assert f"| `{reason}` |" in TEXT
+
+
+@pytest.mark.parametrize("message", [*Tagged.__subclasses__(), Order, Answer])
+def test_every_message_is_listed_with_its_fields(message: type[Struct]) -> None:
+    row = re.search(rf"^\| `{message.__struct_config__.tag}` \|(.*)\|$", TEXT, re.MULTILINE)
+    assert row is not None
+    for field in message.__struct_fields__:
+        assert re.search(rf"\b{field}\b", row.group(1)), f"{message.__name__}.{field}"
+
+
+@pytest.mark.parametrize("event", get_args(AnyEvent))
+def test_every_event_is_listed(event: type) -> None:
+    assert f"`{event.__name__}`" in TEXT
+
+
+@pytest.mark.parametrize("state", [*get_args(State), *get_args(StopState)])
+def test_every_state_is_explained(state: str) -> None:
+    assert f"`{state}`" in TEXT
+
+
+def test_every_verb_is_in_the_table_with_the_states_it_needs() -> None:
+    for verb, states in STATES.items():
+        row = re.search(rf"^\| `{verb}` \|(.*)$", TEXT, re.MULTILINE)
+        assert row is not None, verb
+        for state in states:
+            assert state in row.group(1), (verb, state)
+
+
+def test_keys_are_those_of_the_document() -> None:
+    keys = Keys("r1", "north/hall")
+    for key in (keys.alive, keys.info, keys.state, keys.pose, keys.event):
+        assert key.startswith("north/hall/sx/1/r1/")
+        assert f"`{key.removeprefix('north/hall/sx/1/r1/')}`" in TEXT
+    assert str(protocol.VERSION) in keys.root
+    assert Keys.of_every_robot("north").robot_of("north/sx/1/r7/alive") == "r7"
+
+
+@pytest.mark.parametrize(
+    ("robot", "site"), [("", None), ("a/b", None), ("*", None), ("**", None), ("r1", "a//b"), ("r1", "/a")]
+)
+def test_names_that_are_no_keys_are_refused(robot: str, site: str | None) -> None:
+    with pytest.raises(InputError, match="use letters"):
+        Keys(robot, site)

@@ -1,0 +1,188 @@
+"""Station and robot in two processes, over zenoh on loopback."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from bridge.commands.spawn import end_robot, free_port, robot_process, start_robot
+from bridge.link.zenoh_link import Guard, check_endpoint
+from bridge.station.follow import Report
+from bridge.station.station import connect
+from mission.document import sealed
+from mission.errors import InputError, RobotUnreachable
+from mission.events import Finished, PoseReport, Scanned, StateReport
+from tests.bridge.world import corridor
+
+
+def stopgo(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "mission", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_a_mission_is_pushed_started_and_followed_to_its_end(tmp_path: Path) -> None:
+    with robot_process("r1", tmp_path, speed_up=100) as endpoint, connect(endpoint, robot="r1") as station:
+        station.push(corridor())
+        station.command("start")
+        reports: list[Report] = list(station.reports())
+        again = list(station.reports())
+    events = [report for report in reports if not isinstance(report, StateReport | PoseReport)]
+    assert [event.stop for event in events if isinstance(event, Scanned)] == ["s1", "s2", "s3"]
+    assert isinstance(events[-1], Finished)
+    assert [event.number for event in events] == list(range(1, len(events) + 1))
+    states = [report for report in reports if isinstance(report, StateReport)]
+    assert states[-1].state == "FINISHED"
+    poses = [report for report in reports if isinstance(report, PoseReport)]
+    assert [pose.seq for pose in poses] == sorted({pose.seq for pose in poses})
+    # The poses from before the station listened come too, so the whole run is there.
+    assert poses[0].mission_time_s is not None
+    assert poses[0].mission_time_s < 5
+    assert [event for event in again if isinstance(event, Finished)]
+
+
+def test_the_commands_do_it_too(tmp_path: Path) -> None:
+    document = tmp_path / "mission.json"
+    document.write_bytes(msgspec.json.encode(corridor()))
+    with robot_process("r1", tmp_path / "state", speed_up=100) as endpoint:
+        reach = ("--robot", "r1", "--connect", endpoint)
+        assert stopgo("push", str(document), *reach).returncode == 0
+        started = stopgo("start", *reach, "--json")
+        assert started.returncode == 0, started.stderr
+        assert stopgo("watch", *reach).returncode == 0
+        status = json.loads(stopgo("status", *reach, "--json").stdout)
+        assert list(status) == [
+            *("robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop"),
+            *("done", "skipped", "battery"),
+        ]
+        assert (status["state"], status["done"]) == ("FINISHED", ["s1", "s2", "s3"])
+        refused = stopgo("start", *reach)
+        assert (refused.returncode, refused.stdout) == (1, "")
+        assert "start --again" in refused.stderr
+
+
+def test_a_watch_that_comes_first_waits_for_the_run_and_ends_with_1_when_it_is_aborted(
+    tmp_path: Path,
+) -> None:
+    with robot_process("r1", tmp_path, speed_up=10) as endpoint, connect(endpoint, robot="r1") as station:
+        station.push(corridor())
+        command = [sys.executable, "-m", "mission", "watch", "--robot", "r1", "--connect", endpoint]
+        watch = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        assert watch.stderr is not None
+        assert "waiting" in watch.stderr.readline()
+        station.command("start")
+        station.command("abort")
+        said = watch.communicate(timeout=30)[1]
+    assert watch.returncode == 1
+    assert "Aborted" in said
+
+
+def test_a_killed_robot_comes_back_paused_and_finishes_after_resume(tmp_path: Path) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    robot = start_robot("r1", tmp_path, listen=endpoint, speed_up=100)
+    try:
+        with connect(endpoint, robot="r1") as station:
+            station.push(corridor())
+            station.command("start")
+            for report in station.reports():
+                if isinstance(report, Scanned):
+                    break
+            robot.kill()
+            robot.wait()
+            robot = start_robot("r1", tmp_path, listen=endpoint, speed_up=100)
+            station.reach(endpoint)
+            assert station.status().state == "PAUSED"
+            station.command("resume")
+            events = [report for report in station.reports() if isinstance(report, Scanned)]
+            assert [event.stop for event in events] == ["s1", "s2", "s3"]
+    finally:
+        end_robot(robot)
+
+
+def test_sigterm_ends_the_robot_cleanly(tmp_path: Path) -> None:
+    robot = start_robot("r1", tmp_path, listen=f"tcp/127.0.0.1:{free_port()}")
+    robot.terminate()
+    assert robot.wait(10) == 0
+
+
+def test_a_robot_that_is_not_there_is_unreachable_and_nothing_is_sent() -> None:
+    unreached = connect(f"tcp/127.0.0.1:{free_port()}", robot="r1", timeout_s=0.3)
+    with pytest.raises(RobotUnreachable, match=r"robot r1 did not show itself within 0\.3 s"), unreached:
+        pass
+
+
+def test_a_session_that_is_open_does_not_keep_the_interpreter() -> None:
+    code = (
+        "from bridge.link.zenoh_link import listening\n"
+        f"with listening('tcp/127.0.0.1:{free_port()}') as link:\n"
+        "    link.serve('a/b', lambda request: b'')\n"
+        "    raise SystemExit(7)\n"
+    )
+    assert subprocess.run([sys.executable, "-c", code], timeout=20, check=False).returncode == 7
+
+
+@pytest.mark.parametrize("endpoint", ["tcp/0.0.0.0:7447", "tcp/10.1.2.3:7447", "udp/[::]:7447"])
+def test_addresses_beyond_this_machine_are_refused_unless_insecure(endpoint: str) -> None:
+    with pytest.raises(InputError, match="--insecure"):
+        check_endpoint(endpoint, Guard(), option="--listen")
+    check_endpoint(endpoint, Guard(insecure=True), option="--listen")
+
+
+@pytest.mark.parametrize("endpoint", ["", "127.0.0.1:7447", "tcp/127.0.0.1", "serial//dev/ttyS0"])
+def test_what_is_no_endpoint_is_named(endpoint: str) -> None:
+    with pytest.raises(InputError, match="not an endpoint"):
+        check_endpoint(endpoint, Guard(insecure=True), option="--connect")
+
+
+def test_threads_end_with_the_link() -> None:
+    before = threading.active_count()
+    unreached = connect(f"tcp/127.0.0.1:{free_port()}", robot="r1", timeout_s=0.1)
+    with pytest.raises(RobotUnreachable), unreached:
+        pass
+    assert threading.active_count() <= before + 1
+
+
+def test_watch_records_the_run(tmp_path: Path) -> None:
+    pytest.importorskip("rerun")
+    with robot_process("r1", tmp_path / "state", speed_up=100) as endpoint:
+        with connect(endpoint, robot="r1") as station:
+            station.push(corridor())
+            station.command("start")
+        watched = stopgo(
+            "watch", "--robot", "r1", "--connect", endpoint, "--rrd", str(tmp_path / "field.rrd")
+        )
+    assert watched.returncode == 0, watched.stderr
+    assert (tmp_path / "field.rrd").stat().st_size > 1000
+
+
+def test_another_commander_needs_to_take_over(tmp_path: Path) -> None:
+    document = tmp_path / "mission.json"
+    document.write_bytes(msgspec.json.encode(corridor()))
+    with robot_process("r1", tmp_path / "state") as endpoint:
+        reach = ("--robot", "r1", "--connect", endpoint)
+        assert stopgo("push", str(document), *reach, "--as", "alice").returncode == 0
+        denied = stopgo("push", str(document), *reach, "--as", "bob")
+        assert (denied.returncode, "alice commands it" in denied.stderr) == (1, True)
+        assert stopgo("push", str(document), *reach, "--as", "bob", "--take-over").returncode == 0
+        assert stopgo("start", *reach, "--as", "alice").returncode == 1
+        assert stopgo("start", *reach, "--as", "alice", "--take-over").returncode == 0
+        assert stopgo("pause", *reach, "--as", "bob").returncode == 0
+        assert stopgo("resume", *reach, "--as", "bob").returncode == 1
+        assert stopgo("resume", *reach, "--as", "alice").returncode == 0
+
+
+def test_the_first_pose_of_a_run_is_where_the_robot_was_put(tmp_path: Path) -> None:
+    """Its mission puts a robot that stands nowhere yet at its start; no pose of before is told of the run."""
+    start = msgspec.structs.replace(corridor().start, x=1.0)
+    first = msgspec.structs.replace(corridor().stops[0], approach=((1.0, 0.0), (2.0, 0.0)))
+    mission = sealed(msgspec.structs.replace(corridor(), start=start, stops=(first,), return_=None))
+    with robot_process("r1", tmp_path, speed_up=20) as endpoint, connect(endpoint, robot="r1") as station:
+        station.push(mission)
+        station.command("start")
+        poses = [report for report in station.reports() if isinstance(report, PoseReport)]
+    assert min(report.pose.x for report in poses) >= 1.0 - 0.01

@@ -1,0 +1,139 @@
+"""A small site: three stops round a corner, a simulated vehicle that holds their mission, and its logbook."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from bridge.mavlink.auto.logbook import Logbook, logbook, remember
+from bridge.mavlink.auto.vehicle_agent import Options, connect
+from bridge.mavlink.auto.vehicle_orders import Consent
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.simulated.profiles import PROFILES
+from bridge.mavlink.simulated.vehicle import Setting
+from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from bridge.mavlink.simulated.vehicle_process import vehicle_on
+from bridge.mavlink.simulated.vehicle_store import Store
+from bridge.station.station import Station
+from mission.document import Mission, SiteOrigin
+from mission.events import AnyEvent, Pose
+from mission.mavlink.autopilots import autopilot_named
+from mission.mavlink.items import ItemList
+from mission.mavlink.read_back import upload_of
+from mission.mavlink.translate import translate
+from mission.run.states import Run
+from tests.bridge.mavlink.scripted import free_udp_port
+from tests.mission.mavlink.following.worlds import told, tour
+
+SPEED_UP = 5.0
+PATIENCE_S = 60.0
+KINDS = {"strict": "generic", "ardupilot": "ardupilot", "px4": "px4"}
+"""The autopilot of each profile of the simulated vehicle."""
+
+
+@dataclass
+class Site:
+    """A vehicle's world; `up` switches the vehicle on, `reached` is a station's process that talks to it."""
+
+    folder: Path
+    profile: str = "ardupilot"
+    mission: Mission = field(default_factory=tour)
+    faults: Sequence[str] = ()
+    trigger: Any = "auto"
+    origin: SiteOrigin | None = None
+    at: Pose | None = field(default_factory=lambda: Pose(x=0.0, y=0.0, heading=0.0))
+    speed_up: float = SPEED_UP
+    key: bytes | None = None
+
+    def __post_init__(self) -> None:
+        self.sent: ItemList = translate(self.mission, KINDS[self.profile], trigger=self.trigger)
+        self.url = Url("udpout", "127.0.0.1", free_udp_port())
+        self.origin = self.origin or self.mission.georeference
+        self.load(self.sent)
+        with self.book() as book:
+            remember(book, self.mission, self.sent)
+
+    def load(self, sent: ItemList) -> None:
+        """Let the vehicle hold this list."""
+        vehicle = autopilot_named(sent.autopilot)
+        Store(self.folder / "vehicle").keep(mission=tuple(vehicle.kept(item) for item in upload_of(sent)))
+
+    @contextmanager
+    def up(self) -> Iterator[None]:
+        """The vehicle is on."""
+        made = VehicleFaults(tuple(read_vehicle_fault(text) for text in self.faults))
+        setting = Setting(PROFILES[self.profile], self.folder / "vehicle", self.origin, self.at, made)
+        listening = Url("udpin", self.url.host, self.url.number)
+        with vehicle_on(listening, setting, speed_up=self.speed_up, signing_key=self.key):
+            yield
+
+    @contextmanager
+    def book(self) -> Iterator[Logbook]:
+        with logbook(self.url, 1, self.folder / "station") as opened:
+            yield opened
+
+    @contextmanager
+    def reached(
+        self, *, arm: bool = True, disarm: bool = False, any_origin: bool = False, **options: Any
+    ) -> Iterator[Station]:
+        """The vehicle, from a process of its own."""
+        given: dict[str, Any] = {"state": self.folder / "station", "timeout_s": 5.0}
+        given |= {"commander": "test", "vehicle": 1, "signing_key": self.key}
+        consent = Consent(arm, disarm, any_origin)
+        with connect(self.url, Options(consent=consent, **(given | options))) as station:
+            yield station
+
+    def order(self, verb: Any, *, arm: bool = True, disarm: bool = False, **details: Any) -> Any:
+        with self.reached(arm=arm, disarm=disarm) as station:
+            return station.command(verb, **details)
+
+    @property
+    def run(self) -> Run:
+        with self.book() as book:
+            return book.run
+
+    @property
+    def events(self) -> tuple[AnyEvent, ...]:
+        with self.book() as book:
+            return book.journal.events()
+
+
+ALL = [
+    "Started",
+    *(f"{word} {name}" for name in ("S1", "S2", "S3") for word in ("Arrived", "Settled", "Scanned")),
+    "Finished",
+]
+"""What is told of a run of the tour in which all goes well."""
+
+
+@contextmanager
+def watched(site: Site, **options: Any) -> Iterator[list[Any]]:
+    """A watch in a process of its own; the block ends when the run has."""
+    seen: list[Any] = []
+
+    def follow() -> None:
+        with site.reached(**options) as station:
+            ready.set()
+            seen.extend(station.reports())
+
+    ready = threading.Event()
+    thread = threading.Thread(target=follow, daemon=True)
+    thread.start()
+    assert ready.wait(PATIENCE_S)
+    yield seen
+    thread.join(PATIENCE_S)
+    assert not thread.is_alive(), told(site.events)
+
+
+def until(site: Site, seen: Callable[[tuple[AnyEvent, ...], Run], bool]) -> None:
+    """Wait until the logbook has come so far, however long that takes within reason."""
+    deadline = time.monotonic() + PATIENCE_S
+    with site.book() as book:
+        while not seen(book.journal.events(), book.run):
+            assert time.monotonic() < deadline, (told(book.journal.events()), book.run)
+            time.sleep(0.05)

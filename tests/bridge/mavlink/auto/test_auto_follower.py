@@ -1,0 +1,60 @@
+"""The follower's first look, with a vehicle of a few messages."""
+
+from __future__ import annotations
+
+from bridge.link.clock import SimulatedClock
+from bridge.mavlink.auto.auto_follower import Follower
+from bridge.mavlink.auto.logbook import Logbook, remember
+from bridge.mavlink.line.frames import Message, dialect
+from bridge.robot.journal import memory_journal
+from mission.events import Paused
+from mission.mavlink.autopilots.ardupilot import ARDUPILOT
+from mission.mavlink.following.observer import Observer
+from mission.mavlink.translate import translate
+from mission.run.states import started
+from tests.mission.mavlink.following.worlds import tour
+
+MANUAL = 0
+
+
+class NoHands:
+    """Nothing is told to this vehicle."""
+
+    def ask_for(self, number: int) -> None: ...
+
+    def ask_for_telemetry(self) -> None: ...
+
+
+def told_at_first_look(boot_ms: int) -> list[str]:
+    """Reasons of the pauses told of a run that is found in MANUAL, a minute after it was started."""
+    clock, mission = SimulatedClock(), tour()
+    book = Logbook(memory_journal(), "mavlink-1", clock)
+    remember(book, mission, translate(mission, "ardupilot"))
+    book.booted(clock.now_ns())
+    book.move(lambda run: (started(run, run_id="r", now_ns=clock.now_ns(), by="me"),))
+    clock.wait(60.0)
+    observer = Observer(ARDUPILOT)
+    follower = Follower(book, None, observer, NoHands())  # type: ignore[arg-type]
+    for message in found_in_manual(boot_ms):
+        clock.wait(0.1)
+        follower.look(observer.take(message, book.listed, clock.now_ns()))
+    follower.begin()
+    follower.look("SYSTEM_TIME")
+    return [event.reason for event in book.journal.events() if isinstance(event, Paused)]
+
+
+def found_in_manual(boot_ms: int) -> tuple[Message, ...]:
+    armed = dialect.MAV_MODE_FLAG_SAFETY_ARMED | dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    return (
+        dialect.MAVLink_heartbeat_message(10, 3, armed, MANUAL, 4, 3),
+        dialect.MAVLink_mission_current_message(0, 14, dialect.MISSION_STATE_NOT_STARTED, 1),
+        dialect.MAVLink_system_time_message(0, boot_ms),
+    )
+
+
+def test_a_reboot_is_told_before_the_mode_that_it_brought_about() -> None:
+    assert told_at_first_look(boot_ms=3_000) == ["reboot"]
+
+
+def test_a_mode_that_somebody_chose_is_told_as_theirs() -> None:
+    assert told_at_first_look(boot_ms=60_300) == ["mode MANUAL, by the vehicle's operator"]

@@ -1,0 +1,151 @@
+"""An autopilot drives a mission; what is told of it is what a robot would tell, and is true."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from bridge.mavlink.line.frames import dialect
+from bridge.mavlink.line.peer import reached as found_peer
+from mission.document import sealed
+from mission.events import Arrived, Failed, Held, PoseReport, Scanned, StateReport, Unconfirmed
+from recordings.field import FieldRecording
+from recordings.review import review
+from tests.bridge.mavlink.auto.site import ALL, Site, until, watched
+from tests.mission.mavlink.following.worlds import told, tour
+
+pytestmark = pytest.mark.usefixtures("own_time")
+
+
+def test_a_run_is_told_from_start_to_finish(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up(), watched(site) as seen:
+        assert site.order("start").outcome == "ok"
+    assert told(site.events) == ALL
+    assert site.run.state == "FINISHED" and site.run.done == ("S1", "S2", "S3")
+    assert told([report for report in seen if not isinstance(report, StateReport | PoseReport)]) == ALL
+    assert all(event.deviation_m < 0.02 for event in site.events if isinstance(event, Arrived))
+
+
+@pytest.mark.parametrize("profile", ["ardupilot", "px4", "strict"])
+def test_a_recording_of_a_run_is_reviewed_as_any_other(profile: str, tmp_path: Path) -> None:
+    from bridge.station.watch import watch_run
+
+    site = Site(tmp_path, profile)
+    with site.up(), FieldRecording(tmp_path / "field.rrd", None) as record, site.reached() as station:
+        station.command("start")
+        assert watch_run(station, record, say=print).state == "FINISHED"
+    assert told(site.events) == ALL
+    (run,) = review(tmp_path / "field.rrd").runs
+    assert (run.scanned, run.unconfirmed, run.ended) == (["S1", "S2", "S3"], [], "Finished")
+    assert set(run.deviation_m) == {"S1", "S2", "S3"}
+
+
+def test_scans_of_a_vehicle_that_tells_nothing_are_not_made_up(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot", trigger="none")
+    with site.up(), watched(site):
+        site.order("start")
+    assert not [event for event in site.events if isinstance(event, Scanned)]
+    unsure = [event for event in site.events if isinstance(event, Unconfirmed)]
+    assert [event.stop for event in unsure] == ["S1", "S2", "S3"]
+    assert all(event.pose is not None for event in unsure)
+    assert site.run.state == "FINISHED"
+
+
+def test_a_stop_that_is_missed_has_failed_however_often_it_is_called_reached(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot", faults=["beside@7=0.3"])
+    with site.up(), watched(site):
+        site.order("start")
+        until(site, lambda events, run: run.state == "HELD")
+        (failed,) = [event for event in site.events if isinstance(event, Failed)]
+        assert failed.stop == "S2"
+        assert float(failed.reason.split()[0]) == pytest.approx(0.3, abs=0.012)
+        assert "tolerance is 0.05 m" in failed.reason
+        assert "Arrived S2" not in told(site.events)
+        assert isinstance(site.events[-1], Held)
+        with site.reached() as station:
+            assert station.status().state == "HELD"
+        site.order("skip")
+    assert told(site.events)[-5:] == ["Skipped S2", "Arrived S3", "Settled S3", "Scanned S3", "Finished"]
+
+
+def test_a_stop_that_may_be_left_out_does_not_hold_the_run(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot", faults=["beside@7=0.3"], mission=tour(on_failure="skip"))
+    with site.up(), watched(site):
+        site.order("start")
+    assert site.run.done == ("S1", "S3") and site.run.skipped == ("S2",)
+    assert site.run.state == "FINISHED"
+
+
+def test_a_scan_that_fails_is_tried_again_as_often_as_the_stop_says(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot", faults=["scanner@2"], mission=tour(retries=1))
+    with site.up(), watched(site):
+        site.order("start")
+    words = told(site.events)
+    assert words.count("Arrived S2") == 2 and words.count("Scanned S2") == 1
+    assert site.run.done == ("S1", "S2", "S3")
+
+
+def test_what_the_line_loses_is_recovered(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot", faults=["loss@20=7"])
+    with site.up(), watched(site):
+        site.order("start")
+    words = told(site.events)
+    assert [word for word in words if word.startswith("Arrived")] == [
+        "Arrived S1",
+        "Arrived S2",
+        "Arrived S3",
+    ]
+    assert site.run.state == "FINISHED" and site.run.done == ("S1", "S2", "S3")
+
+
+def test_a_stop_that_ends_the_run_leaves_the_vehicle_standing(tmp_path: Path) -> None:
+    site = Site(tmp_path, "px4", faults=["beside@6=0.3"], mission=tour(on_failure="abort"))
+    with site.up():
+        with watched(site):
+            site.order("start")
+        assert site.run.state == "ABORTED"
+        with found_peer(site.url, vehicle=1) as peer:
+            assert not peer.in_auto
+
+
+def test_a_last_stop_that_is_left_out_ends_the_run_where_the_vehicle_is(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        with watched(site):
+            site.order("start")
+            until(site, lambda events, run: run.at == 2)
+            assert site.order("skip").state == "FINISHED"
+        with found_peer(site.url, vehicle=1) as peer:
+            assert not peer.in_auto
+
+
+def test_the_way_back_is_driven_at_the_end(tmp_path: Path) -> None:
+    there = tour()
+    back = sealed(msgspec.structs.replace(there, return_=((1.0, 1.0), (0.0, 1.0), (0.0, 0.0))))
+    site = Site(tmp_path, "ardupilot", mission=back)
+    with site.up(), watched(site) as seen:
+        site.order("start")
+    assert told(site.events) == [*ALL[:-1], "Homing", "Finished"]
+    last = [report for report in seen if isinstance(report, PoseReport)][-1].pose
+    assert (last.x, last.y) == pytest.approx((0.0, 0.0), abs=0.03)
+
+
+def test_a_pause_stops_a_vehicle_that_somebody_else_has_started(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up(), found_peer(site.url, vehicle=1) as peer:
+        peer.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        peer.order(dialect.MAV_CMD_DO_SET_MODE, 1, 10)
+        assert site.order("pause").outcome == "ok"
+        assert not peer.in_auto
+
+
+def test_a_run_that_somebody_else_has_started_is_told_as_theirs(tmp_path: Path) -> None:
+    site = Site(tmp_path, "px4")
+    with site.up(), found_peer(site.url, vehicle=1) as peer, watched(site, compares=True):
+        peer.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        peer.order(dialect.MAV_CMD_DO_SET_MODE, 1, 4, 4)
+    assert told(site.events) == ALL
+    assert "operator" in getattr(site.events[0], "commander", "")

@@ -1,0 +1,226 @@
+"""Reboots, silence, stations that die, others who interfere: one story, and never the wrong stop."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bridge.mavlink.auto.logbook import remember
+from bridge.mavlink.line.frames import dialect
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.peer import reached as found_peer
+from bridge.station.follow import Silence
+from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
+from mission.events import Arrived, Held, Paused, Resumed, Started
+from mission.mavlink.translate import translate
+from tests.bridge.mavlink.auto.site import ALL, Site, until, watched
+from tests.mission.mavlink.following.worlds import told, tour
+
+pytestmark = pytest.mark.usefixtures("own_time")
+
+
+def by_hand(peer: Peer, mode: tuple[int, int]) -> None:
+    """Somebody else changes the mode."""
+    assert peer.command(dialect.MAV_CMD_DO_SET_MODE, 1, *mode).accepted
+
+
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+def test_after_a_reboot_the_run_goes_on_at_the_stop_that_was_not_finished(
+    profile: str, tmp_path: Path
+) -> None:
+    site = Site(tmp_path, profile)
+    corner_of_s2 = next(
+        site.sent.placed.index(placed) for placed in site.sent.placed if placed.role == "corner"
+    )
+    number = corner_of_s2 + (1 if profile == "ardupilot" else 0)
+    site.faults = [f"reboot-mission@{number}"]
+    with site.up(), watched(site):
+        site.order("start")
+        until(site, lambda events, run: run.state == "PAUSED")
+        assert site.run.done == ("S1",) and site.run.reason == "reboot"
+        with pytest.raises(AnswerIsNo, match="not_armed"):
+            site.order("resume", arm=False)
+        assert site.order("resume").state == "RUNNING"
+    words = told(site.events)
+    assert [word for word in words if word.startswith("Scanned")] == [
+        "Scanned S1",
+        "Scanned S2",
+        "Scanned S3",
+    ]
+    assert words[-1] == "Finished"
+    assert len({event.boot_id for event in site.events}) == 2
+
+
+def test_a_station_that_ends_is_followed_by_another_without_gap_or_repeat(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        with site.reached() as station:
+            station.command("start")
+            until(site, lambda events, run: "Arrived S2" in told(events))
+        assert site.run.state == "RUNNING"
+        with watched(site) as seen:
+            pass
+    events = [report for report in seen if hasattr(report, "number")]
+    assert told(events) == told(site.events) and [event.number for event in events] == list(
+        range(1, len(events) + 1)
+    )
+    assert [word for word in told(events) if "S2" not in word] == [word for word in ALL if "S2" not in word]
+    assert told(events).count("Arrived S2") == 1
+
+
+def test_a_stop_that_nobody_saw_is_not_said_to_be_scanned(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot", mission=tour(), speed_up=20.0)
+    with site.up():
+        site.order("start")
+        with found_peer(site.url, vehicle=1) as peer, peer.box("MISSION_CURRENT") as box:
+            while box.get(30.0).mission_state != dialect.MISSION_STATE_COMPLETE:
+                pass
+        with watched(site):
+            pass
+    words = told(site.events)
+    assert "Unconfirmed S2" in words and "Scanned S2" not in words
+    assert words[-1] == "Finished"
+
+
+def test_two_that_watch_tell_every_event_once(tmp_path: Path) -> None:
+    site = Site(tmp_path, "px4")
+    with site.up(), watched(site) as one, watched(site) as other:
+        site.order("start")
+    assert told(site.events) == ALL
+    for seen in (one, other):
+        assert told([report for report in seen if hasattr(report, "number")]) == ALL
+
+
+def test_a_mode_that_somebody_else_chooses_is_told_as_theirs(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up(), watched(site), found_peer(site.url, vehicle=1) as peer:
+        site.order("start")
+        until(site, lambda events, run: "Scanned S1" in told(events))
+        by_hand(peer, (0, 0))
+        until(site, lambda events, run: run.state == "PAUSED")
+        assert "MANUAL" in site.run.reason and "operator" in site.run.reason
+        by_hand(peer, (10, 0))
+    paused = [event for event in site.events if isinstance(event, Paused | Resumed)]
+    assert told(paused) == ["Paused", "Resumed"]
+    assert site.run.state == "FINISHED" and site.run.done == ("S1", "S2", "S3")
+
+
+def test_a_mission_that_somebody_else_changes_holds_the_run(tmp_path: Path) -> None:
+    from bridge.mavlink.transfer.upload import upload
+
+    site = Site(tmp_path, "ardupilot")
+    short = translate(tour(), "ardupilot", trigger="none")
+    with site.up():
+        site.order("start")
+        with site.reached():
+            until(site, lambda events, run: "Scanned S1" in told(events))
+            site.order("pause")
+            with found_peer(site.url, vehicle=1) as peer:
+                upload(peer, short)
+            until(site, lambda events, run: run.state == "HELD")
+        assert "somebody has changed" in site.run.reason
+        with pytest.raises(AnswerIsNo, match="mission_differs"):
+            site.order("retry")
+        site.order("abort")
+    assert any(isinstance(event, Held) for event in site.events)
+
+
+def test_a_silent_vehicle_is_told_as_silence_and_its_run_goes_on(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    silent, heard = threading.Event(), []
+
+    def follow() -> None:
+        with site.reached() as station:
+            for report in station.reports():
+                heard.append(report)
+                if isinstance(report, Silence):
+                    silent.set()
+
+    thread = threading.Thread(target=follow, daemon=True)
+    with site.up():
+        site.order("start")
+        thread.start()
+        until(site, lambda events, run: "Scanned S1" in told(events))
+    assert silent.wait(30.0)
+    site.at = None
+    with site.up():
+        until(site, lambda events, run: run.state == "PAUSED")
+        site.order("resume")
+        thread.join(60.0)
+    assert not thread.is_alive()
+    assert site.run.state == "FINISHED" and site.run.done == ("S1", "S2", "S3")
+
+
+def test_a_new_push_ends_the_run_that_it_replaces(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        site.order("start")
+        site.order("pause")
+        with site.book() as book:
+            remember(book, site.mission, site.sent)
+    assert told(site.events)[-1] == "Aborted" and site.run.state == "READY"
+
+
+def test_a_stop_is_measured_where_the_vehicle_stands(tmp_path: Path) -> None:
+    site = Site(tmp_path, "px4", faults=["beside@6=0.03"])
+    with site.up(), watched(site):
+        site.order("start")
+    (arrived,) = [event for event in site.events if isinstance(event, Arrived) and event.stop == "S2"]
+    assert arrived.deviation_m == pytest.approx(0.03, abs=0.012)
+
+
+def test_an_order_whose_answer_was_lost_is_told_as_its_commanders_once_it_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = Site(tmp_path, "ardupilot")
+    obeyed = Peer.command
+
+    def unheard(peer: Peer, number: int, *params: float, **details: Any) -> Any:
+        ack = obeyed(peer, number, *params, **details)
+        if number == dialect.MAV_CMD_DO_SET_MODE:
+            raise OutcomeUnknown("the answer was lost")
+        return ack
+
+    with site.up():
+        monkeypatch.setattr(Peer, "command", unheard)
+        with pytest.raises(OutcomeUnknown):
+            site.order("start")
+        assert site.run.state == "READY"
+        monkeypatch.undo()
+        with watched(site):
+            pass
+    begun = [event for event in site.events if isinstance(event, Started)]
+    assert [event.commander for event in begun] == ["test"]
+    assert site.run.state == "FINISHED"
+
+
+def test_a_journal_that_cannot_be_written_ends_the_watch_and_says_why(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up(), pytest.raises(InputError, match="disk full"), site.reached() as station:
+        station.command("start")
+        with site.book() as book:
+            book.journal._connection.execute("CREATE TRIGGER full BEFORE INSERT ON events BEGIN SELECT"
+                                             " RAISE(FAIL, 'disk full'); END")  # fmt: skip
+        for _ in station.reports():
+            pass
+
+
+def test_a_mission_of_as_many_items_is_seen_to_be_another_when_somebody_starts_it(tmp_path: Path) -> None:
+    from bridge.mavlink.transfer.upload import upload
+
+    site = Site(tmp_path, "ardupilot")
+    other = translate(tour(settle_s=1.5), "ardupilot")
+    assert len(other.placed) == len(site.sent.placed)
+    with site.up(), site.reached() as station, found_peer(site.url, vehicle=1) as peer:
+        station.command("start")
+        until(site, lambda events, run: "Arrived S1" in told(events))
+        station.command("pause")
+        upload(peer, other)
+        by_hand(peer, (10, 0))
+        until(site, lambda events, run: run.state == "HELD")
+        assert "settle of S1" in site.run.reason
+        assert peer.in_auto
+        station.command("abort")

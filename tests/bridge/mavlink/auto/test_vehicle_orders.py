@@ -1,0 +1,289 @@
+"""Orders to a vehicle: done by its autopilot and shown by it, or refused with the way out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from bridge.mavlink.auto.vehicle_orders import Consent, Orders
+from bridge.mavlink.line.frames import dialect
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.peer import reached as found_peer
+from bridge.mavlink.simulated.vehicle_store import Store
+from bridge.robot.answers import answer_to, remember_answer
+from mission.document import Scan, SiteOrigin
+from mission.errors import AnswerIsNo, InputError, RobotUnreachable
+from mission.events import Aborted, Pose, Resumed, Started
+from mission.mavlink.translate import translate
+from mission.run.orders import Order
+from tests.bridge.mavlink.auto.site import ALL, Site, until, watched
+from tests.mission.mavlink.following.worlds import told, tour
+
+pytestmark = pytest.mark.usefixtures("own_time")
+
+PROFILES = ["ardupilot", "px4"]
+
+
+def refused(site: Site, verb: str, **details: object) -> str:
+    """Why an order was refused."""
+    with pytest.raises(AnswerIsNo) as no:
+        site.order(verb, **details)
+    return str(no.value)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_a_paused_vehicle_goes_on_where_it_stood(profile: str, tmp_path: Path) -> None:
+    site = Site(tmp_path, profile)
+    with site.up(), watched(site):
+        site.order("start")
+        until(site, lambda events, run: "Scanned S1" in told(events))
+        assert site.order("pause").state == "PAUSED"
+        assert site.order("resume").state == "RUNNING"
+    words = told(site.events)
+    assert [word for word in words if word not in ("Paused", "Resumed")] == ALL
+    assert [event.commander for event in site.events if isinstance(event, Resumed)] == ["test"]
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_a_stop_that_is_skipped_on_the_way_is_driven_past_without_waiting(
+    profile: str, tmp_path: Path
+) -> None:
+    site = Site(tmp_path, profile)
+    with site.up(), watched(site):
+        site.order("start")
+        until(site, lambda events, run: run.at == 1)
+        site.order("skip", stop="S2")
+    assert site.run.done == ("S1", "S3") and site.run.skipped == ("S2",)
+    assert "Scanned S2" not in told(site.events)
+
+
+def test_a_vehicle_that_is_aborted_stands_and_may_be_disarmed(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up(), watched(site):
+        site.order("start")
+        until(site, lambda events, run: "Arrived S1" in told(events))
+        assert site.order("abort", disarm=True).state == "ABORTED"
+        with site.reached(arm=False) as station:
+            assert station.status().state == "ABORTED"
+        assert "disarmed" in refused(site, "start", arm=False, again=True, from_here=True)
+    assert isinstance(site.events[-1], Aborted)
+
+
+def test_an_aborted_mission_is_begun_anew_only_when_that_is_meant(tmp_path: Path) -> None:
+    site = Site(tmp_path, "px4")
+    with site.up():
+        site.order("start")
+        site.order("abort")
+        assert "finished_before" in refused(site, "start")
+        assert site.order("start", again=True, from_here=True).outcome == "ok"
+        with watched(site):
+            pass
+    words = told(site.events)
+    assert words.count("Started") == 2 and words[-1] == "Finished"
+
+
+def test_home_is_refused_with_the_way_out(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        site.order("start")
+        why = refused(site, "home")
+        site.order("abort")
+    assert "unsupported" in why and "--controller mavlink:URL" in why
+
+
+def test_a_disarmed_vehicle_is_armed_only_when_that_is_said(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        why = refused(site, "start", arm=False)
+        assert "not_armed" in why and "--arm" in why
+        assert site.run.state == "READY"
+
+
+def test_another_mission_is_never_started(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    other = tour(settle_s=3.0)
+    site.load(translate(other, "ardupilot"))
+    with site.up():
+        why = refused(site, "start")
+    assert "mission_differs" in why and "settle of S1" in why and "push" in why
+
+
+def test_a_mission_that_another_station_has_cleared_is_not_told_or_started(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    Store(tmp_path / "vehicle").keep(mission=())
+    with site.up(), site.reached() as station:
+        assert (station.status().state, station.status().mission_id) == ("IDLE", None)
+        with pytest.raises(AnswerIsNo, match=r"no_mission: .*cleared") as no:
+            station.command("start")
+    assert no.value.reason == "no_mission"
+
+
+def test_an_abort_under_a_used_id_is_refused_and_never_told_that_it_was_done(tmp_path: Path) -> None:
+    start = Order(cmd_id="once", verb="start", commander="test", issued_ns=0, valid_for_s=5.0)
+    abort = msgspec.structs.replace(start, verb="abort")
+    with Site(tmp_path).book() as book:
+        no_vehicle: Any = None
+        orders = Orders(book, no_vehicle, no_vehicle, no_vehicle, book.clock, Consent())
+        remember_answer(book.journal, start, answer_to(start, None, book.run))
+        assert (orders.obey(start).outcome, orders.obey(abort).reason) == ("ok", "id_reused")
+
+
+@pytest.mark.parametrize(
+    ("origin", "word"),
+    [(SiteOrigin(lat=51.5001, lon=7.5, alt=100.0, heading_deg=0.0), "11.1"), (None, "no origin")],
+)
+def test_a_vehicle_that_counts_from_elsewhere_is_not_started(
+    origin: SiteOrigin | None, word: str, tmp_path: Path
+) -> None:
+    site = Site(tmp_path, "ardupilot")
+    site.origin = origin
+    with site.up():
+        why = refused(site, "start")
+    assert word in why and "wrong_origin" in why
+
+
+def test_a_vehicle_with_satellites_may_count_from_anywhere(tmp_path: Path) -> None:
+    """11 m to the south; it stands at the mission's start all the same."""
+    site = Site(tmp_path, "ardupilot", at=Pose(x=0.0, y=11.131884, heading=0.0))
+    site.origin = SiteOrigin(lat=51.4999, lon=7.5, alt=100.0, heading_deg=0.0)
+    with site.up():
+        assert "--any-origin" in refused(site, "start")
+        with site.reached(any_origin=True) as station:
+            assert station.command("start").outcome == "ok"
+            assert station.command("abort").outcome == "ok"
+
+
+def test_a_vehicle_that_stands_elsewhere_is_not_started(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot", at=Pose(x=0.5, y=0.0, heading=0.0))
+    with site.up():
+        why = refused(site, "start")
+        assert "not_at_start" in why and "0.50 m" in why and "--from-here" in why
+        assert site.order("start", from_here=True).outcome == "ok"
+        site.order("abort")
+
+
+def test_nothing_is_sent_where_no_vehicle_is(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with pytest.raises(RobotUnreachable, match="nothing was sent"), site.reached(timeout_s=0.5):
+        pass
+
+
+def test_the_same_order_again_is_not_carried_out_again(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up(), site.reached() as station:
+        order = station.order("start")
+        assert station.give(order) == station.give(order)
+        station.command("abort")
+    assert told(site.events).count("Started") == 1
+
+
+def test_a_folder_belongs_to_one_vehicle(tmp_path: Path) -> None:
+    from bridge.mavlink.auto.logbook import logbook
+
+    site = Site(tmp_path, "ardupilot")
+    with (
+        pytest.raises(InputError, match="belongs to robot mavlink-1"),
+        logbook(site.url, 2, tmp_path / "station"),
+    ):
+        pass
+
+
+def test_a_finished_mission_runs_once_more_when_that_is_meant(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        with watched(site):
+            site.order("start")
+        with pytest.raises(AnswerIsNo, match="finished_before"):
+            site.order("start")
+        with site.reached() as station:
+            assert station.command("start", again=True, from_here=True).state == "RUNNING"
+            until(site, lambda events, run: len([e for e in events if isinstance(e, Started)]) == 2)
+            until(site, lambda events, run: run.state == "FINISHED")
+    assert told(site.events)[-1] == "Finished"
+    assert len({event.run_id for event in site.events}) == 2
+
+
+def test_a_second_station_knows_nothing_of_the_run_and_starts_nothing(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        site.order("start")
+        with site.reached(state=tmp_path / "other", commander="other") as station:
+            assert station.status().state == "IDLE" and station.status().run_id is None
+            with pytest.raises(AnswerIsNo, match="no_mission"):
+                station.command("start")
+        assert site.run.state == "RUNNING"
+        site.order("abort")
+
+
+def test_another_commander_is_refused_until_the_lease_is_over(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot")
+    with site.up():
+        site.order("start")
+        with site.reached(commander="other") as station:
+            with pytest.raises(AnswerIsNo, match="not_the_commander"):
+                station.command("skip")
+            assert station.command("pause").outcome == "ok"
+            assert station.command("resume", take_over=True).outcome == "ok"
+        site.order("abort")
+    assert "TakenOver" in told(site.events)
+
+
+def test_a_signed_vehicle_obeys_its_key_and_is_not_heard_without(tmp_path: Path) -> None:
+    site = Site(tmp_path, "px4", key=bytes(range(32)))
+    with site.up():
+        assert site.order("start").outcome == "ok"
+        assert site.order("abort").outcome == "ok"
+        with (
+            pytest.raises(RobotUnreachable, match="signing key"),
+            site.reached(signing_key=bytes(32), timeout_s=1.5),
+        ):
+            pass
+
+
+def test_a_vehicle_in_auto_is_not_armed_before_it_is_put_on_hold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = Site(tmp_path, "ardupilot")
+    ordered: list[int] = []
+    obeyed = Peer.command
+
+    def noted(peer: Peer, number: int, *params: float, **details: Any) -> Any:
+        ordered.append(number)
+        return obeyed(peer, number, *params, **details)
+
+    with site.up(), found_peer(site.url, vehicle=1) as peer:
+        peer.order(dialect.MAV_CMD_DO_SET_MODE, 1, 10)
+        monkeypatch.setattr(Peer, "command", noted)
+        assert site.order("start").outcome == "ok"
+    mode, arm = dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_CMD_COMPONENT_ARM_DISARM
+    assert ordered == [mode, arm, dialect.MAV_CMD_DO_SET_MISSION_CURRENT, mode]
+
+
+def test_a_pause_lets_the_scan_under_way_finish_and_no_stop_is_scanned_twice(tmp_path: Path) -> None:
+    long = Scan(profile="default", duration_s=10.0, timeout_s=20.0)
+    site = Site(tmp_path, "ardupilot", mission=tour(scan=long))
+    with site.up(), site.reached() as station:
+        station.command("start")
+        until(site, lambda events, run: "Settled S1" in told(events))
+        assert station.command("pause").state == "PAUSED"
+        until(site, lambda events, run: "Scanned S1" in told(events))
+        assert site.run.state == "PAUSED" and site.run.done == ("S1",)
+        assert station.command("resume").outcome == "ok"
+        until(site, lambda events, run: "Arrived S2" in told(events))
+        station.command("abort")
+    words = told(site.events)
+    assert words.index("Paused") < words.index("Scanned S1") < words.index("Resumed")
+    assert words.count("Scanned S1") == words.count("Arrived S1") == 1
+
+
+def test_a_stop_that_failed_is_driven_to_again_when_somebody_says_so(tmp_path: Path) -> None:
+    site = Site(tmp_path, "ardupilot", faults=["beside@7=0.3"])
+    with site.up(), site.reached() as station:
+        station.command("start")
+        until(site, lambda events, run: run.state == "HELD")
+        assert station.command("retry").state == "RUNNING"
+        until(site, lambda events, run: told(events).count("Failed S2") == 2)
+        assert station.command("abort").state == "ABORTED"

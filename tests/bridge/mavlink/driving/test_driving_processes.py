@@ -1,0 +1,110 @@
+"""Station, robot's end and vehicle in processes of their own: run, recorded, killed and gone on with."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from bridge.commands.spawn import end_robot, free_port, robot_process, start, start_robot
+from bridge.mavlink.line.frames import dialect
+from bridge.mavlink.line.peer import reached
+from bridge.mavlink.line.url import Url
+from bridge.station.station import connect
+from mission.events import Scanned
+from tests.bridge.link.test_zenoh import stopgo
+from tests.bridge.mavlink.driving.world import Operator, is_state, site_mission, until
+from tests.bridge.mavlink.scripted import free_udp_port
+
+
+@contextmanager
+def vehicle(tmp_path: Path, profile: str) -> Iterator[tuple[Url, Operator]]:
+    """A vehicle in a process of its own, on hold at the mission's start."""
+    port = free_udp_port()
+    process = start(
+        "robot", "--mavlink-vehicle", f"udpin:127.0.0.1:{port}", "--profile", profile, "--at", "0,0,0",
+        "--origin", "47.4,8.5,400,30", "--speed-up", "10", "--state", str(tmp_path / "vehicle"),
+        called="the vehicle",
+    )  # fmt: skip
+    url = Url("udpout", "127.0.0.1", port)
+    try:
+        with reached(url, vehicle=1) as peer:
+            operator = Operator(peer, profile)
+            operator.hold()
+            yield url, operator
+    finally:
+        end_robot(process)
+
+
+def driving(url: Url) -> tuple[str, ...]:
+    return ("--controller", f"mavlink:{url}", "--vehicle", "1", "--arm")
+
+
+def scans_begun(operator: Operator) -> int:
+    """How many the vehicle has begun, whoever has heard of them."""
+    last = operator.peer.ask(dialect.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED)
+    assert last is not None
+    return int(last.image_index) + 1
+
+
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+def test_a_mission_over_zenoh_is_driven_by_an_autopilot_and_recorded(tmp_path: Path, profile: str) -> None:
+    document, field = tmp_path / "mission.json", tmp_path / "field.rrd"
+    document.write_bytes(msgspec.json.encode(site_mission(stops=3, closed=True)))
+    with (
+        vehicle(tmp_path, profile) as (url, operator),
+        robot_process("r1", tmp_path / "r1", extra=driving(url)) as endpoint,
+    ):
+        reach = ("--robot", "r1", "--connect", endpoint)
+        assert stopgo("push", str(document), *reach).returncode == 0
+        command = [sys.executable, "-m", "mission", "watch", *reach, "--rrd", str(field), "--json"]
+        watch = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        started = stopgo("start", *reach)
+        assert started.returncode == 0, started.stderr
+        out, said = watch.communicate(timeout=120)
+        assert watch.returncode == 0, said
+        assert json.loads(out)["done"] == ["s1", "s2", "s3"]
+        assert scans_begun(operator) == 3
+    review = json.loads(stopgo("review", str(field), "--json").stdout)
+    assert review["mission_id"] == site_mission().id
+    (run,) = review["runs"]
+    assert (run["scanned"], run["ended"]) == (["s1", "s2", "s3"], "Finished")
+    assert max(run["deviation_m"].values()) < 0.01
+
+
+@pytest.mark.parametrize(("stop", "doing"), [("s1", "SCANNING"), ("s2", "NAVIGATING")])
+def test_a_killed_gateway_comes_back_paused_and_scans_no_stop_twice(
+    tmp_path: Path, stop: str, doing: str
+) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with vehicle(tmp_path, "ardupilot") as (url, operator):
+        gateway = start_robot("r1", tmp_path / "r1", listen=endpoint, extra=driving(url))
+        try:
+            with connect(endpoint, robot="r1") as station:
+                station.push(site_mission())
+                station.command("start")
+                until(
+                    station.reports(),
+                    lambda report: (
+                        (getattr(report, "stop", ""), getattr(report, "stop_state", "")) == (stop, doing)
+                    ),
+                )
+                gateway.kill()
+                gateway.wait()
+                gateway = start_robot("r1", tmp_path / "r1", listen=endpoint, extra=driving(url))
+                station.reach(endpoint)
+                assert station.status().state == "PAUSED"
+                assert operator.mode() == "HOLD"
+                station.command("resume")
+                until(station.reports(), is_state("FINISHED"))
+                scanned = [event.stop for event in station.log() if isinstance(event, Scanned)]
+            assert scanned == ["s1", "s2"]
+            assert scans_begun(operator) <= 2 + (doing == "SCANNING")
+        finally:
+            end_robot(gateway)

@@ -1,0 +1,230 @@
+"""What the controller does when something goes wrong, stop by stop, in simulated time."""
+
+from __future__ import annotations
+
+import sqlite3
+
+import msgspec
+import pytest
+
+from bridge.robot.base import Rest
+from bridge.robot.simulator import Fault, Faults, read_fault
+from mission.document import Mission, sealed
+from mission.errors import AnswerIsNo, InputError
+from mission.events import Pose
+from tests.bridge.world import Field, corridor
+
+
+def started(mission: Mission, *faults: Fault) -> Field:
+    """A field whose robot has begun the mission."""
+    field = Field(faults=Faults(faults))
+    field.station().push(mission)
+    field.order("start")
+    return field
+
+
+def with_policy(**details: object) -> Mission:
+    mission = corridor()
+    policy = msgspec.structs.replace(mission.policy, **details)
+    return sealed(msgspec.structs.replace(mission, policy=policy))
+
+
+def test_a_failed_scan_is_taken_again() -> None:
+    field = started(corridor(), Fault("scanner", 2))
+    field.work()
+    assert field.controller.run.done == ("s1", "s2", "s3")
+    assert "Failed s2" not in field.told()
+
+
+def test_a_scan_without_points_is_not_a_scan() -> None:
+    field = started(corridor(retries=0), Fault("empty", 1))
+    field.work()
+    assert field.controller.run.state == "HELD"
+    assert "0 points" in field.controller.run.reason
+
+
+def test_tries_that_are_used_up_hold_the_robot_and_retry_gives_new_ones() -> None:
+    field = started(corridor(), Fault("scanner", 1), Fault("scanner", 2))
+    field.work()
+    assert field.controller.run.state == "HELD"
+    assert field.told()[-2:] == ["Failed s1", "Held"]
+    assert field.order("resume").reason == "wrong_state"
+    assert field.order("retry", stop="s1").outcome == "ok"
+    field.work()
+    assert field.controller.run.done == ("s1", "s2", "s3")
+
+
+def test_a_held_robot_goes_on_after_skip() -> None:
+    field = started(corridor(retries=0), Fault("scanner", 1))
+    field.work()
+    assert field.order("skip").outcome == "ok"
+    field.work()
+    assert (field.controller.run.skipped, field.controller.run.done) == (("s1",), ("s2", "s3"))
+
+
+@pytest.mark.parametrize(
+    ("on_failure", "state", "at_home"),
+    [("skip", "FINISHED", True), ("abort", "ABORTED", False), ("home", "ABORTED", True)],
+)
+def test_the_mission_says_what_a_failure_leads_to(on_failure: str, state: str, at_home: bool) -> None:
+    field = started(corridor(retries=0, on_failure=on_failure), Fault("scanner", 2))
+    field.work()
+    assert field.controller.run.state == state
+    assert (abs(field.base.pose().x) < 1e-6) == at_home
+    assert "Failed s2" in field.told()
+
+
+def test_a_slip_is_corrected_until_the_stop_is_within_tolerance() -> None:
+    field = started(corridor(), Fault("slip", 1, 0.2))
+    field.work()
+    assert field.controller.run.state == "FINISHED"
+    arrived = [event for event in field.journal.events() if type(event).__name__ == "Arrived"]
+    assert all(event.deviation_m <= 0.05 for event in arrived)  # type: ignore[union-attr]
+
+
+def test_a_stop_that_is_never_reached_fails() -> None:
+    slips = [Fault("slip", drive, 0.2) for drive in range(1, 20)]
+    field = started(corridor(retries=0), *slips)
+    field.work()
+    assert field.controller.run.state == "HELD"
+    assert "tolerance is 0.05 m" in field.controller.run.reason
+
+
+def test_a_blocked_leg_holds_the_robot_and_retry_drives_the_rest() -> None:
+    field = started(corridor(on_failure="skip"), Fault("blocked", 2))
+    field.work()
+    assert field.controller.run.state == "HELD"
+    assert "blocked at (3." in field.controller.run.reason
+    field.order("retry")
+    field.work()
+    assert field.controller.run.done == ("s1", "s2", "s3")
+
+
+def test_a_robot_that_shakes_is_not_scanned_from_until_it_stands_still() -> None:
+    calm, shaken = started(corridor()), started(corridor(), Fault("shaking", 1, 10.0))
+    calm.work()
+    shaken.work()
+    late = shaken.journal.events()[2].mission_time_s - calm.journal.events()[2].mission_time_s
+    assert 9.0 < late < 13.0
+
+
+def test_a_robot_that_never_stands_still_fails_the_stop() -> None:
+    field = started(corridor(retries=0), Fault("shaking", 1, 1000.0))
+    field.work()
+    assert field.controller.run.reason == "s1: not still within 32 s"
+
+
+def test_a_base_that_is_located_less_well_stands_still_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    field = started(corridor(retries=0), Fault("shaking", 1, 1000.0))
+    monkeypatch.setattr(field.base, "rest", lambda: Rest(metres=0.02, radians=0.02))
+    field.work()
+    assert field.controller.run.done == ("s1", "s2", "s3")
+
+
+def test_a_low_battery_sends_it_home_and_it_goes_on_once_charged() -> None:
+    field = started(corridor(), Fault("drain", 2, 0.1))
+    field.work()
+    assert field.controller.run.state == "PAUSED"
+    assert abs(field.base.pose().x) < 1e-6
+    assert field.controller.run.done == ("s1", "s2")
+    field.base.charge()
+    assert field.order("resume").outcome == "ok"
+    field.work()
+    assert (field.controller.run.state, field.controller.run.done) == ("FINISHED", ("s1", "s2", "s3"))
+
+
+def test_a_robot_carried_off_its_route_is_not_resumed() -> None:
+    field = started(corridor())
+    field.order("pause")
+    field.base.stand_at(Pose(x=1.0, y=0.5, heading=0.0))
+    assert field.order("resume").reason == "off_route"
+    field.base.stand_at(Pose(x=1.0, y=0.02, heading=0.0))
+    assert field.order("resume").outcome == "ok"
+
+
+def test_home_while_paused_drives_home() -> None:
+    field = started(corridor())
+    field.clock.at(72.0, lambda: field.order("pause"))
+    field.work()
+    assert field.order("home").outcome == "ok"
+    field.work()
+    assert field.controller.run.state == "ABORTED"
+    assert abs(field.base.pose().x) < 1e-6
+
+
+def test_a_paused_way_home_is_gone_on_with() -> None:
+    field = started(corridor())
+    field.clock.at(80.0, lambda: field.order("home"))
+    field.clock.at(83.0, lambda: field.order("pause"))
+    field.work()
+    assert field.controller.run.state == "PAUSED"
+    field.boot()
+    field.order("resume")
+    field.work()
+    assert field.controller.run.state == "ABORTED"
+    assert abs(field.base.pose().x) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("policy", "state", "done"),
+    [
+        ("continue", "FINISHED", ("s1", "s2", "s3")),
+        ("hold", "HELD", ()),
+        ("finish_stop", "HELD", ("s1",)),
+        ("home", "PAUSED", ()),
+    ],
+)
+def test_a_lost_link_is_met_as_the_mission_says(policy: str, state: str, done: tuple[str, ...]) -> None:
+    field = started(with_policy(link_loss=policy))
+    field.clock.at(2.0, lambda: field.controller.hear_of_link(31.0))
+    field.work()
+    assert (field.controller.run.state, field.controller.run.done) == (state, done)
+    field.controller.hear_of_link(0.0)
+    if state != "FINISHED":
+        field.order("retry" if state == "HELD" else "resume")
+        field.work()
+    assert field.controller.run.done == ("s1", "s2", "s3")
+
+
+def test_a_lost_link_cuts_no_scan_short() -> None:
+    field = started(with_policy(link_loss="hold"))
+    field.clock.at(30.0, lambda: field.controller.hear_of_link(31.0))
+    field.work()
+    assert (field.controller.run.state, field.controller.run.done) == ("HELD", ("s1",))
+
+
+def full_disk(moment: str) -> None:
+    raise sqlite3.OperationalError("database or disk is full")
+
+
+def test_a_full_disk_refuses_orders_and_stops_the_robot_until_there_is_room() -> None:
+    field = started(corridor())
+
+    def fill() -> None:
+        field.journal.edge = full_disk
+        assert field.order("pause").reason == "storage"
+
+    field.clock.at(3.0, fill)
+    field.work()
+    assert field.controller.run.state == "HELD"
+    assert field.base.speed() == 0.0
+    field.journal.edge = lambda moment: None
+    assert field.order("retry").outcome == "ok"
+    field.work()
+    assert field.controller.run.done == ("s1", "s2", "s3")
+
+
+def test_a_full_disk_rejects_a_mission() -> None:
+    field = Field()
+    station = field.station()
+    field.journal.edge = full_disk
+    with pytest.raises(AnswerIsNo, match="storage: the journal cannot be written: database or disk is full"):
+        station.push(corridor())
+    assert field.controller.run.state == "IDLE"
+
+
+@pytest.mark.parametrize("text", ["slip", "slip@x", "melt@1", "slip@1=much", "@1"])
+def test_a_fault_that_makes_no_sense_is_named(text: str) -> None:
+    with pytest.raises(InputError, match="--fault"):
+        read_fault(text)
+    assert read_fault("slip@2=0.2") == Fault("slip", 2, 0.2)

@@ -1,0 +1,164 @@
+"""A mission arrives on the robot whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+
+import msgspec
+import pytest
+
+from bridge.link.link import Request
+from bridge.link.protocol import CHUNK_BYTES, Accepted, Malformed, Manifest, Ready, Rejected, encode
+from mission.document import Mission, canonical, sealed
+from mission.errors import AnswerIsNo, OutcomeUnknown
+from mission.files.mission_json import parse
+from tests.bridge.world import Field, corridor
+
+
+def manifest_of(mission: Mission, document: bytes) -> Manifest:
+    return Manifest(
+        mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
+        sha256=hashlib.sha256(document).hexdigest(), chunk_bytes=CHUNK_BYTES,
+    )  # fmt: skip
+
+
+def asked(field: Field, mission: Mission, step: str, payload: bytes, **parameters: str) -> object:
+    return field.inbox.receive(Request(field.keys.mission(mission.id, step), payload, parameters))
+
+
+def test_a_pushed_mission_is_read_back_the_same() -> None:
+    field, mission = Field(), corridor()
+    station = field.station()
+    assert not station.push(mission).already
+    assert station.status().state == "READY"
+    assert station.mission(mission.id, 1) == mission
+
+
+def test_a_file_in_which_another_program_wrote_0_for_0_is_taken() -> None:
+    document = msgspec.to_builtins(corridor(stops=1))
+    document["start"]["x"] = 0
+    del document["digest"]
+    document["digest"] = hashlib.sha256(canonical(document)).hexdigest()
+    mission = parse(canonical(document), "mission.json")
+    assert mission.digest == document["digest"] != corridor(stops=1).digest
+    assert Field().station().push(mission).digest == corridor(stops=1).digest
+
+
+def test_a_mission_of_many_chunks_arrives_whole() -> None:
+    field, mission = Field(), corridor(stops=800)
+    station = field.station()
+    seen: list[tuple[int, int]] = []
+    station.push(mission, progress=lambda held, size: seen.append((held, size)))
+    assert len(seen) > 3
+    assert seen[-1][0] == seen[-1][1]
+    assert station.mission(mission.id, 1) == mission
+
+
+def test_pushing_the_same_again_changes_nothing() -> None:
+    field = Field()
+    field.station().push(corridor())
+    assert field.station().push(corridor()).already
+
+
+def test_the_same_revision_with_another_digest_is_refused_and_both_are_named() -> None:
+    field = Field()
+    field.station().push(corridor())
+    with pytest.raises(AnswerIsNo, match=r"revision_taken.*push the change as revision 2"):
+        field.station().push(corridor(stops=2))
+    assert field.station().push(corridor(stops=2, revision=2)).revision == 2
+
+
+def test_an_older_revision_is_refused() -> None:
+    field = Field()
+    field.station().push(corridor(revision=2))
+    with pytest.raises(AnswerIsNo, match="older_revision"):
+        field.station().push(corridor(revision=1))
+
+
+def test_another_mission_is_refused_while_one_runs() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    other = sealed(msgspec.structs.replace(corridor(), id="f" * 32))
+    with pytest.raises(AnswerIsNo, match="running"):
+        field.station().push(other)
+    assert field.controller.run.mission_id == corridor().id
+
+
+def test_only_missing_chunks_are_asked_for_after_a_reboot() -> None:
+    field, mission = Field(), corridor(stops=400)
+    document = msgspec.json.encode(mission)
+    manifest = manifest_of(mission, document)
+    assert asked(field, mission, "begin", encode(manifest)) == Ready(held=())
+    asked(field, mission, "chunk/1", document[CHUNK_BYTES : 2 * CHUNK_BYTES], of=manifest.sha256)
+    field.boot()
+    assert asked(field, mission, "begin", encode(manifest)) == Ready(held=(1,))
+
+
+def test_pieces_of_another_size_are_not_mixed() -> None:
+    """A stopgo that cuts differently goes on with a push that another one began."""
+    field, mission = Field(), corridor(stops=400)
+    document = msgspec.json.encode(mission)
+    before = msgspec.structs.replace(manifest_of(mission, document), chunk_bytes=48 * 1024)
+    asked(field, mission, "begin", encode(before))
+    asked(field, mission, "chunk/0", document[: 48 * 1024], of=before.sha256)
+    assert asked(field, mission, "begin", encode(manifest_of(mission, document))) == Ready(held=())
+    assert not field.station().push(mission).already
+
+
+def test_a_commit_without_every_chunk_is_rejected() -> None:
+    field, mission = Field(), corridor()
+    manifest = manifest_of(mission, msgspec.json.encode(mission))
+    asked(field, mission, "begin", encode(manifest))
+    answer = asked(field, mission, "commit", encode(field.commit(manifest)))
+    assert isinstance(answer, Rejected)
+    assert answer.reason == "incomplete"
+    assert field.controller.run.state == "IDLE"
+
+
+@pytest.mark.parametrize(
+    ("document", "reason"),
+    [
+        (b'{"schema": "stopgo/mission"}' + b" " * 20, "malformed"),
+        (msgspec.json.encode(corridor()).replace(b'"corridor"', b'"c0rridor"'), "digest"),
+        (msgspec.json.encode(corridor()).replace(b'"revision":1', b'"revision":1,"x":2'), "malformed"),
+    ],
+)
+def test_a_document_that_is_not_what_it_claims_is_rejected(document: bytes, reason: str) -> None:
+    field, mission = Field(), corridor()
+    manifest = manifest_of(mission, document)
+    asked(field, mission, "begin", encode(manifest))
+    asked(field, mission, "chunk/0", document, of=manifest.sha256)
+    answer = asked(field, mission, "commit", encode(field.commit(manifest)))
+    assert isinstance(answer, Rejected)
+    assert answer.reason == reason
+
+
+def test_a_mission_that_leaves_its_route_is_infeasible() -> None:
+    stop = msgspec.structs.replace(corridor().stops[1], approach=((9.0, 9.0), (4.0, 0.0)))
+    mission = sealed(msgspec.structs.replace(corridor(), stops=(corridor().stops[0], stop)))
+    with pytest.raises(
+        AnswerIsNo, match=r"infeasible: \$\.stops\[1\]\.approach\[0\]: \(9\.000, 9\.000\) is not stop s1"
+    ):
+        Field().station().push(mission)
+
+
+def test_nonsense_is_answered_as_malformed() -> None:
+    field, mission = Field(), corridor()
+    for step in ("begin", "commit", "chunk/x", "part/x", "nowhere"):
+        assert isinstance(asked(field, mission, step, b"\xff{"), Malformed)
+
+
+def test_a_cut_link_makes_the_outcome_unknown() -> None:
+    field = Field()
+    station = field.station()
+    station.push(corridor())
+    field.board.cut = True
+    with pytest.raises(OutcomeUnknown):
+        station.status()
+
+
+def test_an_accepted_answer_says_what_was_accepted() -> None:
+    mission = corridor()
+    accepted = Field().station().push(mission)
+    assert accepted == Accepted(mission_id=mission.id, revision=1, digest=mission.digest, already=False)

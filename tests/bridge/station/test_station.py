@@ -1,0 +1,119 @@
+"""A command keeps to its time, and says whether anything was sent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pytest
+
+from bridge.link.link import MemoryLink, Switchboard
+from bridge.station import station as stations
+from bridge.station.station import LEAST_S, PATIENCE_S, Station
+from mission.errors import OutcomeUnknown, RobotUnreachable
+from tests.bridge.world import Field, corridor
+
+
+class StoppedTime:
+    """A clock that passes only while somebody waits."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+class DeafLink(MemoryLink):
+    """Answers nothing on keys with a certain word, and takes all the time it is given for that."""
+
+    def __init__(self, board: Switchboard, time: StoppedTime, deaf: str) -> None:
+        super().__init__(board)
+        self.time = time
+        self.deaf = deaf
+        self.asked: list[str] = []
+
+    def ask(
+        self,
+        key: str,
+        payload: bytes = b"",
+        *,
+        timeout_s: float,
+        parameters: Mapping[str, str] | None = None,
+        bulk: bool = False,
+        signature: bytes = b"",
+    ) -> bytes | None:
+        self.asked.append(key)
+        if self.deaf in key:
+            self.time.sleep(timeout_s)
+            return None
+        return super().ask(key, payload, timeout_s=timeout_s, parameters=parameters)
+
+
+@pytest.fixture
+def time(monkeypatch: pytest.MonkeyPatch) -> StoppedTime:
+    stopped = StoppedTime()
+    monkeypatch.setattr(stations, "time", stopped)
+    return stopped
+
+
+def deaf(field: Field, time: StoppedTime, word: str) -> tuple[Station, DeafLink]:
+    """A station with five seconds for an order, whose robot does not hear some questions."""
+    field.station().push(corridor())
+    link = DeafLink(field.board, time, word)
+    return Station(link, field.keys, commander="test", timeout_s=5.0), link
+
+
+def test_an_order_that_is_not_answered_is_unknown_when_its_time_is_up(time: StoppedTime) -> None:
+    station, link = deaf(Field(), time, "/cmd/")
+    began = time.now
+    with pytest.raises(OutcomeUnknown, match="whether it was carried out is unknown"):
+        station.command("start")
+    assert time.now - began == pytest.approx(5.0, abs=0.1)
+    assert link.asked.count("sx/1/r1/cmd/start") > 1
+
+
+def test_an_order_to_a_robot_that_does_not_tell_its_state_was_not_sent(time: StoppedTime) -> None:
+    station, link = deaf(Field(), time, "/info")
+    began = time.now
+    with pytest.raises(RobotUnreachable, match="start was not sent"):
+        station.command("start")
+    assert time.now - began == pytest.approx(5.0, abs=0.1)
+    assert set(link.asked) == {"sx/1/r1/info"}
+
+
+def test_what_the_state_took_is_gone_for_the_order(time: StoppedTime) -> None:
+    station, link = deaf(Field(), time, "/cmd/")
+    answered = link.ask
+
+    def slowly(key: str, payload: bytes = b"", **options: object) -> bytes | None:
+        if key.endswith("/info"):
+            time.sleep(4.8)
+        return answered(key, payload, **options)  # type: ignore[arg-type]
+
+    link.ask = slowly  # type: ignore[method-assign, assignment]
+    began = time.now
+    with pytest.raises(OutcomeUnknown):
+        station.command("start")
+    assert time.now - began == pytest.approx(4.8 + LEAST_S, abs=0.1)
+
+
+def test_a_push_goes_on_for_as_long_as_its_pieces_are_answered(time: StoppedTime) -> None:
+    station, link = deaf(Field(), time, "/chunk/1")
+    began = time.now
+    with pytest.raises(OutcomeUnknown, match="push"):
+        station.push(corridor(stops=400, revision=2))
+    assert time.now - began == pytest.approx(PATIENCE_S, abs=0.1)
+    link.deaf = "nothing"
+    sent = len(link.asked)
+    station.push(corridor(stops=400, revision=2))
+    assert not any(key.endswith("/chunk/0") for key in link.asked[sent:])
+
+
+def test_an_order_may_be_waited_for_longer_than_it_may_be_valid() -> None:
+    field = Field()
+    field.station().push(corridor())
+    station = Station(field.board.link(), field.keys, commander="test", timeout_s=300.0)
+    assert station.command("start").outcome == "ok"

@@ -1,0 +1,241 @@
+"""What a person sees of a run, and what a recording is handed."""
+
+from __future__ import annotations
+
+import json
+import queue
+import threading
+import time
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+
+from bridge import cli
+from bridge.console import say, tell
+from bridge.link.clock import WallClock
+from bridge.link.link import Switchboard
+from bridge.link.protocol import Keys
+from bridge.robot import agent as agents
+from bridge.robot.agent import Agent
+from bridge.robot.bodies import pose_of
+from bridge.robot.controller import Controller
+from bridge.robot.journal import memory_journal
+from bridge.robot.simulator import SimulatedBase, SimulatedScanner
+from bridge.station.follow import Report, Silence
+from bridge.station.station import Station
+from bridge.station.watch import Lines, Table, clock, remaining_s, table_lines, watch_showing
+from mission.__main__ import main
+from mission.document import Mission
+from mission.errors import OutcomeUnknown
+from mission.events import AnyEvent, Held, PoseReport, Scanned, StateReport
+from mission.schedule import schedule
+from tests.bridge.world import Field, corridor
+from tests.disk import small_disk
+
+
+def test_the_time_left_at_the_start_is_the_plan() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    left = remaining_s(corridor(), field.controller.report(), (), 0.0)
+    assert left == schedule(corridor()).total_s
+
+
+def test_the_time_left_counts_down_and_ends_at_zero() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    left = []
+    while field.controller.step():
+        events = field.journal.events()
+        left.append(remaining_s(corridor(), field.controller.report(), events, events[-1].mission_time_s))
+    assert left == sorted(left, reverse=True)
+    assert left[-1] < 0.1
+
+
+def test_the_table_names_stop_state_battery_link_and_time() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    for _ in range(3):
+        field.controller.step()
+    lines = "\n".join(table_lines(corridor(), field.controller.report(), None, field.journal.events(), 4.0))
+    for said in (
+        "RUNNING  s1 SCANNING",
+        "0 done, 0 skipped of 3",
+        "100%",
+        "no word for 4 s",
+        "left as planned",
+    ):
+        assert said in lines
+
+
+def test_the_table_is_drawn_in_place() -> None:
+    written: list[str] = []
+    table = Table(written.append)
+    field = Field()
+    for _ in range(2):
+        table.show(field.controller.report())
+    height = written[0].count("\n")
+    assert written[1].startswith(f"\x1b[{height}A")
+    assert written[1].count("\n") == height
+
+
+def test_lines_tell_events_and_silence_but_not_every_pose() -> None:
+    said: list[str] = []
+    lines = Lines(said.append)
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    field.work()
+    for report in (field.controller.report(), *field.journal.events(), Silence(seconds=3.0)):
+        lines.show(report)
+    assert len(said) == len(field.journal.events()) + 1
+    assert said[-1] == "no word for 3 s"
+
+
+def test_a_robot_cannot_colour_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    held = Held(
+        number=1, robot="r1", boot_id="b", run_id="1", mission_id="m", revision=1, robot_ns=0,
+        mission_time_s=0.0, reason=RED,
+    )  # fmt: skip
+    written: list[str] = []
+    table = Table(written.append)
+    table.show(Field().controller.report())
+    table.show(held)
+    Lines(say).show(held)
+    tell(f"one\n{RED}")
+    assert RED not in written[-1]
+    assert RED not in "".join(capsys.readouterr())
+
+
+RED = "\x1b[31m"
+
+
+def test_a_duration_reads_as_a_clock() -> None:
+    assert clock(3725.9) == "1:02:05"
+
+
+def test_events_missed_while_the_link_was_cut_are_told_once_and_in_order() -> None:
+    board = Switchboard()
+    journal, wall = memory_journal(), WallClock(speed_up=200)
+    base, scanner = SimulatedBase(clock=wall), SimulatedScanner(clock=wall)
+    controller = Controller(
+        robot="r1", journal=journal, base=base, scanner=scanner, clock=wall, command_clock=WallClock(),
+        mission_taken=lambda mission: base.stand_at_start(pose_of(mission.start)),
+    )  # fmt: skip
+    agent = Agent(
+        keys=Keys("r1"), link=board.link(), journal=journal, controller=controller, base=base,
+        scanner=scanner, clock=wall, command_clock=WallClock(), speed_up=200,
+    )  # fmt: skip
+    with agents.on_link(agent):
+        station = Station(board.link(), Keys("r1"), commander="test")
+        station.push(corridor())
+        told: queue.Queue[Report] = queue.Queue()
+        watching = threading.Thread(target=lambda: [told.put(report) for report in station.reports()])
+        watching.start()
+        station.command("start")
+        while not isinstance(told.get(timeout=10), Scanned):
+            pass
+        board.cut = True
+        while controller.run.state != "FINISHED":
+            time.sleep(0.01)
+        board.cut = False
+        watching.join(20)
+    heard = [told.get() for _ in range(told.qsize())]
+    events = [report for report in heard if not isinstance(report, StateReport | PoseReport | Silence)]
+    assert [event.number for event in events] == list(range(events[0].number, journal.newest + 1))
+    assert heard[-1] is not None
+    assert [report.state for report in heard if isinstance(report, StateReport)][-1] == "FINISHED"
+
+
+def test_a_forged_publication_is_left_out() -> None:
+    field = Field()
+    station = field.station()
+    station.push(corridor())
+    field.order("start")
+    field.work()
+    reports = station.reports()
+    first = next(reports)
+    field.board.link().publisher(field.keys.state)(b"{}")
+    field.board.link().publisher(field.keys.event)(b"\xff")
+    rest = [first, *reports]
+    assert [report.state for report in rest if isinstance(report, StateReport)][-1] == "FINISHED"
+
+
+def test_an_answer_in_unknown_words_is_unknown() -> None:
+    field = Field()
+    station = field.station()
+    field.board.serving[field.keys.info] = lambda request: b'{"is": "Info", "protocol": 9}'
+    with pytest.raises(OutcomeUnknown, match="words this stopgo does not know"):
+        station.status()
+
+
+def test_a_robot_whose_work_has_failed_does_not_look_alive() -> None:
+    field = Field()
+    field.station().push(corridor())
+    agent = Agent(
+        keys=Keys("r1"), link=Switchboard().link(), journal=field.journal, controller=field.controller,
+        base=field.base, scanner=field.scanner, clock=field.clock, command_clock=WallClock(),
+    )  # fmt: skip
+
+    def broken(*arguments: object, **options: object) -> None:
+        raise ZeroDivisionError
+
+    field.base.goto = broken  # type: ignore[method-assign, assignment]
+    with agents.on_link(agent), pytest.raises(ZeroDivisionError):
+        field.order("start")
+        agent.wait()
+
+
+class Taken:
+    """A recording that keeps the revisions it is handed."""
+
+    def __init__(self) -> None:
+        self.revisions: list[int] = []
+
+    def mission(self, mission: Mission) -> None:
+        self.revisions.append(mission.revision)
+
+    def state(self, report: StateReport) -> None: ...
+
+    def pose(self, report: PoseReport) -> None: ...
+
+    def event(self, event: AnyEvent) -> None: ...
+
+
+def test_a_recording_is_handed_every_revision_in_turn_also_when_it_comes_late() -> None:
+    field, record = Field(), Taken()
+    field.station().push(corridor(stops=2))
+    field.order("start")
+    for revision in (2, 3):
+        field.station().push(corridor(stops=1 + revision, revision=revision))
+        while field.controller.run.revision != revision:
+            field.controller.step()
+    field.work()
+    watch_showing(field.station(), record, Lines(lambda line: None))
+    assert record.revisions == [1, 2, 3]
+
+
+@pytest.mark.parametrize(("verb", "code"), [("pause", 2), ("abort", 1)])
+def test_a_run_is_followed_to_its_end_though_its_recording_finds_no_room(
+    verb: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    field.order(verb)
+    field.order("resume")
+    field.work()
+    monkeypatch.setattr(cli, "reached", lambda way: nullcontext(field.station()))
+    rrd = tmp_path / "field.rrd"
+    with small_disk(0):
+        assert main(["watch", "--robot", "r1", "--rrd", str(rrd), "--json"]) == code
+    told = capsys.readouterr()
+    assert json.loads(told.out)["state"] == {2: "FINISHED", 1: "ABORTED"}[code]
+    assert [line for line in told.err.splitlines() if "field" in line] == [
+        f"{rrd.with_name('field.partial.rrd')}: cannot be written (File too large); "
+        "the recording waits in memory for room",
+        f"{'stopgo: ' * (code == 2)}{rrd}: could not be written whole (File too large); nothing is kept",
+    ]
