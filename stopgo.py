@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from contextlib import AbstractContextManager
 
-    from bridge.station.follow import Report
+    from bridge.station.follow import Followed
     from bridge.station.station import Station
     from mission.document import Mission
     from mission.floor import FloorPlan
@@ -171,7 +171,7 @@ def push(mission: Mission, station: Station) -> None:
     station.push(mission)
 
 
-def follow(station: Station) -> Iterator[Report]:
+def follow(station: Station) -> Iterator[Followed]:
     """States, poses and events of the robot's run as they come, until the run is over."""
     return station.reports()
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 
 from bridge.commands.spawn import end_robot, free_port, start_robot
-from bridge.link.protocol import Keys
+from bridge.link.protocol import KeyExpressions
 from bridge.link.zenoh_link import connecting
 from bridge.station.station import fleet
 from mission.events import PoseReport
@@ -55,7 +55,7 @@ def listen(endpoint: str, seconds: float) -> None:
         heard[report.robot].append(report.seq)
 
     with connecting(endpoint) as link:
-        link.hear(Keys("*").pose, take)
+        link.hear(KeyExpressions("*").pose, take)
         time.sleep(2.0)
         for seqs in heard.values():
             seqs.clear()

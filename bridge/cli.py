@@ -12,18 +12,18 @@ import typer
 
 from bridge.commands.connection import (
     DEFAULT_ENDPOINT,
+    Connection,
     Insecure,
     KeyFolder,
     SigningKey,
-    Site,
+    SiteName,
     StateFolder,
     Timeout,
     VehicleId,
-    Way,
     alone,
-    by_way,
     given_in,
     reached,
+    with_connection,
 )
 from bridge.commands.key_commands import key_commands
 from bridge.commands.order_commands import Json, TakeOver, add_orders, status_json
@@ -32,7 +32,7 @@ from bridge.console import Bar, print_json, refusals_in, say, tell
 from mission.errors import InputError
 
 if TYPE_CHECKING:
-    from bridge.mavlink.driving.mavlink_scanner import Trigger
+    from bridge.mavlink.driving.mavlink_scanner import ScanTrigger
     from bridge.station.watch import Recording
     from mission.document import Mission, Transform
     from mission.events import Pose
@@ -85,7 +85,7 @@ def robot(
     connect: Annotated[
         str | None, typer.Option(metavar="ENDPOINT", help="A router to connect to, instead of listening.")
     ] = None,
-    site: Site = None,
+    site: SiteName = None,
     speed_up: Annotated[
         float, typer.Option("--speed-up", min=0.01, max=1000, help="How much faster simulated time runs.")
     ] = 1.0,
@@ -148,7 +148,7 @@ def robot(
     Example: stopgo robot --mavlink-vehicle udpin:127.0.0.1:14550 --profile ardupilot --origin 47.4,8.5,400
     """
     from bridge.mavlink.driving.autopilot_body import AutopilotBody, autopilot_url
-    from bridge.robot.bodies import Incarnate, SimulatedBody
+    from bridge.robot.bodies import OpenBody, SimulatedBody
     from bridge.robot.program import RobotOptions, run_robot
     from bridge.robot.simulator import Faults, read_fault
 
@@ -172,7 +172,7 @@ def robot(
     url = autopilot_url(controller)
     if url is None:
         alone(given, "a simulated robot", "--signing-key", *driven)
-        body: Incarnate = SimulatedBody(
+        body: OpenBody = SimulatedBody(
             state, None if at is None else read_pose("--at", at), to_map, 3600 * endurance, faults
         )
     else:
@@ -203,7 +203,7 @@ def read_revisions(text: str) -> RevisionPolicy:
     return POLICIES[text]
 
 
-def read_trigger(text: str) -> Trigger:
+def read_trigger(text: str) -> ScanTrigger:
     """What makes an autopilot's scanner scan."""
     from bridge.mavlink.driving.mavlink_scanner import TRIGGERS
 
@@ -213,9 +213,9 @@ def read_trigger(text: str) -> Trigger:
     return known
 
 
-@by_way(without=("timeout",))
+@with_connection(without=("timeout",))
 def push(
-    way: Way,
+    connection: Connection,
     *,
     mission: Annotated[Path, typer.Argument(metavar="MISSION.json", help="The mission to send.")],
     take_over: TakeOver = False,
@@ -248,18 +248,23 @@ def push(
     """
     from mission.files.mission_json import read
 
-    if way.mavlink is None:
+    if connection.mavlink is None:
         alone(
-            way.given, "--robot", "--autopilot", "--trigger", "--scan-wait", "--settle", "--set-origin",
-            "--any-origin", "--while-running",
+            connection.given, "--robot", "--autopilot", "--trigger", "--scan-wait", "--settle",
+            "--set-origin", "--any-origin", "--while-running",
         )  # fmt: skip
-        return push_over_zenoh(read(mission), pushing(way, patience), take_over=take_over, json_=json_)
+        return push_over_zenoh(read(mission), pushing(connection, patience), take_over=take_over, json_=json_)
     from bridge.commands.vehicle_missions import Leave, Line, Writing, push_mission
 
-    alone(way.given, "--mavlink", "--take-over", "--as")
-    vehicle = way.mavlink
+    alone(connection.given, "--mavlink", "--take-over", "--as")
+    vehicle = connection.mavlink
     line = Line(
-        vehicle.url, vehicle.vehicle, vehicle.signing_key, way.insecure, autopilot, patience or way.timeout_s
+        vehicle.url,
+        vehicle.vehicle,
+        vehicle.signing_key,
+        connection.insecure,
+        autopilot,
+        patience or connection.timeout_s,
     )
     with refusals_in(json_):
         push_mission(
@@ -269,10 +274,10 @@ def push(
         )  # fmt: skip
 
 
-def push_over_zenoh(document: Mission, way: Way, *, take_over: bool, json_: bool) -> None:
+def push_over_zenoh(document: Mission, connection: Connection, *, take_over: bool, json_: bool) -> None:
     """Push to a robot of ours, and say what it did with the mission."""
-    robot = way.robot
-    with refusals_in(json_), reached(way) as station, Bar("pushing") as bar:
+    robot = connection.robot
+    with refusals_in(json_), reached(connection) as station, Bar("pushing") as bar:
         told = turning(station.info().to_map, document)
         accepted = station.push(document, progress=bar.show, take_over=take_over)
     if told:
@@ -346,9 +351,9 @@ def turning(own: Transform | None, mission: Mission) -> str:
     return f"on the robot's map, places are turned by {turned} ({whose})"
 
 
-@by_way(without=("who",))
+@with_connection(without=("who",))
 def watch(
-    way: Way,
+    connection: Connection,
     *,
     rrd: Annotated[
         Path | None, typer.Option("--rrd", metavar="FIELD.rrd", help="Record the run for Rerun.")
@@ -370,7 +375,7 @@ def watch(
 
     with (
         recording(rrd, view=view) as record,
-        reached(way.to_look(compares=True)) as station,
+        reached(connection.to_look(compares=True)) as station,
     ):
         state = watch_showing(station, record, Table() if sys.stderr.isatty() else Lines(say))
         if json_:
@@ -395,9 +400,9 @@ def recording(path: Path | None, *, view: bool) -> AbstractContextManager[Record
     return Viewed(record)
 
 
-def pushing(way: Way, timeout_s: float | None) -> Way:
-    """The way for a push, which takes as long as it takes: its timeout is that without an answer."""
-    return way if timeout_s is None else replace(way, timeout_s=timeout_s, patience_s=timeout_s)
+def pushing(connection: Connection, timeout_s: float | None) -> Connection:
+    """The connection for a push, which takes as long as it takes: its timeout is that without an answer."""
+    return connection if timeout_s is None else replace(connection, timeout_s=timeout_s, patience_s=timeout_s)
 
 
 def read_map(text: str | None) -> Transform | None:

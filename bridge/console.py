@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from mission.errors import AnswerIsNo
 from mission.table import printable, printable_lines
+
+Progress = Callable[[int, int], None]
+"""Called with what is done and what there is to do, as a bar's `show`."""
 
 KILOBYTES = ("kB", 1000)
 

@@ -201,3 +201,7 @@ class PoseReport(msgspec.Struct, frozen=True, kw_only=True):
     mission_time_s: float | None
     pose: Pose
     speed: float
+
+
+Report = StateReport | PoseReport | AnyEvent
+"""What a robot tells of itself and its run."""

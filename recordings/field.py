@@ -10,15 +10,13 @@ from typing import Any
 
 from mission.document import Mission
 from mission.errors import InputError
-from mission.events import AnyEvent, PoseReport, StateReport
+from mission.events import AnyEvent, PoseReport, Report, StateReport
 from mission.files.atomic import must_be_writable
 from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
 from recordings.compact import compact
 from recordings.pieces import Pieces
 from recordings.runs.drawing import RunDrawing
 from recordings.stages.mission import draw_mission, mission_extent
-
-Report = StateReport | PoseReport | AnyEvent
 
 
 class FieldRecording:

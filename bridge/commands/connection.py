@@ -1,4 +1,4 @@
-"""The ways to a robot, over zenoh by its name or over MAVLink by a URL, and the options that say which."""
+"""How a command reaches a robot, over zenoh by its name or over MAVLink by a URL, and the options for it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ AnyRobot = Annotated[str | None, typer.Option("--robot", metavar="NAME", help="N
 Connect = Annotated[
     str, typer.Option("--connect", metavar="ENDPOINT", help="Where it listens, such as tcp/127.0.0.1:7447.")
 ]
-Site = Annotated[str | None, typer.Option("--site", metavar="NAME", help="Prefix of the site's keys.")]
+SiteName = Annotated[str | None, typer.Option("--site", metavar="NAME", help="Prefix of the site's keys.")]
 As = Annotated[
     str | None, typer.Option("--as", metavar="WHO", help="Who gives the order; user@host if not given.")
 ]
@@ -58,8 +58,8 @@ StateFolder = Annotated[
 ]
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 VEHICLES = ("--vehicle", "--signing-key", "--state")
-"""Options of the way to a vehicle."""
-Given = frozenset[str]
+"""Options that reach a vehicle."""
+GivenOptions = frozenset[str]
 """The options on a command line, such as "--site"."""
 LEAST_S = 0.5
 """Left for a question or an order, however long it took to find the robot."""
@@ -83,7 +83,7 @@ class Mavlink:
 
 
 @dataclass(frozen=True)
-class Way:
+class Connection:
     """How a robot is to be reached, and by whom."""
 
     robot: str
@@ -97,29 +97,29 @@ class Way:
     patience_s: float = 20.0
     """For each piece of a mission that is pushed."""
     mavlink: Mavlink | None = field(default=None)
-    given: Given = frozenset()
+    given: GivenOptions = frozenset()
 
-    def to_drive(self, *, arm: bool = False, disarm: bool = False, any_origin: bool = False) -> Way:
-        """The same way, for an order and what it may do to a vehicle, or overlook."""
+    def to_drive(self, *, arm: bool = False, disarm: bool = False, any_origin: bool = False) -> Connection:
+        """The same connection, for an order and what it may do to a vehicle, or overlook."""
         if self.mavlink is None:
             alone(self.given, "--robot", "--arm", "--disarm", "--any-origin")
             return self
         given = replace(self.mavlink, arm=arm, disarm=disarm, any_origin=any_origin)
         return replace(self, mavlink=given)
 
-    def to_look(self, *, compares: bool = False) -> Way:
-        """The same way: to look at a vehicle and do no more, or to follow one whose mission is compared."""
+    def to_look(self, *, compares: bool = False) -> Connection:
+        """The same connection, to look at a vehicle, or to follow one whose mission is compared."""
         if self.mavlink is None:
             return self
         return replace(self, mavlink=replace(self.mavlink, looks_only=not compares, compares=compares))
 
 
-def way_of(
-    given: Given,
+def connection_of(
+    given: GivenOptions,
     *,
     robot: AnyRobot = None,
     connect: Connect = DEFAULT_ENDPOINT,
-    site: Site = None,
+    site: SiteName = None,
     who: As = None,
     mavlink: MavlinkUrl = None,
     vehicle: VehicleId = None,
@@ -128,21 +128,21 @@ def way_of(
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
     keys: KeyFolder = None,
-) -> Way:
-    """The way that the options mean; those after `given` are the options of every command that goes one."""
+) -> Connection:
+    """What the options mean; those after `given` are the options of every command that reaches a robot."""
     if mavlink is None:
         alone(given, "--robot", *VEHICLES)
         if robot is None:
             raise InputError("say which robot: --robot NAME, or --mavlink URL for a vehicle")
-        return Way(robot, connect, site, who, timeout, insecure, keys, given=given)
+        return Connection(robot, connect, site, who, timeout, insecure, keys, given=given)
     alone(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
-    return Way(
+    return Connection(
         "", connect, None, who, timeout, insecure, None,
         mavlink=Mavlink(mavlink, vehicle=vehicle, signing_key=signing_key, state=state), given=given,
     )  # fmt: skip
 
 
-def given_in(context: typer.Context) -> Given:
+def given_in(context: typer.Context) -> GivenOptions:
     """The options on the command line, whatever their values."""
     sources = {name: context.get_parameter_source(name) for name in context.params}
     typed = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
@@ -151,7 +151,7 @@ def given_in(context: typer.Context) -> Given:
     )
 
 
-def alone(given: Given, what: str, *options: str) -> None:
+def alone(given: GivenOptions, what: str, *options: str) -> None:
     """Refuse options that were given and have no meaning with `what`."""
     for option in options:
         if option in given:
@@ -161,24 +161,24 @@ def alone(given: Given, what: str, *options: str) -> None:
 CommandBody = Callable[..., Any]
 
 
-def by_way(*, without: tuple[str, ...] = ()) -> Callable[[CommandBody], CommandBody]:
-    """Gives a command's first parameter, `way`, by the options of `way_of`; none that it goes `without`."""
-    return partial(_by_way, without)
+def with_connection(*, without: tuple[str, ...] = ()) -> Callable[[CommandBody], CommandBody]:
+    """Gives a command its `connection` by the options of `connection_of`, but those `without`."""
+    return partial(_with_connection, without)
 
 
-def _by_way(without: tuple[str, ...], command: CommandBody) -> CommandBody:
+def _with_connection(without: tuple[str, ...], command: CommandBody) -> CommandBody:
     (_, *options), (_, *own) = (
         [
             one
             for one in inspect.signature(which, eval_str=True).parameters.values()
             if one.name not in without
         ]
-        for which in (way_of, command)
+        for which in (connection_of, command)
     )
 
     def called(context: typer.Context, **values: Any) -> Any:
         chosen = {option.name: values.pop(option.name) for option in options}
-        return command(way_of(given_in(context), **chosen), **values)
+        return command(connection_of(given_in(context), **chosen), **values)
 
     context = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context)
     everything = [context, *options, *own]
@@ -188,36 +188,37 @@ def _by_way(without: tuple[str, ...], command: CommandBody) -> CommandBody:
     return called
 
 
-def reached(way: Way) -> AbstractContextManager[Station]:
-    """The robot or vehicle at the end of the way; raises as both `connect` do."""
-    if way.mavlink is not None:
-        return _vehicle(way, way.mavlink)
+def reached(connection: Connection) -> AbstractContextManager[Station]:
+    """The robot or vehicle at the other end; raises as both `connect` do."""
+    if connection.mavlink is not None:
+        return _vehicle(connection, connection.mavlink)
     from bridge.station.station import connect
 
     return connect(
-        way.endpoint, robot=way.robot, site=way.site, commander=way.who, timeout_s=way.timeout_s,
-        patience_s=way.patience_s, insecure=way.insecure, keys=way.keys,
+        connection.endpoint, robot=connection.robot, site=connection.site, commander=connection.who,
+        timeout_s=connection.timeout_s, patience_s=connection.patience_s, insecure=connection.insecure,
+        keys=connection.keys,
     )  # fmt: skip
 
 
-def _vehicle(way: Way, mavlink: Mavlink) -> AbstractContextManager[Station]:
+def _vehicle(connection: Connection, mavlink: Mavlink) -> AbstractContextManager[Station]:
     from bridge.mavlink.auto.vehicle_agent import Options, connect
     from bridge.mavlink.auto.vehicle_orders import Consent
     from bridge.mavlink.line.wire import read_line
 
-    url, key = read_line(mavlink.url, mavlink.signing_key, insecure=way.insecure)
+    url, key = read_line(mavlink.url, mavlink.signing_key, insecure=connection.insecure)
     options = Options(
-        vehicle=mavlink.vehicle, signing_key=key, state=mavlink.state, timeout_s=way.timeout_s,
-        commander=way.who, consent=Consent(mavlink.arm, mavlink.disarm, mavlink.any_origin),
+        vehicle=mavlink.vehicle, signing_key=key, state=mavlink.state, timeout_s=connection.timeout_s,
+        commander=connection.who, consent=Consent(mavlink.arm, mavlink.disarm, mavlink.any_origin),
         looks_only=mavlink.looks_only, compares=mavlink.compares,
     )  # fmt: skip
     return connect(url, options)
 
 
 @contextmanager
-def in_time(way: Way) -> Iterator[Station]:
+def in_time(connection: Connection) -> Iterator[Station]:
     """A robot that has been reached, with what is left of the time for one question or order."""
     began = time.monotonic()
-    with reached(way) as station:
-        station.timeout_s = max(LEAST_S, way.timeout_s - (time.monotonic() - began))
+    with reached(connection) as station:
+        station.timeout_s = max(LEAST_S, connection.timeout_s - (time.monotonic() - began))
         yield station

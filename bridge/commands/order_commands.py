@@ -11,20 +11,20 @@ from bridge.commands.connection import (
     DEFAULT_ENDPOINT,
     VEHICLES,
     Connect,
+    Connection,
     Insecure,
     KeyFolder,
     MavlinkUrl,
     SigningKey,
-    Site,
+    SiteName,
     StateFolder,
     Timeout,
     VehicleId,
-    Way,
     alone,
-    by_way,
+    connection_of,
     given_in,
     in_time,
-    way_of,
+    with_connection,
 )
 from bridge.console import print_json, refusals_in, tell
 
@@ -52,9 +52,9 @@ def add_orders(app: typer.Typer) -> None:
     app.command()(status)
 
 
-@by_way()
+@with_connection()
 def start(
-    way: Way,
+    connection: Connection,
     *,
     take_over: TakeOver = False,
     again: Annotated[bool, typer.Option("--again", help="Run a mission that was run before.")] = False,
@@ -71,7 +71,7 @@ def start(
 
     Example: stopgo start --mavlink udpout:127.0.0.1:14550 --arm
     """
-    driving = way.to_drive(arm=arm, any_origin=any_origin)
+    driving = connection.to_drive(arm=arm, any_origin=any_origin)
     with refusals_in(json_), in_time(driving) as station:
         answer = station.command("start", again=again, from_here=from_here, take_over=take_over)
     report_answer(answer, station.keys.robot, json_)
@@ -91,7 +91,7 @@ def order_of(verb: Verb) -> Callable[..., None]:
     """The command that gives the order `verb`."""
 
     def command(
-        way: Way,
+        connection: Connection,
         *,
         stop: StopId = None,
         take_over: TakeOver = False,
@@ -100,14 +100,14 @@ def order_of(verb: Verb) -> Callable[..., None]:
         disarm: Annotated[bool, typer.Option("--disarm", help="Disarm a vehicle that stands.")] = False,
         json_: Json = False,
     ) -> None:
-        driving = way.to_drive(arm=arm, disarm=disarm, any_origin=any_origin)
+        driving = connection.to_drive(arm=arm, disarm=disarm, any_origin=any_origin)
         with refusals_in(json_), in_time(driving) as station:
             answer = station.command(verb, stop=stop, take_over=take_over)
         report_answer(answer, station.keys.robot, json_)
 
     command.__doc__ = f"{ABOUT[verb]}\n\nExample: stopgo {verb} --robot r1 --connect {DEFAULT_ENDPOINT}"
     without = () if verb in ("resume", "retry", "skip") else ("arm", "any_origin")
-    return by_way(without=without if verb == "abort" else (*without, "disarm"))(command)
+    return with_connection(without=without if verb == "abort" else (*without, "disarm"))(command)
 
 
 def status(
@@ -117,7 +117,7 @@ def status(
         str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot; all if not given.")
     ] = None,
     connect: Connect = DEFAULT_ENDPOINT,
-    site: Site = None,
+    site: SiteName = None,
     mavlink: MavlinkUrl = None,
     vehicle: VehicleId = None,
     signing_key: SigningKey = None,
@@ -141,11 +141,11 @@ def status(
         reports = fleet(connect, site=site, timeout_s=timeout, insecure=insecure, keys=keys)
         as_json: dict[str, Any] = {"robots": [status_json(report) for report in reports]}
     else:
-        way = way_of(
+        connection = connection_of(
             given, robot=robot, connect=connect, site=site, mavlink=mavlink, vehicle=vehicle,
             signing_key=signing_key, state=state, timeout=timeout, insecure=insecure, keys=keys,
         )  # fmt: skip
-        with in_time(way.to_look()) as station:
+        with in_time(connection.to_look()) as station:
             reports = (station.status(),)
         as_json = status_json(reports[0])
     if json_:

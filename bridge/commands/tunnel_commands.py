@@ -14,16 +14,16 @@ from bridge.commands.connection import (
     Insecure,
     KeyFolder,
     RobotName,
-    Site,
+    SiteName,
     alone,
     given_in,
 )
 from bridge.console import say
 
 if TYPE_CHECKING:
-    from bridge.mavlink.line.frames import Message
     from bridge.mavlink.line.transport import Transport
     from bridge.mavlink.tunnel.tunnel import Tunnel
+    from mission.mavlink.telemetry import Message
 
 MOST_KINDS = 100
 """More are the sign of nonsense, which is not worth a line each."""
@@ -58,7 +58,7 @@ def tunnel_robot(
     raw_orders: Annotated[
         bool, typer.Option("--raw-orders", help="Let stations order anything, not only look and stop.")
     ] = False,
-    site: Site = None,
+    site: SiteName = None,
     insecure: Insecure = False,
     keys: KeyFolder = None,
 ) -> None:
@@ -70,18 +70,18 @@ def tunnel_robot(
     Example: stopgo tunnel robot --name r1 --mavlink serial:/dev/ttyAMA1:57600 --connect tcp/127.0.0.1:7447
     """
     from bridge.link.access import access_control
-    from bridge.link.protocol import Keys
+    from bridge.link.protocol import KeyExpressions
     from bridge.link.zenoh_link import Guard, joining, listening
     from bridge.mavlink.line.url import read_url
-    from bridge.mavlink.tunnel.message_filter import Harmless
+    from bridge.mavlink.tunnel.message_filter import MessageFilter
     from bridge.mavlink.tunnel.tunnel import open_tunnel
     from bridge.robot.program import robots_keys
 
     if connect is not None:
         alone(given_in(context), "--connect", "--listen")
     _leave_on_sigterm()
-    own, held = Keys(name, site), None if keys is None else robots_keys(keys, name)
-    judge, refusals = Harmless(), Refusals()
+    own, held = KeyExpressions(name, site), None if keys is None else robots_keys(keys, name)
+    judge, refusals = MessageFilter(), Refusals()
     # One that joins is reached by nobody but the robot's own end, which decides who may what.
     access = None if held is None or connect else access_control(own)
     guard = Guard(held, insecure, access)
@@ -104,7 +104,7 @@ def tunnel_station(
         str, typer.Option("--mavlink", metavar="URL", help="Where the ground program is.")
     ] = "udpout:127.0.0.1:14550",
     connect: Connect = DEFAULT_ENDPOINT,
-    site: Site = None,
+    site: SiteName = None,
     insecure: Insecure = False,
     keys: KeyFolder = None,
 ) -> None:
@@ -113,12 +113,12 @@ def tunnel_station(
     Example: stopgo tunnel station --robot r1 --connect tcp/10.0.0.5:7447 --mavlink udpout:127.0.0.1:14550
     """
     from bridge.link.keys import now_utc, read_keys
-    from bridge.link.protocol import Keys
+    from bridge.link.protocol import KeyExpressions
     from bridge.link.zenoh_link import Guard, connecting
     from bridge.mavlink.tunnel.tunnel import open_tunnel
 
     _leave_on_sigterm()
-    own, held = Keys(robot, site), None if keys is None else read_keys(keys, now=now_utc())
+    own, held = KeyExpressions(robot, site), None if keys is None else read_keys(keys, now=now_utc())
     speaks = held is None or held.holder.role == "station"
     transport = _transport(mavlink, insecure)
     with connecting(connect, Guard(held, insecure)) as link, open_tunnel(

@@ -27,7 +27,7 @@ from mission.files.exports import qgc_plan, qgc_waypoints
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.autopilots import AUTOPILOTS, autopilot_named
 from mission.mavlink.fields import PLACED
-from mission.mavlink.items import Command, Frame, Item, ItemList
+from mission.mavlink.items import Command, Item, ItemList, MavFrame
 from mission.mavlink.local_frame import VehicleOrigin
 from mission.mavlink.read_back import home_item
 from mission.mavlink.translate import translate
@@ -220,8 +220,10 @@ def _home(peer: Peer, read: tuple[Item, ...], origin: VehicleOrigin | None) -> I
         return read[0]
     if origin is not None:
         return home_item(SiteOrigin(lat=origin.lat, lon=origin.lon, alt=origin.alt, heading_deg=0.0))
-    first = next((item for item in read if item.command in PLACED), Item(Command.NAV_WAYPOINT, Frame.GLOBAL))
-    return Item(Command.NAV_WAYPOINT, Frame.GLOBAL, x=first.x, y=first.y)
+    first = next(
+        (item for item in read if item.command in PLACED), Item(Command.NAV_WAYPOINT, MavFrame.GLOBAL)
+    )
+    return Item(Command.NAV_WAYPOINT, MavFrame.GLOBAL, x=first.x, y=first.y)
 
 
 def _origin_json(origin: VehicleOrigin | None) -> dict[str, float] | None:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from bridge.link.protocol import Keys
+from bridge.link.protocol import KeyExpressions
 
 
-def access_control(keys: Keys) -> dict[str, Any]:
+def access_control(keys: KeyExpressions) -> dict[str, Any]:
     """zenoh's `access_control` for one robot: default deny, viewers watch, stations command as well.
 
     A router in between holds a robot's certificate and passes on what stations ask; there the
@@ -33,8 +33,8 @@ def access_control(keys: Keys) -> dict[str, Any]:
     }
 
 
-def _watching(keys: Keys) -> list[dict[str, Any]]:
-    every = Keys.of_every_robot(keys.site)
+def _watching(keys: KeyExpressions) -> list[dict[str, Any]]:
+    every = KeyExpressions.of_every_robot(keys.site)
     asked = [every.info, keys.log, keys.poses, keys.mission("*", "part/*")]
     told = [f"{keys.root}/tel/*"]
     tokens = [every.alive]
@@ -51,7 +51,7 @@ def _watching(keys: Keys) -> list[dict[str, Any]]:
     ]
 
 
-def _commanding(keys: Keys) -> list[dict[str, Any]]:
+def _commanding(keys: KeyExpressions) -> list[dict[str, Any]]:
     orders = [keys.command("*"), keys.mission("*", "**")]
     return [
         _rule("command_ask", ["query"], "ingress", orders),
@@ -59,7 +59,7 @@ def _commanding(keys: Keys) -> list[dict[str, Any]]:
     ]
 
 
-def _overhearing(keys: Keys) -> list[dict[str, Any]]:
+def _overhearing(keys: KeyExpressions) -> list[dict[str, Any]]:
     """Frames from the vehicle."""
     down, alive = [keys.mavlink("down")], [keys.mavlink("alive")]
     return [
@@ -70,7 +70,7 @@ def _overhearing(keys: Keys) -> list[dict[str, Any]]:
     ]
 
 
-def _steering(keys: Keys) -> list[dict[str, Any]]:
+def _steering(keys: KeyExpressions) -> list[dict[str, Any]]:
     """Frames to the vehicle."""
     up = [keys.mavlink("up")]
     return [
@@ -79,7 +79,7 @@ def _steering(keys: Keys) -> list[dict[str, Any]]:
     ]
 
 
-def _tunnelling(keys: Keys) -> list[dict[str, Any]]:
+def _tunnelling(keys: KeyExpressions) -> list[dict[str, Any]]:
     """The tunnel's end at the robot, if it is a process of its own that joins the robot's."""
     down, up, alive = [keys.mavlink("down")], [keys.mavlink("up")], [keys.mavlink("alive")]
     return [

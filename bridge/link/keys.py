@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from cryptography import x509
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-Role = Literal["station", "viewer", "robot"]
-ROLES: Final[tuple[Role, ...]] = ("station", "viewer", "robot")
+HolderRole = Literal["station", "viewer", "robot"]
+ROLES: Final[tuple[HolderRole, ...]] = ("station", "viewer", "robot")
 AUTHORITY = "authority"
 AUTHORITY_DAYS = 3650
 DAYS = 90
@@ -52,7 +52,7 @@ class KeyFiles:
 class Holder(msgspec.Struct, frozen=True, kw_only=True):
     """Who a certificate was issued to."""
 
-    role: Role
+    role: HolderRole
     name: str
     not_before: datetime
     not_after: datetime
@@ -67,7 +67,7 @@ class Signature(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 @dataclass(frozen=True)
-class Keys:
+class HeldKeys:
     """Keys that have been read and found to fit together."""
 
     files: KeyFiles
@@ -141,7 +141,7 @@ def init_site(folder: Path, *, now: datetime) -> None:
     _write(files, certificate, certificate, key)
 
 
-def issue(folder: Path, role: Role, name: str, *, now: datetime, days: int = DAYS) -> KeyFiles:
+def issue(folder: Path, role: HolderRole, name: str, *, now: datetime, days: int = DAYS) -> KeyFiles:
     """Issue keys for `name` from the authority in `folder`, into a folder of that name.
 
     Raises
@@ -166,7 +166,7 @@ def issue(folder: Path, role: Role, name: str, *, now: datetime, days: int = DAY
     return files
 
 
-def read_keys(folder: Path, *, now: datetime) -> Keys:
+def read_keys(folder: Path, *, now: datetime) -> HeldKeys:
     """The keys in one holder's folder.
 
     Raises
@@ -193,7 +193,7 @@ def read_keys(folder: Path, *, now: datetime) -> Keys:
             f"{files.certificate}: valid from {holder.not_before:%Y-%m-%d %H:%M} to"
             f" {holder.not_after:%Y-%m-%d %H:%M} UTC; issue new keys for {holder.name}"
         )
-    return Keys(files, holder, authority, certificate, key)
+    return HeldKeys(files, holder, authority, certificate, key)
 
 
 def holder_of(certificate: x509.Certificate) -> Holder:
@@ -241,7 +241,7 @@ def _certificate(
     *,
     now: datetime,
     days: int,
-    role: Role | None,
+    role: HolderRole | None,
 ) -> x509.Certificate:
     """A certificate; without a role it is an authority's own."""
     from cryptography import x509

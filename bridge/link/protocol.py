@@ -16,7 +16,7 @@ from mission.document import Transform
 from mission.errors import InputError
 from mission.events import AnyEvent, PoseReport, StateReport
 from mission.run.lease import Lease
-from mission.run.orders import Answer, Count, Reason, Word
+from mission.run.orders import Answer, Count, Reason, ShortText
 
 VERSION: Final = 1
 CHUNK_BYTES: Final = 32 * 1024
@@ -33,7 +33,7 @@ _SITE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}(/[A-Za-z0-9][A-Za-z0-9_.-]{
 
 
 @dataclass(frozen=True)
-class Keys:
+class KeyExpressions:
     """The key expressions of one robot, `[<site>/]sx/1/<robot>/…`, or of every robot of a site."""
 
     robot: str
@@ -42,7 +42,7 @@ class Keys:
     """Robot `*` stands for every robot: to ask them or hear them, never to order."""
 
     @classmethod
-    def of_every_robot(cls, site: str | None) -> Keys:
+    def of_every_robot(cls, site: str | None) -> KeyExpressions:
         return cls("*", site, every=True)
 
     def __post_init__(self) -> None:
@@ -132,12 +132,12 @@ class Info(Tagged, frozen=True):
 class Manifest(Tagged, frozen=True):
     """What is about to be transferred, on `mission/<id>/begin`."""
 
-    mission_id: Word
+    mission_id: ShortText
     revision: Count
-    digest: Word
+    digest: ShortText
     """The mission's own digest."""
     size: Count
-    sha256: Word
+    sha256: ShortText
     """Of the transferred bytes."""
     chunk_bytes: Count
 
@@ -161,8 +161,8 @@ class Commit(Tagged, frozen=True):
     """Everything has been sent: verify and store it, on `mission/<id>/commit`."""
 
     manifest: Manifest
-    commander: Word
-    nonce: Word
+    commander: ShortText
+    nonce: ShortText
     """Taken once: the same commit may be sent again, but not to undo a later one."""
     not_after_ns: int
     fence: Count | None = None

@@ -19,7 +19,7 @@ from typing import Any
 
 import zenoh
 
-from bridge.link.keys import Keys, now_utc
+from bridge.link.keys import HeldKeys, now_utc
 from bridge.link.link import Answering, Hearing, Presence, Publish, Request
 from mission.errors import InputError
 
@@ -59,7 +59,7 @@ LAST_SECOND = timedelta(seconds=1)
 class Guard:
     """How a link is guarded: by keys, or by staying on this machine, or knowingly not at all."""
 
-    keys: Keys | None = None
+    keys: HeldKeys | None = None
     insecure: bool = False
     access: dict[str, Any] | None = None
     """zenoh's access control, at the end that is asked."""
@@ -143,7 +143,7 @@ def _opened(settings: dict[str, Any], endpoint: str, guard: Guard) -> Iterator[Z
 
 
 @contextmanager
-def _silent_after(link: ZenohLink, keys: Keys | None) -> Iterator[None]:
+def _silent_after(link: ZenohLink, keys: HeldKeys | None) -> Iterator[None]:
     """Whoever's keys have ended says and hears nothing more, also on a link of the last second."""
     if keys is None:
         yield

@@ -24,7 +24,7 @@ from bridge.link.protocol import (
     VERSION,
     Commit,
     Info,
-    Keys,
+    KeyExpressions,
     Malformed,
     Rejected,
     Reply,
@@ -74,7 +74,7 @@ class Agent:
     def __init__(
         self,
         *,
-        keys: Keys,
+        keys: KeyExpressions,
         link: Link,
         journal: Journal,
         controller: Controller,

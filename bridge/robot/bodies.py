@@ -24,7 +24,7 @@ class Body:
     take: Callable[[Mission], None]
 
 
-Incarnate = Callable[[Clock], AbstractContextManager[Body]]
+OpenBody = Callable[[Clock], AbstractContextManager[Body]]
 """Gives the body while the robot's program runs, on the run's clock."""
 
 

@@ -48,8 +48,8 @@ class OnMap:
         self, path: Sequence[Point], *, heading: float | None, limits: RobotSpec, interrupt: Event
     ) -> Outcome:
         points = [turned_point(point, self.to_map) for point in path]
-        onward = None if heading is None else heading + self.to_map.heading
-        return self._base.goto(points, heading=onward, limits=limits, interrupt=interrupt)
+        on_map = None if heading is None else heading + self.to_map.heading
+        return self._base.goto(points, heading=on_map, limits=limits, interrupt=interrupt)
 
     def stop(self) -> None:
         self._base.stop()

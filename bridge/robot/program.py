@@ -14,9 +14,9 @@ from bridge.link import keys as key_files
 from bridge.link.access import access_control
 from bridge.link.clock import Clock, WallClock
 from bridge.link.link import Link
-from bridge.link.protocol import Keys
+from bridge.link.protocol import KeyExpressions
 from bridge.robot.agent import Agent, on_link, trusting
-from bridge.robot.bodies import Incarnate
+from bridge.robot.bodies import OpenBody
 from bridge.robot.controller import Controller
 from bridge.robot.journal import Journal, open_journal
 from bridge.robot.simulator import NO_FAULTS, Faults
@@ -32,7 +32,7 @@ class RobotOptions:
     name: str
     listen: str
     state: Path
-    body: Incarnate
+    body: OpenBody
     """What it drives."""
     connect: str | None = None
     """A zenoh router to connect to, instead of listening."""
@@ -54,7 +54,7 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     from bridge.link.zenoh_link import Guard, joining, listening
 
     signal.signal(signal.SIGTERM, _leave)
-    keys = Keys(options.name, options.site)
+    keys = KeyExpressions(options.name, options.site)
     held = None if options.keys is None else robots_keys(options.keys, options.name)
     guard = Guard(held, options.insecure, None if held is None else access_control(keys))
     opened = joining(options.connect, guard) if options.connect else listening(options.listen, guard)
@@ -65,7 +65,7 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
 
 @contextmanager
 def robot_on(
-    link: Link, keys: Keys, options: RobotOptions, held: key_files.Keys | None = None
+    link: Link, keys: KeyExpressions, options: RobotOptions, held: key_files.HeldKeys | None = None
 ) -> Iterator[Agent]:
     """A robot on `link`; with keys of its own it obeys only what stations have signed."""
     with open_journal(options.state, options.name) as journal:
@@ -97,7 +97,7 @@ def clocks(journal: Journal, *, speed_up: float, now_ns: int | None = None) -> t
     return WallClock(speed_up=speed_up, origin_ns=origin_ns), wall
 
 
-def robots_keys(folder: Path, name: str) -> key_files.Keys:
+def robots_keys(folder: Path, name: str) -> key_files.HeldKeys:
     """The robot's own keys; anybody else's are refused."""
     held = key_files.read_keys(folder, now=key_files.now_utc())
     if (held.holder.role, held.holder.name) != ("robot", name):

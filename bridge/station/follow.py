@@ -12,8 +12,8 @@ from typing import Any
 import msgspec
 
 from bridge.link.link import Link
-from bridge.link.protocol import POSE_PAGE, Info, Keys, LogPage, PosePage, decode
-from mission.events import Aborted, AnyEvent, Finished, PoseReport, StateReport
+from bridge.link.protocol import POSE_PAGE, Info, KeyExpressions, LogPage, PosePage, decode
+from mission.events import Aborted, AnyEvent, Finished, PoseReport, Report, StateReport
 
 SILENCE_S = 1.0
 """After this long without a word the robot is asked."""
@@ -30,22 +30,22 @@ class Silence(msgspec.Struct, frozen=True, kw_only=True):
     seconds: float
 
 
-Report = StateReport | PoseReport | AnyEvent | Silence
-Heard = StateReport | PoseReport | AnyEvent
+Followed = Report | Silence
+"""What is told of a run that is followed."""
 
 
-def reports(link: Link, keys: Keys) -> Iterator[Report]:
+def reports(link: Link, keys: KeyExpressions) -> Iterator[Followed]:
     """Everything of the robot's run, until it is over; first what was, then what comes."""
     link.announce(keys.watcher(uuid.uuid4().hex[:12]))
     heard = _listen(link, keys)
-    follower = Follower(link, keys)
+    follower = RunFollower(link, keys)
     last = time.monotonic()
     while not follower.ended:
-        item = _next(heard, 0.0 if follower.path.behind else SILENCE_S)
+        item = _next(heard, 0.0 if follower.poses.behind else SILENCE_S)
         if item is not None:
             last = time.monotonic()
-        elif follower.path.behind:
-            yield from follower.path.catch_up()
+        elif follower.poses.behind:
+            yield from follower.poses.catch_up()
         if item is None and time.monotonic() - last >= SILENCE_S:
             yield Silence(seconds=time.monotonic() - last)
             item = _asked_state(link, keys)
@@ -54,10 +54,10 @@ def reports(link: Link, keys: Keys) -> Iterator[Report]:
     yield from _late_poses(heard, follower)
 
 
-class Path:
+class PoseHistory:
     """Which poses of a run have been told; those that were missed are asked for, page by page."""
 
-    def __init__(self, link: Link, keys: Keys) -> None:
+    def __init__(self, link: Link, keys: KeyExpressions) -> None:
         self._link = link
         self._keys = keys
         self._newest = 0
@@ -106,13 +106,13 @@ class Path:
         return None if reply is None else decode(reply, PosePage)
 
 
-class Follower:
+class RunFollower:
     """Which run is followed, and up to which event it has been told."""
 
-    def __init__(self, link: Link, keys: Keys) -> None:
+    def __init__(self, link: Link, keys: KeyExpressions) -> None:
         self._link = link
         self._keys = keys
-        self.path = Path(link, keys)
+        self.poses = PoseHistory(link, keys)
         self.run_id: str | None = None
         self.told = -1
         self.end: Finished | Aborted | None = None
@@ -124,7 +124,7 @@ class Follower:
         state = self.last_state
         return self.end is not None and state is not None and state.last_event >= self.end.number
 
-    def take(self, item: Heard) -> Iterator[Heard]:
+    def take(self, item: Report) -> Iterator[Report]:
         if isinstance(item, StateReport):
             self._settle_on(item)
             yield from self._missed(item.last_event)
@@ -132,7 +132,7 @@ class Follower:
                 self.last_state = item
                 yield item
         elif isinstance(item, PoseReport):
-            yield from self.path.take(item)
+            yield from self.poses.take(item)
         elif self.run_id is not None:
             yield from self._missed(item.number)
 
@@ -142,7 +142,7 @@ class Follower:
             self.told = state.last_event
         if self.run_id is None and state.run_id is not None:
             self.run_id, self.told = state.run_id, 0
-            self.path.run_id = state.run_id
+            self.poses.run_id = state.run_id
 
     def _missed(self, newest: int) -> Iterator[AnyEvent]:
         """Events up to `newest` that have not been told, read from the journal."""
@@ -159,16 +159,18 @@ class Follower:
                 self.told = max(self.told, page.newest)
 
 
-def log_page(link: Link, keys: Keys, *, since: int, run_id: str | None, timeout_s: float) -> LogPage | None:
+def log_page(
+    link: Link, keys: KeyExpressions, *, since: int, run_id: str | None, timeout_s: float
+) -> LogPage | None:
     """One page of the journal, or `None` if no answer came."""
     parameters = {"since": str(since)} | ({"run": run_id} if run_id else {})
     reply = link.ask(keys.log, timeout_s=timeout_s, parameters=parameters)
     return None if reply is None else decode(reply, LogPage)
 
 
-def _listen(link: Link, keys: Keys) -> queue.SimpleQueue[Heard]:
+def _listen(link: Link, keys: KeyExpressions) -> queue.SimpleQueue[Report]:
     """A queue that fills with what the robot tells; listening comes before asking, so no gap is left."""
-    heard: queue.SimpleQueue[Heard] = queue.SimpleQueue()
+    heard: queue.SimpleQueue[Report] = queue.SimpleQueue()
     link.hear(keys.event, lambda key, payload: _put(heard, payload, AnyEvent))
     link.hear(keys.pose, lambda key, payload: _put(heard, payload, PoseReport))
     link.hear(keys.state, lambda key, payload: _put(heard, payload, StateReport))
@@ -178,30 +180,30 @@ def _listen(link: Link, keys: Keys) -> queue.SimpleQueue[Heard]:
     return heard
 
 
-def _next(heard: queue.SimpleQueue[Heard], wait_s: float) -> Heard | None:
+def _next(heard: queue.SimpleQueue[Report], wait_s: float) -> Report | None:
     try:
         return heard.get(timeout=wait_s) if wait_s else heard.get_nowait()
     except queue.Empty:
         return None
 
 
-def _put(heard: queue.SimpleQueue[Heard], payload: bytes, kind: Any) -> None:
+def _put(heard: queue.SimpleQueue[Report], payload: bytes, kind: Any) -> None:
     """Take what can be read; anything else on these keys is not the robot's."""
     with suppress(msgspec.DecodeError):
         heard.put(msgspec.json.decode(payload, type=kind))
 
 
-def _asked_state(link: Link, keys: Keys) -> StateReport | None:
+def _asked_state(link: Link, keys: KeyExpressions) -> StateReport | None:
     reply = link.ask(keys.info, timeout_s=ASK_S)
     return None if reply is None else decode(reply, Info).state
 
 
-def _late_poses(heard: queue.SimpleQueue[Heard], follower: Follower) -> Iterator[Heard]:
+def _late_poses(heard: queue.SimpleQueue[Report], follower: RunFollower) -> Iterator[Report]:
     """Poses of the run that have not come yet, up to the first after its end."""
     end_ns = follower.end.robot_ns if follower.end else 0
     deadline = time.monotonic() + LAST_POSES_S
     while (left := deadline - time.monotonic()) > 0:
-        for pose in follower.path.catch_up():
+        for pose in follower.poses.catch_up():
             yield pose
             if pose.robot_ns > end_ns:
                 return

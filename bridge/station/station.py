@@ -12,15 +12,15 @@ import socket
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from bridge.link.keys import Keys as HeldKeys
-from bridge.link.keys import now_utc, read_keys
+from bridge.console import Progress
+from bridge.link.keys import HeldKeys, now_utc, read_keys
 from bridge.link.link import Link
 from bridge.link.protocol import (
     CHUNK_BYTES,
@@ -29,7 +29,7 @@ from bridge.link.protocol import (
     ChunkHeld,
     Commit,
     Info,
-    Keys,
+    KeyExpressions,
     Malformed,
     Manifest,
     MissionPart,
@@ -62,9 +62,6 @@ COMMIT_VALID_S = 60.0
 PATIENCE_S = 20.0
 """How long a push goes on without an answer: on a line that loses much, the link may be opened anew."""
 
-Progress = Callable[[int, int], None]
-"""Called with bytes held by the robot and bytes in all."""
-
 
 @contextmanager
 def connect(
@@ -95,7 +92,12 @@ def connect(
         raise InputError(f"--as {who}: the keys in {keys} are those of {held.holder.name}")
     with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
         station = Station(
-            link, Keys(robot, site), commander=who, timeout_s=timeout_s, patience_s=patience_s, held=held
+            link,
+            KeyExpressions(robot, site),
+            commander=who,
+            timeout_s=timeout_s,
+            patience_s=patience_s,
+            held=held,
         )
         station.reach(endpoint)
         yield station
@@ -120,7 +122,7 @@ def fleet(
 
     held = None if keys is None else read_keys(keys, now=now_utc())
     with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
-        station = Station(link, Keys.of_every_robot(site), commander=whoami(), timeout_s=timeout_s)
+        station = Station(link, KeyExpressions.of_every_robot(site), commander=whoami(), timeout_s=timeout_s)
         station.reach(endpoint)
         time.sleep(GATHER_S)
         infos = [decode(reply, Info) for reply in link.ask_all(station.keys.info, timeout_s=TRY_S)]
@@ -138,7 +140,7 @@ class Station:
     def __init__(
         self,
         link: Link,
-        keys: Keys,
+        keys: KeyExpressions,
         *,
         commander: str,
         timeout_s: float = 5.0,
@@ -315,7 +317,7 @@ class Station:
                 return tuple(told)
             since = page.events[-1].number
 
-    def reports(self) -> Iterator[follow.Report]:
+    def reports(self) -> Iterator[follow.Followed]:
         """States, poses and events of the robot's run as they come, gaps filled, until the run is over.
 
         If the robot's mission has not been run yet, the next run is waited for.

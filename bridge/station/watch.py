@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from bridge.station.follow import Report, Silence
+from bridge.station.follow import Followed, Silence
 from bridge.station.station import Station
 from mission.document import Mission
 from mission.errors import OutcomeUnknown
@@ -46,7 +46,7 @@ class Showing(Protocol):
 
     def mission(self, mission: Mission) -> None: ...
 
-    def show(self, report: Report) -> None: ...
+    def show(self, report: Followed) -> None: ...
 
 
 def watch_run(station: Station, record: Recording | None, *, say: Callable[[str], None]) -> StateReport:
@@ -79,7 +79,7 @@ def watch_showing(station: Station, record: Recording | None, showing: Showing) 
     return state
 
 
-def _plan_of(report: Report) -> tuple[str | None, int | None] | None:
+def _plan_of(report: Followed) -> tuple[str | None, int | None] | None:
     """Run and revision that a state or an event is of; none before a run.
 
     Events tell of every revision in turn; a state may come when two have passed.
@@ -97,7 +97,7 @@ def _introduce(station: Station, report: Any, record: Recording | None, showing:
         record.mission(mission)
 
 
-def hand_over(record: Recording, report: Report) -> None:
+def hand_over(record: Recording, report: Followed) -> None:
     """Give a report to the recording's method for it."""
     if isinstance(report, StateReport):
         record.state(report)
@@ -117,7 +117,7 @@ class Lines:
     def mission(self, mission: Mission) -> None:
         self._say(f"{mission.name}: {len(mission.stops)} stops")
 
-    def show(self, report: Report) -> None:
+    def show(self, report: Followed) -> None:
         if isinstance(report, StateReport):
             if not self._greeted and report.run_id is None:
                 self._say(f"{report.robot} is {report.state}; waiting for a run")
@@ -144,7 +144,7 @@ class Table:
     def mission(self, mission: Mission) -> None:
         self._mission = mission
 
-    def show(self, report: Report) -> None:
+    def show(self, report: Followed) -> None:
         self._silent_s = report.seconds if isinstance(report, Silence) else 0.0
         if isinstance(report, StateReport):
             self._state = report

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mission.files.sheet import Sheet
+from mission.files.sheet import PaperSheet
 from mission.files.svg import group, line_data, number, path, ring_data
 from mission.floor import Element, FloorPlan
 from mission.geometry import BoolArray, FloatArray, Polygon
@@ -34,7 +34,7 @@ PASSABLE: dict[str, object] = {"stroke": "#0b63b0", "stroke_width": 0.4}
 BLOCKED: dict[str, object] = {"stroke": "#e07b00", "stroke_width": 0.5}
 
 
-def building(space: NavigableSpace, sheet: Sheet) -> Iterator[str]:
+def building(space: NavigableSpace, sheet: PaperSheet) -> Iterator[str]:
     """Floor, rooms, elements by kind, and openings."""
     floor = space.floor
     outline = "".join(_region(part, sheet) for part in floor.outline)
@@ -47,7 +47,7 @@ def building(space: NavigableSpace, sheet: Sheet) -> Iterator[str]:
     yield from _openings(space.openings, sheet)
 
 
-def targets(selection: Selection, sheet: Sheet) -> Iterator[str]:
+def targets(selection: Selection, sheet: PaperSheet) -> Iterator[str]:
     """Faces out of every candidate's sight, in sight but not seen, and seen."""
     visibility = selection.visibility
     seen = seen_units(selection)
@@ -81,17 +81,17 @@ def cross(at: FloatArray, *, size: float) -> str:
     )
 
 
-def _region(part: Polygon, sheet: Sheet) -> str:
+def _region(part: Polygon, sheet: PaperSheet) -> str:
     return "".join(ring_data(sheet.on_paper(ring)) for ring in part.rings)
 
 
-def _elements(elements: list[Element], sheet: Sheet) -> Iterator[str]:
+def _elements(elements: list[Element], sheet: PaperSheet) -> Iterator[str]:
     solids = (_region(part, sheet) for item in elements for part in item.solids)
     yield path(solids, **_EVEN_ODD)
     yield path((line_data(sheet.on_paper(line)) for item in elements for line in item.lines), fill="none")
 
 
-def _openings(openings: tuple[OpeningState, ...], sheet: Sheet) -> Iterator[str]:
+def _openings(openings: tuple[OpeningState, ...], sheet: PaperSheet) -> Iterator[str]:
     """Passable ones as a line from jamb to jamb, the others with an × on it; passages dashed."""
     for name, passable, look in (("passable", True, PASSABLE), ("blocked", False, BLOCKED)):
         chosen = [state for state in openings if state.passable == passable]
@@ -104,16 +104,16 @@ def _openings(openings: tuple[OpeningState, ...], sheet: Sheet) -> Iterator[str]
         )
 
 
-def _lines(openings: list[OpeningState], kind: str, sheet: Sheet) -> str:
+def _lines(openings: list[OpeningState], kind: str, sheet: PaperSheet) -> str:
     data = [line_data(sheet.on_paper(item.opening.line)) for item in openings if item.opening.kind == kind]
     return path(data, **({"stroke_dasharray": "1.2 0.7"} if kind == "passage" else {}))
 
 
-def _middle(state: OpeningState, sheet: Sheet) -> FloatArray:
+def _middle(state: OpeningState, sheet: PaperSheet) -> FloatArray:
     return sheet.on_paper(state.opening.line.mean(axis=0))
 
 
-def _strokes(targets: Targets, units: BoolArray, sheet: Sheet) -> Iterator[str]:
+def _strokes(targets: Targets, units: BoolArray, sheet: PaperSheet) -> Iterator[str]:
     """Path data of the units of a mask; stretches that meet end to end become one polyline."""
     runs = runs_of(targets, units)
     a, b = targets.a[runs.segment], targets.b[runs.segment]

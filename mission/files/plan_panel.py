@@ -12,7 +12,7 @@ from mission.document import Mission
 from mission.figures import Figures, Share, percent
 from mission.files import floor_drawing as floor_look
 from mission.files import route_drawing as route_look
-from mission.files.sheet import COLUMN, HEADER, ROW, Box, Chunk, Sheet
+from mission.files.sheet import COLUMN, HEADER, ROW, Chunk, PaperBox, PaperSheet
 from mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
 from mission.planning import Route
 from mission.schedule import schedule
@@ -31,7 +31,7 @@ def title_height(facts: list[tuple[str, str]]) -> float:
     return TITLE_HEAD + LINE * len(facts) + 2.0
 
 
-def title_block(mission: Mission, facts: list[tuple[str, str]], box: Box) -> str:
+def title_block(mission: Mission, facts: list[tuple[str, str]], box: PaperBox) -> str:
     """The plan's name, and what it is of, when, and for which machine."""
     name = shortened(mission.name, size=5.0, width=box.width - 6)
     lines = [
@@ -106,7 +106,7 @@ def _back_words(route: Route) -> str:
     return "back to the start" if route.tour == "closed" else "on to the end"
 
 
-def legend(entries: list[tuple[str, str]], mission: Mission, sheet: Sheet) -> str:
+def legend(entries: list[tuple[str, str]], mission: Mission, sheet: PaperSheet) -> str:
     """Symbols in two columns; below them the scale bar, the axes and north."""
     box = sheet.legend
     rows = math.ceil(len(entries) / 2)
@@ -153,7 +153,7 @@ _STROKES: dict[str, dict[str, object]] = {
 }
 
 
-def _scale_bar(sheet: Sheet, *, x: float, y: float) -> str:
+def _scale_bar(sheet: PaperSheet, *, x: float, y: float) -> str:
     """Five alternating fields over a round number of metres, at most 50 mm long."""
     metres = max(step * 10.0**power for power in range(-1, 7) for step in (1, 2, 5)
                  if sheet.length(step * 10.0**power) <= 50.01)  # fmt: skip
@@ -281,18 +281,18 @@ def _row(row: Row, x: float, y: float) -> str:
     return f'<g font-weight="bold">{spans}</g>' if row.bold else spans
 
 
-def _frame(box: Box) -> str:
+def _frame(box: PaperBox) -> str:
     return rect(box.x, box.y, box.width, box.height, fill="#fff", stroke="#000", stroke_width=0.25)
 
 
-def coordinate_ticks(sheet: Sheet) -> str:
+def coordinate_ticks(sheet: PaperSheet) -> str:
     """Coordinates of the site along the drawing's lower and left edge, in round metres."""
     step = next(s * 10.0**p for p in range(-1, 9) for s in (1, 2, 5) if sheet.length(s * 10.0**p) >= 25)
     items = [*_ticks(sheet, step, axis=0), *_ticks(sheet, step, axis=1)]
     return group("coordinates", items, fill="#666666", stroke_width=0.15, text_anchor="middle")
 
 
-def _ticks(sheet: Sheet, step: float, *, axis: int) -> Iterator[str]:
+def _ticks(sheet: PaperSheet, step: float, *, axis: int) -> Iterator[str]:
     box = sheet.drawing
     room = ((box.width, box.height)[axis] / 2 - 7.0) * sheet.scale / 1000
     first = math.ceil((sheet.centre[axis] - room) / step)

@@ -12,7 +12,7 @@ from mission.files import plan_panel as panel
 from mission.files.floor_drawing import building, targets
 from mission.files.room_labels import Busy, points_along, room_labels
 from mission.files.route_drawing import STOP, rings, route, stops
-from mission.files.sheet import Box, Contents, Sheet, fit
+from mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit
 from mission.files.svg import FONT, attributes, clean, number, rect
 from mission.floor import FloorPlan
 from mission.geometry import FloatArray, bounds
@@ -35,7 +35,7 @@ def plan_svg(
     rows = [*panel.stop_rows(mission), *(panel.figure_rows(figures) if figures else [])]
     facts = panel.facts_of(made, mission, date=date)
     blocks = (panel.legend_height(entries), panel.title_height([*facts, ("Scale", "")]), len(rows))
-    sheet = fit(Contents(_bounds(made, mission), PADDING, *blocks))
+    sheet = fit(SheetContents(_bounds(made, mission), PADDING, *blocks))
     drawn = (
         *_drawing(made, mission, sheet, with_range=with_range),
         panel.title_block(mission, [*facts, ("Scale", _scale(sheet))], sheet.title),
@@ -45,7 +45,7 @@ def plan_svg(
     return _document(sheet, mission, "\n".join(item for item in drawn if item))
 
 
-def _drawing(made: Route, mission: Mission, sheet: Sheet, *, with_range: bool) -> tuple[str, ...]:
+def _drawing(made: Route, mission: Mission, sheet: PaperSheet, *, with_range: bool) -> tuple[str, ...]:
     """Everything to scale, from the floor up to the numbers."""
     space = made.selection.visibility.candidates.space
     parts = chain(
@@ -61,7 +61,7 @@ def _drawing(made: Route, mission: Mission, sheet: Sheet, *, with_range: bool) -
     return (clipped, _outline(sheet.drawing), panel.coordinate_ticks(sheet))
 
 
-def _busy(mission: Mission, floor: FloorPlan, sheet: Sheet) -> Busy:
+def _busy(mission: Mission, floor: FloorPlan, sheet: PaperSheet) -> Busy:
     """What room names keep away from: stops above all, then the route, then elements."""
     turns = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     disc = (STOP + 0.5) * np.stack([np.cos(turns), np.sin(turns)], axis=1)
@@ -94,16 +94,16 @@ def _bounds(made: Route, mission: Mission) -> tuple[float, float, float, float]:
     return bounds([*outline, *rooms, *solids, *lines, *openings, *_legs(mission), start])
 
 
-def _scale(sheet: Sheet) -> str:
+def _scale(sheet: PaperSheet) -> str:
     lying = "landscape" if sheet.width > sheet.height else "portrait"
     return f"1:{sheet.scale} on {sheet.paper} {lying}"
 
 
-def _outline(box: Box) -> str:
+def _outline(box: PaperBox) -> str:
     return rect(box.x, box.y, box.width, box.height, fill="none", stroke="#000", stroke_width=0.35)
 
 
-def _document(sheet: Sheet, mission: Mission, content: str) -> bytes:
+def _document(sheet: PaperSheet, mission: Mission, content: str) -> bytes:
     size = {
         "width": f"{number(sheet.width)}mm",
         "height": f"{number(sheet.height)}mm",

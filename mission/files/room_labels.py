@@ -8,7 +8,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from mission.files.sheet import Sheet
+from mission.files.sheet import PaperSheet
 from mission.files.svg import group, shortened, text, text_width
 from mission.floor import Room
 from mission.geometry import BoolArray, FloatArray
@@ -67,7 +67,7 @@ class Label:
         return self.centre + grid * self.half
 
 
-def room_labels(rooms: tuple[Room, ...], sheet: Sheet, *, avoid: Busy) -> str:
+def room_labels(rooms: tuple[Room, ...], sheet: PaperSheet, *, avoid: Busy) -> str:
     """Name and area of each room, off `avoid` and each other where the room is large enough."""
     labels: list[Label] = []
     # The smallest rooms first: they have the least choice.
@@ -79,7 +79,7 @@ def room_labels(rooms: tuple[Room, ...], sheet: Sheet, *, avoid: Busy) -> str:
     return group("names", drawn, text_anchor="middle", fill="#222222", stroke_linejoin="round", **style)
 
 
-def _label(room: Room, sheet: Sheet, avoid: Busy) -> Label:
+def _label(room: Room, sheet: PaperSheet, avoid: Busy) -> Label:
     """On one line or two, whichever covers less."""
     rings = [sheet.on_paper(ring) for part in room.polygons for ring in part.rings]
     widest = max(float(np.ptp(np.concatenate(rings)[:, 0])) - 1.0, LEAST)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from mission.document import Mission, Point, Stop
-from mission.files.sheet import Sheet
+from mission.files.sheet import PaperSheet
 from mission.files.svg import circle, group, line, line_data, path, polygon, text
 from mission.geometry import FloatArray
 
@@ -24,14 +24,14 @@ _ARROW_LEAST = 8.0
 """Shorter legs have no room for an arrow between their stops."""
 
 
-def rings(mission: Mission, sheet: Sheet) -> str:
+def rings(mission: Mission, sheet: PaperSheet) -> str:
     """How far the scanner reaches from each stop, faintly."""
     reach = sheet.length(mission.scanner.range)
     circles = [circle(x, y, reach) for x, y in _stops_on_paper(mission, sheet).tolist()]
     return group("range", circles, fill="none", stroke="#b9a6dd", stroke_width=0.12, stroke_dasharray="1 1.5")
 
 
-def route(mission: Mission, sheet: Sheet) -> Iterator[str]:
+def route(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
     """Legs with direction arrows; the return leg dashed."""
     legs = [_on_paper(stop.approach, sheet) for stop in mission.stops]
     back = _on_paper(mission.return_ or (), sheet)
@@ -42,7 +42,7 @@ def route(mission: Mission, sheet: Sheet) -> Iterator[str]:
     yield group("directions", arrows, fill=WAY["stroke"])
 
 
-def stops(mission: Mission, sheet: Sheet) -> Iterator[str]:
+def stops(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
     """The start, then each stop's disc with its number and a tick where it faces."""
     yield start_mark(sheet.on_paper(np.array([mission.start.x, mission.start.y])))
     places = _stops_on_paper(mission, sheet)
@@ -74,7 +74,7 @@ def stop_mark(at: FloatArray, number: str, *, heading: float, doorway: bool) -> 
     ))  # fmt: skip
 
 
-def _stops_on_paper(mission: Mission, sheet: Sheet) -> FloatArray:
+def _stops_on_paper(mission: Mission, sheet: PaperSheet) -> FloatArray:
     return sheet.on_paper(_xy(mission.stops))
 
 
@@ -82,7 +82,7 @@ def _xy(stops: Sequence[Stop]) -> FloatArray:
     return np.array([[stop.x, stop.y] for stop in stops], dtype=np.float64).reshape(-1, 2)
 
 
-def _on_paper(leg: Sequence[Point], sheet: Sheet) -> FloatArray:
+def _on_paper(leg: Sequence[Point], sheet: PaperSheet) -> FloatArray:
     return sheet.on_paper(np.array(leg, dtype=np.float64).reshape(-1, 2))
 
 

@@ -23,7 +23,7 @@ HEADER = 5.0
 
 
 @dataclass(frozen=True)
-class Box:
+class PaperBox:
     """A rectangle on paper, in millimetres from the sheet's upper left corner."""
 
     x: float
@@ -36,13 +36,13 @@ class Box:
 class Chunk:
     """A piece of the table: `count` rows from row `first` on."""
 
-    box: Box
+    box: PaperBox
     first: int
     count: int
 
 
 @dataclass(frozen=True)
-class Sheet:
+class PaperSheet:
     """A sheet of paper, what stands where on it, and its scale."""
 
     paper: str
@@ -50,9 +50,9 @@ class Sheet:
     height: float
     scale: int
     """N of 1:N."""
-    drawing: Box
-    legend: Box
-    title: Box
+    drawing: PaperBox
+    legend: PaperBox
+    title: PaperBox
     table: tuple[Chunk, ...]
     centre: tuple[float, float]
     """The point of the site, in metres, at the centre of the drawing."""
@@ -69,7 +69,7 @@ class Sheet:
 
 
 @dataclass(frozen=True)
-class Contents:
+class SheetContents:
     """What is to go on a sheet: the site's bounds in metres, and heights of the blocks in mm."""
 
     bounds: tuple[float, float, float, float]
@@ -89,7 +89,7 @@ class Contents:
         return ((x1 - x0) * 1000 / scale + 2 * self.padding, (y1 - y0) * 1000 / scale + 2 * self.padding)
 
 
-def fit(contents: Contents) -> Sheet:
+def fit(contents: SheetContents) -> PaperSheet:
     """The sheet for a plan: the largest scale that is still handy, on the smallest paper that holds it."""
     for scale, papers in _scales():
         for paper in papers:
@@ -113,7 +113,9 @@ def _scales() -> Iterator[tuple[int, tuple[str, ...]]]:
             yield step * 10**power, papers
 
 
-def _beside(contents: Contents, paper: str, width: float, height: float, scale: int) -> Sheet | None:
+def _beside(
+    contents: SheetContents, paper: str, width: float, height: float, scale: int
+) -> PaperSheet | None:
     """Columns to the right of the drawing."""
     tall = height - 2 * MARGIN
     wide, high = contents.size(scale)
@@ -121,13 +123,15 @@ def _beside(contents: Contents, paper: str, width: float, height: float, scale: 
         left = width - MARGIN - columns * (COLUMN + GAP)
         packed = _packed(contents, columns, x=left + GAP, y=MARGIN, height=tall)
         if packed is not None:
-            drawing = Box(MARGIN, MARGIN, left - MARGIN, tall)
+            drawing = PaperBox(MARGIN, MARGIN, left - MARGIN, tall)
             fits = wide <= drawing.width and high <= drawing.height
-            return Sheet(paper, width, height, scale, drawing, *packed, contents.centre) if fits else None
+            return (
+                PaperSheet(paper, width, height, scale, drawing, *packed, contents.centre) if fits else None
+            )
     return None
 
 
-def _below(contents: Contents, paper: str, width: float, height: float, scale: int) -> Sheet | None:
+def _below(contents: SheetContents, paper: str, width: float, height: float, scale: int) -> PaperSheet | None:
     """Columns in a strip under the drawing, as low as it can be."""
     columns = int((width - 2 * MARGIN + GAP) // (COLUMN + GAP))
     left = width - MARGIN - columns * (COLUMN + GAP) + GAP
@@ -138,41 +142,41 @@ def _below(contents: Contents, paper: str, width: float, height: float, scale: i
     for strip in np.arange(max(contents.legend, contents.title), most, ROW).tolist():
         packed = _packed(contents, columns, x=left, y=height - MARGIN - strip, height=strip)
         if packed is not None:
-            drawing = Box(MARGIN, MARGIN, width - 2 * MARGIN, height - 2 * MARGIN - GAP - strip)
-            return Sheet(paper, width, height, scale, drawing, *packed, contents.centre)
+            drawing = PaperBox(MARGIN, MARGIN, width - 2 * MARGIN, height - 2 * MARGIN - GAP - strip)
+            return PaperSheet(paper, width, height, scale, drawing, *packed, contents.centre)
     return None
 
 
 def _packed(
-    contents: Contents, columns: int, *, x: float, y: float, height: float
-) -> tuple[Box, Box, tuple[Chunk, ...]] | None:
+    contents: SheetContents, columns: int, *, x: float, y: float, height: float
+) -> tuple[PaperBox, PaperBox, tuple[Chunk, ...]] | None:
     """Title block at the lower right, the legend above or left of it, the table in what is left."""
     lefts = [x + number * (COLUMN + GAP) for number in range(columns)]
     together = contents.legend + GAP + contents.title <= height
     beside = 0 if together else 1
     if beside >= columns or max(contents.legend, contents.title) > height:
         return None
-    legend = Box(lefts[-1 - beside], y, COLUMN, contents.legend)
-    title = Box(lefts[-1], y + height - contents.title, COLUMN, contents.title)
-    spans = [Box(left, y, COLUMN, height) for left in lefts[: columns - 1 - beside]]
+    legend = PaperBox(lefts[-1 - beside], y, COLUMN, contents.legend)
+    title = PaperBox(lefts[-1], y + height - contents.title, COLUMN, contents.title)
+    spans = [PaperBox(left, y, COLUMN, height) for left in lefts[: columns - 1 - beside]]
     below_legend = legend.y + legend.height + GAP
     if together:
-        spans.append(Box(legend.x, below_legend, COLUMN, title.y - GAP - below_legend))
+        spans.append(PaperBox(legend.x, below_legend, COLUMN, title.y - GAP - below_legend))
     else:
-        spans.append(Box(legend.x, below_legend, COLUMN, y + height - below_legend))
-        spans.append(Box(title.x, y, COLUMN, title.y - GAP - y))
+        spans.append(PaperBox(legend.x, below_legend, COLUMN, y + height - below_legend))
+        spans.append(PaperBox(title.x, y, COLUMN, title.y - GAP - y))
     table = _chunks(spans, contents.rows)
     return None if table is None else (legend, title, table)
 
 
-def _chunks(spans: list[Box], rows: int) -> tuple[Chunk, ...] | None:
+def _chunks(spans: list[PaperBox], rows: int) -> tuple[Chunk, ...] | None:
     """The table's rows over the spans from left to right, or None if they do not fit."""
     chunks: list[Chunk] = []
     first = 0
     for span in spans:
         count = min(int((span.height - HEADER) // ROW), rows - first)
         if count > 0:
-            box = Box(span.x, span.y, span.width, HEADER + count * ROW)
+            box = PaperBox(span.x, span.y, span.width, HEADER + count * ROW)
             chunks.append(Chunk(box, first, count))
             first += count
     return tuple(chunks) if first >= rows else None

@@ -30,7 +30,7 @@ Picture = tuple[int, int]
 """The picture's number and the vehicle's time (ms since it was started); the same however often told."""
 
 
-class Captured(Protocol):
+class CaptureMessage(Protocol):
     """The fields of CAMERA_IMAGE_CAPTURED that are read."""
 
     image_index: int
@@ -59,17 +59,17 @@ class Capture:
         return away <= (NEAR_M if isinstance(self.result, ScanFailed) else stop.tolerance_m + STEPS_M)
 
 
-def capture_of(message: Captured, sent: ItemList | None) -> Capture:
+def capture_of(message: CaptureMessage, sent: ItemList | None) -> Capture:
     """What the message tells of a scan, placed in the site whose items were sent."""
     return Capture(picture_of(message), _pose(message, sent), result_of(message))
 
 
-def picture_of(message: Captured) -> Picture:
+def picture_of(message: CaptureMessage) -> Picture:
     """What tells a picture from others; cameras that were started again count anew."""
     return int(message.image_index), int(message.time_boot_ms)
 
 
-def result_of(message: Captured) -> ScanResult | ScanFailed:
+def result_of(message: CaptureMessage) -> ScanResult | ScanFailed:
     """What the message says of the scan."""
     if message.capture_result != 1:
         return ScanFailed(reason="the vehicle reports that the scan failed")
@@ -95,7 +95,7 @@ def _count(text: str) -> int:
     return int(text) if _NUMBER.fullmatch(text) else 0
 
 
-def _pose(message: Captured, sent: ItemList | None) -> Pose | None:
+def _pose(message: CaptureMessage, sent: ItemList | None) -> Pose | None:
     if sent is None or (message.lat, message.lon) == (0, 0):
         return None
     x, y = point_at(sent, message.lat, message.lon)

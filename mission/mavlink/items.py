@@ -7,7 +7,7 @@ from typing import Literal
 
 from mission.document import SiteOrigin
 
-Role = Literal["home", "speed", "corner", "stop", "settle", "trigger", "scan", "return", "other"]
+ItemRole = Literal["home", "speed", "corner", "stop", "settle", "trigger", "scan", "return", "other"]
 """What an item does in a mission of scan stops."""
 
 NAN = float("nan")
@@ -92,7 +92,7 @@ NAMES = {
 """Names of the commands that mission lists hold in practice, without the prefix MAV_CMD_."""
 
 
-class Frame:
+class MavFrame:
     """MAV_FRAME numbers that are used here."""
 
     GLOBAL = 0
@@ -133,7 +133,7 @@ class Placed:
     """An item and what it is for."""
 
     item: Item
-    role: Role
+    role: ItemRole
     stop: str | None = None
     """Id of the scan stop it belongs to."""
 

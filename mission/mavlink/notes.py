@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from mission.document import Mission
-from mission.mavlink.translation_options import Manner
+from mission.mavlink.translation_options import TranslationOptions
 from mission.run.scans import needs_heading
 
 
-def notes_of(mission: Mission, manner: Manner) -> tuple[str, ...]:
+def notes_of(mission: Mission, options: TranslationOptions) -> tuple[str, ...]:
     """A line for each thing that is not carried by the items."""
-    return (*_failures(mission), *_arrival(mission, manner), *_policy(mission))
+    return (*_failures(mission), *_arrival(mission, options), *_policy(mission))
 
 
 def _failures(mission: Mission) -> Iterator[str]:
@@ -24,12 +24,12 @@ def _failures(mission: Mission) -> Iterator[str]:
             yield f"{_some(ids)}: on_failure {doing} is done only by the station that follows the run"
 
 
-def _arrival(mission: Mission, manner: Manner) -> Iterator[str]:
-    name, reached = manner.vehicle.name, manner.vehicle.reached
+def _arrival(mission: Mission, options: TranslationOptions) -> Iterator[str]:
+    name, reached = options.vehicle.name, options.vehicle.reached
     yield f"{name} counts a stop as reached {reached}: the station checks tolerance_m before a scan"
     if needs_heading(mission.scanner):
         yield "headings are sent: the station checks them before a scan"
-    if manner.trigger == "none":
+    if options.trigger == "none":
         yield "no item starts a scan: the station does"
 
 

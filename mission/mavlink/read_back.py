@@ -9,7 +9,7 @@ from mission.document import Point, SiteOrigin
 from mission.geodesy import Geodetic, from_geodetic, from_steps, to_steps
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.autopilots.kind import Autopilot
-from mission.mavlink.items import Command, Frame, Item, ItemList, Placed
+from mission.mavlink.items import Command, Item, ItemList, MavFrame, Placed
 
 CLOSE = 1e-6
 """Relative difference within which two float32 numbers are the same: some sixteen of their steps."""
@@ -23,7 +23,7 @@ def point_at(sent: ItemList, lat: int, lon: int) -> Point:
 def home_item(origin: SiteOrigin) -> Item:
     """The item that stands for home: the site's origin, above the sea."""
     lat, lon = to_steps(Geodetic(lat=origin.lat, lon=origin.lon))
-    return Item(Command.NAV_WAYPOINT, Frame.GLOBAL_INT, x=lat, y=lon, z=origin.alt)
+    return Item(Command.NAV_WAYPOINT, MavFrame.GLOBAL_INT, x=lat, y=lon, z=origin.alt)
 
 
 def upload_of(sent: ItemList) -> tuple[Item, ...]:

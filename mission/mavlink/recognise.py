@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from mission.document import Mission
 from mission.errors import InputError
-from mission.mavlink.items import Command, Frame, Item, Placed, Role
+from mission.mavlink.items import Command, Item, ItemRole, MavFrame, Placed
 from mission.mavlink.numbers import stop_numbered
 
 PLACES = frozenset({Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME})
@@ -23,8 +23,8 @@ TRIGGERS = frozenset(
     {Command.DO_SEND_SCRIPT_MESSAGE, Command.IMAGE_START_CAPTURE, Command.DO_DIGICAM_CONTROL}
 )
 GLOBAL_FRAMES = frozenset({
-    Frame.GLOBAL, Frame.MISSION, Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_INT, Frame.GLOBAL_RELATIVE_ALT_INT,
-    Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT,
+    MavFrame.GLOBAL, MavFrame.MISSION, MavFrame.GLOBAL_RELATIVE_ALT, MavFrame.GLOBAL_INT,
+    MavFrame.GLOBAL_RELATIVE_ALT_INT, MavFrame.GLOBAL_TERRAIN_ALT, MavFrame.GLOBAL_TERRAIN_ALT_INT,
 })  # fmt: skip
 
 
@@ -166,7 +166,7 @@ def _group_number(group: _Group) -> int | None:
 
 
 def _placed(group: _Group, *, here: bool, stop: str | None) -> Iterator[Placed]:
-    passing: Role = "return" if stop is None else "corner"
+    passing: ItemRole = "return" if stop is None else "corner"
     for at, item in enumerate(group.items):
         if item.command == Command.DO_CHANGE_SPEED:
             yield Placed(item, "speed")

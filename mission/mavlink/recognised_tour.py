@@ -19,7 +19,7 @@ FAR_M = 100_000.0
 
 
 @dataclass(frozen=True)
-class Visit:
+class RecognisedStop:
     """A scan stop as items tell it."""
 
     at: Point
@@ -38,19 +38,19 @@ class Visit:
 
 
 @dataclass(frozen=True)
-class Round:
+class RecognisedTour:
     """A way past scan stops as items tell it."""
 
-    visits: tuple[Visit, ...]
+    visits: tuple[RecognisedStop, ...]
     back: tuple[Point, ...]
     """Points driven through after the last stop."""
     speed: float | None
     """Metres per second of the first change of speed."""
 
 
-def round_of(
+def recognised_tour(
     placed: Sequence[Placed], origin: SiteOrigin, autopilot: str = "ardupilot", *, first: int = 1
-) -> Round:
+) -> RecognisedTour:
     """The stops and the way in the site's frame, of items that `recognise` or `translate` placed.
 
     `first` is the number by which errors call the first item.
@@ -62,7 +62,7 @@ def round_of(
     """
     vehicle = autopilot_named(autopilot)
     numbers = _distinct_numbers(placed)
-    visits: list[Visit] = []
+    visits: list[RecognisedStop] = []
     through: list[Point] = []
     for index, one in enumerate(placed):
         if one.role in ("corner", "return"):
@@ -71,10 +71,12 @@ def round_of(
             at = _point(one.item, first + index, origin, vehicle)
             settle, scan = _times(placed, index)
             heading = _heading(one.item, origin, vehicle)
-            visits.append(Visit(at, heading, settle, scan, numbers.get(len(visits)), tuple(through), index))
+            visits.append(
+                RecognisedStop(at, heading, settle, scan, numbers.get(len(visits)), tuple(through), index)
+            )
             through = []
     speeds = [one.item.params[1] for one in placed if one.role == "speed"]
-    return Round(tuple(visits), tuple(through), speeds[0] if speeds else None)
+    return RecognisedTour(tuple(visits), tuple(through), speeds[0] if speeds else None)
 
 
 def _heading(item: Item, origin: SiteOrigin, vehicle: Autopilot) -> float | None:

@@ -10,7 +10,7 @@ from mission.errors import AnswerIsNo, InputError
 from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.fields import as_sent
 from mission.mavlink.items import Command, Placed
-from mission.mavlink.translation_options import Manner
+from mission.mavlink.translation_options import TranslationOptions
 from mission.problems import problems_of
 from mission.run.scans import needs_heading
 
@@ -32,16 +32,16 @@ def origin_of(mission: Mission) -> SiteOrigin:
     return mission.georeference
 
 
-def check(mission: Mission, numbers: tuple[int, ...], manner: Manner) -> None:
+def check(mission: Mission, numbers: tuple[int, ...], options: TranslationOptions) -> None:
     """Refuses what cannot be written as items so that the vehicle does what the mission says."""
-    _check_manner(manner)
-    _check_origin(mission, manner.origin)
+    _check_manner(options)
+    _check_origin(mission, options.origin)
     for problem in problems_of(mission):
         raise InputError(f"{mission.name}: {problem}; correct the mission or plan it again")
-    _check_heading(mission, manner.vehicle)
+    _check_heading(mission, options.vehicle)
     for stop, number in zip(mission.stops, numbers, strict=True):
-        _check_waits(mission, stop, manner)
-        _check_handshake(mission, stop, number, manner)
+        _check_waits(mission, stop, options)
+        _check_handshake(mission, stop, number, options)
 
 
 def check_fields(mission: Mission, placed: Sequence[Placed]) -> None:
@@ -72,15 +72,15 @@ def check_count(mission: Mission, placed: Sequence[Placed], vehicle: Autopilot, 
     )
 
 
-def _check_manner(manner: Manner) -> None:
+def _check_manner(options: TranslationOptions) -> None:
     needs = {"script": Command.DO_SEND_SCRIPT_MESSAGE, "camera": Command.IMAGE_START_CAPTURE}
-    taken, name = manner.vehicle.commands, manner.vehicle.name
-    if manner.trigger != "none" and needs.get(manner.trigger) not in taken:
-        raise InputError(f"{name} has no trigger {manner.trigger!r}; choose camera or none")
-    if manner.scan_wait == "script_time" and Command.NAV_SCRIPT_TIME not in taken:
+    taken, name = options.vehicle.commands, options.vehicle.name
+    if options.trigger != "none" and needs.get(options.trigger) not in taken:
+        raise InputError(f"{name} has no trigger {options.trigger!r}; choose camera or none")
+    if options.scan_wait == "script_time" and Command.NAV_SCRIPT_TIME not in taken:
         raise InputError(f"{name} has no NAV_SCRIPT_TIME; wait for a scan by delay")
-    if not 0 <= manner.max_lateral_m < math.inf:
-        raise InputError(f"max_lateral_m is {manner.max_lateral_m}; it must be finite and not negative")
+    if not 0 <= options.max_lateral_m < math.inf:
+        raise InputError(f"max_lateral_m is {options.max_lateral_m}; it must be finite and not negative")
 
 
 def _check_origin(mission: Mission, origin: SiteOrigin) -> None:
@@ -108,18 +108,18 @@ def _check_heading(mission: Mission, vehicle: Autopilot) -> None:
         )
 
 
-def _check_waits(mission: Mission, stop: Stop, manner: Manner) -> None:
-    longest = manner.vehicle.max_delay_s
+def _check_waits(mission: Mission, stop: Stop, options: TranslationOptions) -> None:
+    longest = options.vehicle.max_delay_s
     for field, seconds in {"settle_s": stop.settle_s, "scan.duration_s": stop.scan.duration_s}.items():
         if seconds > longest:
             raise AnswerIsNo(
                 f"{mission.name}: stop {stop.id}: {field} is {seconds:g}, longer than the {longest:.0f} s "
-                f"that {manner.vehicle.name} waits; shorten it"
+                f"that {options.vehicle.name} waits; shorten it"
             )
-    if manner.settle == "hold" and not _can_be_held(stop.settle_s, manner.vehicle):
+    if options.settle == "hold" and not _can_be_held(stop.settle_s, options.vehicle):
         raise AnswerIsNo(
             f"{mission.name}: stop {stop.id}: settle_s is {stop.settle_s:g}, a hold is whole seconds up to "
-            f"{manner.vehicle.longest_hold_s:.0f}; round it or settle by delay"
+            f"{options.vehicle.longest_hold_s:.0f}; round it or settle by delay"
         )
 
 
@@ -127,8 +127,8 @@ def _can_be_held(seconds: float, vehicle: Autopilot) -> bool:
     return seconds == round(seconds) and seconds <= vehicle.longest_hold_s
 
 
-def _check_handshake(mission: Mission, stop: Stop, number: int, manner: Manner) -> None:
-    if manner.scan_wait != "script_time":
+def _check_handshake(mission: Mission, stop: Stop, number: int, options: TranslationOptions) -> None:
+    if options.scan_wait != "script_time":
         return
     if stop.scan.timeout_s > LONGEST_SCRIPT_S:
         raise AnswerIsNo(

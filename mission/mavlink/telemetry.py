@@ -11,6 +11,9 @@ from typing import Any
 from mission.geodesy import Geodetic, from_steps
 from mission.mavlink.local_frame import VehicleOrigin
 
+Message = Any
+"""A MAVLink message as pymavlink gives it, from a line or a log."""
+
 STILL_M_S = 0.03
 STILL_RAD_S = 0.03
 """An estimator's speeds of a robot that stands are not zero."""

@@ -16,7 +16,7 @@ from mission.mavlink.items import Command, Item, ItemList, Placed
 from mission.mavlink.notes import notes_of
 from mission.mavlink.numbers import numbers_of
 from mission.mavlink.refusals import check, check_count, check_fields, origin_of
-from mission.mavlink.translation_options import Manner, ScanWait, Settle, Trigger
+from mission.mavlink.translation_options import ScanWait, Settle, TranslationOptions, Trigger
 from mission.mavlink.writing import (
     capture,
     corner_waypoint,
@@ -62,16 +62,16 @@ def translate(
         If the mission depends on what the autopilot would drop: a heading, a wait, items above its number.
     """
     vehicle = autopilot_named(autopilot)
-    manner = Manner(
+    options = TranslationOptions(
         origin=origin_of(mission), vehicle=vehicle, trigger=_meant(vehicle, trigger),
         scan_wait=scan_wait, settle=settle, max_lateral_m=max_lateral_m,
     )  # fmt: skip
     numbers = numbers_of(mission)
-    check(mission, numbers, manner)
-    placed = tuple(_without_repeats(_placed(mission, numbers, manner)))
+    check(mission, numbers, options)
+    placed = tuple(_without_repeats(_placed(mission, numbers, options)))
     check_fields(mission, placed)
     check_count(mission, placed, vehicle, max_items or vehicle.max_items)
-    return ItemList(vehicle.name, manner.origin, placed, notes=notes_of(mission, manner))
+    return ItemList(vehicle.name, options.origin, placed, notes=notes_of(mission, options))
 
 
 def _meant(vehicle: Autopilot, trigger: Trigger) -> Trigger:
@@ -81,27 +81,27 @@ def _meant(vehicle: Autopilot, trigger: Trigger) -> Trigger:
     return "script" if Command.DO_SEND_SCRIPT_MESSAGE in vehicle.commands else "camera"
 
 
-def _placed(mission: Mission, numbers: Sequence[int], manner: Manner) -> Iterator[Placed]:
+def _placed(mission: Mission, numbers: Sequence[int], options: TranslationOptions) -> Iterator[Placed]:
     """Where the robot starts is no item: it stands there."""
     yield Placed(speed_change(mission.robot.speed), "speed")
     for stop, number in zip(mission.stops, numbers, strict=True):
-        for point in corners(stop.approach, within=manner.max_lateral_m)[1:-1]:
-            yield Placed(corner_waypoint(point, stop.tolerance_m, manner), "corner", stop.id)
-        yield from _visited(stop, number, manner)
+        for point in corners(stop.approach, within=options.max_lateral_m)[1:-1]:
+            yield Placed(corner_waypoint(point, stop.tolerance_m, options), "corner", stop.id)
+        yield from _visited(stop, number, options)
     tolerance_m = mission.stops[-1].tolerance_m
-    for point in corners(mission.return_ or (), within=manner.max_lateral_m)[1:]:
-        yield Placed(corner_waypoint(point, tolerance_m, manner), "return")
+    for point in corners(mission.return_ or (), within=options.max_lateral_m)[1:]:
+        yield Placed(corner_waypoint(point, tolerance_m, options), "return")
 
 
-def _visited(stop: Stop, number: int, manner: Manner) -> Iterator[Placed]:
-    yield Placed(stop_waypoint(stop, manner), "stop", stop.id)
-    if stop.settle_s > 0 and manner.settle == "delay":
+def _visited(stop: Stop, number: int, options: TranslationOptions) -> Iterator[Placed]:
+    yield Placed(stop_waypoint(stop, options), "stop", stop.id)
+    if stop.settle_s > 0 and options.settle == "delay":
         yield Placed(delay(stop.settle_s), "settle", stop.id)
-    if manner.trigger == "script":
+    if options.trigger == "script":
         yield Placed(script_message(stop, number), "trigger", stop.id)
-    if manner.trigger == "camera":
+    if options.trigger == "camera":
         yield Placed(capture(number), "trigger", stop.id)
-    wait = script_time(stop, number) if manner.scan_wait == "script_time" else delay(stop.scan.duration_s)
+    wait = script_time(stop, number) if options.scan_wait == "script_time" else delay(stop.scan.duration_s)
     yield Placed(wait, "scan", stop.id)
 
 

@@ -14,7 +14,7 @@ Settle = Literal["delay", "hold"]
 
 
 @dataclass(frozen=True)
-class Manner:
+class TranslationOptions:
     """The choices of `mission.mavlink.translate.translate`; `trigger` is no longer `auto`."""
 
     origin: SiteOrigin

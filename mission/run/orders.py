@@ -14,7 +14,7 @@ LONGEST_VALID_S: Final = 60.0
 
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 """A number that JSON readers and SQLite hold exactly."""
-Word = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
+ShortText = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 
 Verb = Literal["start", "pause", "resume", "skip", "retry", "abort", "home"]
 FREE_VERBS: tuple[Verb, ...] = ("pause", "abort")
@@ -37,9 +37,9 @@ class Order(
 ):
     """An order; sent again with the same `cmd_id` it is carried out once."""
 
-    cmd_id: Word
+    cmd_id: ShortText
     verb: Verb
-    commander: Word
+    commander: ShortText
     issued_ns: int
     valid_for_s: float
     fence: Count | None = None
@@ -47,10 +47,10 @@ class Order(
     take_over: bool = False
     expect_state: tuple[State, ...] | None = None
     """Refused in any other state, so that a late order does no harm."""
-    run_id: Word | None = None
-    mission_id: Word | None = None
+    run_id: ShortText | None = None
+    mission_id: ShortText | None = None
     revision: Count | None = None
-    stop: Word | None = None
+    stop: ShortText | None = None
     """The stop that skip and retry are meant for."""
     again: bool = False
     from_here: bool = False

@@ -12,7 +12,7 @@ from typing import Literal
 
 from mission.document import Mission, Stop
 from mission.events import RevisionDropped, RevisionTaken, RevisionWaits
-from mission.run.states import Change, Run, changed, onward
+from mission.run.states import Change, Run, changed, next_leg
 
 RevisionPolicy = Literal["next-stop", "refuse"]
 POLICIES: dict[str, RevisionPolicy] = {"next-stop": "next-stop", "refuse": "refuse"}
@@ -27,7 +27,7 @@ def waits(run: Run, mission: Mission) -> Change:
 def taken(run: Run, mission: Mission) -> Change:
     """Between two stops: from here on the run follows `mission`."""
     revised = changed(run, revision=mission.revision, next_revision=None)
-    change = onward(revised, mission)
+    change = next_leg(revised, mission)
     return Change(change.run, (partial(RevisionTaken, before=run.revision or 0), *change.events))
 
 

@@ -211,10 +211,10 @@ def verified(run: Run, mission: Mission, pose: Pose) -> Change:
 def next_stop(run: Run, mission: Mission) -> Change:
     """On to the next stop; a new revision that waits says itself what is next."""
     between = changed(run, at=run.at + 1, stop_state="WAITING", attempt=0, approaches=0, scan=None)
-    return Change(between) if between.next_revision is not None else onward(between, mission)
+    return Change(between) if between.next_revision is not None else next_leg(between, mission)
 
 
-def onward(run: Run, mission: Mission) -> Change:
+def next_leg(run: Run, mission: Mission) -> Change:
     """To the stop that is next, the way back, or the end."""
     if run.at < len(mission.stops):
         return Change(run)

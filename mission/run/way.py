@@ -15,7 +15,7 @@ from mission.events import Pose
 
 
 @dataclass(frozen=True)
-class Place:
+class NearestPoint:
     """The point of a polyline nearest to a pose."""
 
     point: Point
@@ -29,13 +29,13 @@ def legs_of(mission: Mission) -> tuple[tuple[Point, ...], ...]:
     return legs if mission.return_ is None else (*legs, mission.return_)
 
 
-def nearest(leg: Sequence[Point], pose: Pose) -> Place:
+def nearest(leg: Sequence[Point], pose: Pose) -> NearestPoint:
     """Where on `leg` the robot stands; of equally near points the one farthest along."""
     here = (pose.x, pose.y)
-    places = [Place(leg[0], 0, math.dist(leg[0], here))]
+    places = [NearestPoint(leg[0], 0, math.dist(leg[0], here))]
     for segment, (a, b) in enumerate(pairwise(leg)):
         point = foot(a, b, here)
-        places.append(Place(point, segment, math.dist(point, here)))
+        places.append(NearestPoint(point, segment, math.dist(point, here)))
     return min(reversed(places), key=lambda place: place.distance)
 
 
@@ -49,7 +49,7 @@ def backward(leg: Sequence[Point], pose: Pose) -> tuple[Point, ...]:
     return tuple(reversed(leg[: nearest(leg, pose).segment + 1]))
 
 
-def nearest_leg(mission: Mission, pose: Pose) -> tuple[int, Place]:
+def nearest_leg(mission: Mission, pose: Pose) -> tuple[int, NearestPoint]:
     """The leg to a stop that passes nearest to the robot, the first of equals."""
     places = [nearest(stop.approach, pose) for stop in mission.stops]
     leg = min(range(len(places)), key=lambda index: places[index].distance)

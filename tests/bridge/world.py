@@ -12,7 +12,7 @@ import msgspec
 
 from bridge.link.clock import SimulatedClock
 from bridge.link.link import MemoryLink, Switchboard
-from bridge.link.protocol import Commit, Keys, Manifest
+from bridge.link.protocol import Commit, KeyExpressions, Manifest
 from bridge.robot.agent import Agent
 from bridge.robot.bodies import pose_of
 from bridge.robot.controller import Controller
@@ -83,7 +83,7 @@ class Field:
 
     def __post_init__(self) -> None:
         self.board = Switchboard()
-        self.keys = Keys("r1")
+        self.keys = KeyExpressions("r1")
         self.base = SimulatedBase(clock=self.clock, wear=self.wear, keep=self.keep, faults=self.faults)
         self.scanner = SimulatedScanner(clock=self.clock, faults=self.faults, record=self.record)
         self.boot()

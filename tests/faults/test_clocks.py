@@ -18,7 +18,7 @@ from bridge.link import keys as site_keys
 from bridge.link.clock import WallClock
 from bridge.link.keys import init_site, issue, now_utc, read_keys
 from bridge.link.link import Switchboard
-from bridge.link.protocol import Keys, Rejected
+from bridge.link.protocol import KeyExpressions, Rejected
 from bridge.robot import agent as agents
 from bridge.robot.agent import Agent, trusting
 from bridge.robot.bodies import pose_of
@@ -60,11 +60,11 @@ def test_a_date_that_is_set_forward_at_both_ends_during_a_run_moves_nothing(
         mission_taken=lambda mission: base.stand_at_start(pose_of(mission.start)),
     )  # fmt: skip
     agent = Agent(
-        keys=Keys("r1"), link=board.link(), journal=journal, controller=controller, base=base,
+        keys=KeyExpressions("r1"), link=board.link(), journal=journal, controller=controller, base=base,
         scanner=scanner, clock=clock, command_clock=WallClock(), speed_up=50,
     )  # fmt: skip
     with agents.on_link(agent):
-        alice, bob = (Station(board.link(), Keys("r1"), commander=who) for who in ("alice", "bob"))
+        alice, bob = (Station(board.link(), KeyExpressions("r1"), commander=who) for who in ("alice", "bob"))
         alice.push(corridor())
         alice.command("start")
         fence = alice.info().lease

@@ -7,12 +7,13 @@ import socket
 
 import pytest
 
-from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import Wire, wire
 from bridge.mavlink.simulated.profiles import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
 from bridge.mavlink.simulated.vehicle_process import vehicle_on
+from mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.scripted import free_udp_port
 from tests.bridge.mavlink.simulated.bench import ACCEPTED, ORIGIN, Bench, delay, waypoint
@@ -32,7 +33,7 @@ def test_messages_that_make_no_sense_are_survived(profile: str, seed: int) -> No
     driven = 0
     for number in range(FRAMES):
         bench.say(hostile.message())
-        driven += bench.vehicle.course.state == "active"
+        driven += bench.vehicle.auto.state == "active"
         if number % 50 == 0:
             drive(bench, hostile)
         if number % 20 == 0:
@@ -93,10 +94,10 @@ def test_a_vehicle_on_a_stream_answers_whoever_else_talks_nonsense() -> None:
 
 def answered(station: Wire, message: Message) -> bool:
     """Whether an AUTOPILOT_VERSION comes; a vehicle that was made to reboot is away for a second."""
-    with station.box("AUTOPILOT_VERSION") as box:
+    with station.waiting("AUTOPILOT_VERSION") as waiting:
         for _ in range(60):
             station.send(message)
-            if box.get(0.25) is not None:
+            if waiting.get(0.25) is not None:
                 return True
     return False
 
@@ -107,12 +108,12 @@ def test_a_signing_vehicle_does_nothing_that_a_stranger_says() -> None:
         vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES["strict"]), signing_key=key),
         wire(Url("udpout", "127.0.0.1", port), signing_key=key) as station,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
-        station.box("HEARTBEAT", "MISSION_CURRENT") as box,
+        station.waiting("HEARTBEAT", "MISSION_CURRENT") as waiting,
     ):
         for datagram in hostile.datagrams(FRAMES):
             stranger.sendto(datagram, ("127.0.0.1", port))
         station.beat(lambda: dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
-        seen = [box.get(5.0) for _ in range(4)]
+        seen = [waiting.get(5.0) for _ in range(4)]
     assert {message.get_type() for message in seen} == {"HEARTBEAT", "MISSION_CURRENT"}
     for message in seen:
         if message.get_type() == "HEARTBEAT":

@@ -12,7 +12,7 @@ import msgspec
 import pytest
 
 from bridge.commands.spawn import end_robot, free_port, start_robot
-from bridge.link.protocol import Keys, encode
+from bridge.link.protocol import KeyExpressions, encode
 from bridge.station.follow import Report
 from bridge.station.station import Station, connect
 from mission.errors import AnswerIsNo, OutcomeUnknown
@@ -152,7 +152,7 @@ def test_of_two_stations_at_once_one_commands(tmp_path: Path) -> None:
 
 def test_an_oversize_message_is_not_taken_and_the_robot_stays(tmp_path: Path) -> None:
     with line(tmp_path) as proxy, connect(proxy.endpoint, robot="r1") as station:
-        key = Keys("r1").mission("x", "begin")
+        key = KeyExpressions("r1").mission("x", "begin")
         assert station.link.ask(key, b"x" * 3_000_000, timeout_s=1.0) is None
         station.timeout_s = 10.0
         assert station.status().state == "IDLE"

@@ -17,7 +17,7 @@ from mission.errors import InputError
 from mission.files.plan_panel import coordinate_ticks
 from mission.files.plan_svg import plan_svg
 from mission.files.room_labels import inside, wrapped
-from mission.files.sheet import MARGIN, PAPERS, Box, Contents, Sheet, fit
+from mission.files.sheet import MARGIN, PAPERS, PaperBox, PaperSheet, SheetContents, fit
 from mission.files.svg import SMALLEST_TEXT, shortened, text_width
 from mission.planning import Route
 from tests.mission.worlds import mission_of, room_mission, room_route, stop
@@ -131,7 +131,7 @@ def test_a_mission_of_hundreds_of_stops_continues_its_table_in_columns() -> None
 
 
 def test_coordinates_of_a_national_grid_are_written_in_full() -> None:
-    sheet = fit(Contents((392_000.0, 5_712_000.0, 392_020.0, 5_712_010.0), 8.0, 60.0, 65.0, 0))
+    sheet = fit(SheetContents((392_000.0, 5_712_000.0, 392_020.0, 5_712_010.0), 8.0, 60.0, 65.0, 0))
     shown = words(ET.fromstring(f'<svg xmlns="http://www.w3.org/2000/svg">{coordinate_ticks(sheet)}</svg>'))
     assert {"392000", "392005", "5712000", "5712005"} <= set(shown)
 
@@ -156,7 +156,7 @@ sides = st.floats(0.5, 300.0)
 def test_nothing_on_a_sheet_overlaps(
     width: float, height: float, rows: int, legend: float, title: float
 ) -> None:
-    sheet = fit(Contents((0.0, 0.0, width, height), 8.0, legend, title, rows))
+    sheet = fit(SheetContents((0.0, 0.0, width, height), 8.0, legend, title, rows))
     boxes = [sheet.drawing, sheet.legend, sheet.title, *(chunk.box for chunk in sheet.table)]
     assert all(apart(one, other) for one, other in combinations(boxes, 2))
     assert all(on_sheet(box, sheet) for box in boxes)
@@ -169,7 +169,7 @@ def test_nothing_on_a_sheet_overlaps(
     assert sheet.drawing.y + 7.99 <= high[1] <= low[1] <= sheet.drawing.y + sheet.drawing.height - 7.99
 
 
-def apart(one: Box, other: Box) -> bool:
+def apart(one: PaperBox, other: PaperBox) -> bool:
     slack = 0.01
     return (
         one.x + one.width <= other.x + slack
@@ -179,7 +179,7 @@ def apart(one: Box, other: Box) -> bool:
     )
 
 
-def on_sheet(box: Box, sheet: Sheet) -> bool:
+def on_sheet(box: PaperBox, sheet: PaperSheet) -> bool:
     right, low = sheet.width - MARGIN + 0.01, sheet.height - MARGIN + 0.01
     inner = box.x >= MARGIN - 0.01 and box.y >= MARGIN - 0.01
     return inner and box.x + box.width <= right and box.y + box.height <= low
@@ -190,14 +190,14 @@ def on_sheet(box: Box, sheet: Sheet) -> bool:
     [(8, 4, 50, "A4"), (12, 10, 50, "A3"), (26, 13, 100, "A3"), (50, 36, 200, "A3"), (400, 300, 500, "A0")],
 )
 def test_the_scale_is_the_largest_that_is_handy(width: float, height: float, scale: int, paper: str) -> None:
-    sheet = fit(Contents((0.0, 0.0, width, height), 8.0, 60.0, 65.0, 10))
+    sheet = fit(SheetContents((0.0, 0.0, width, height), 8.0, 60.0, 65.0, 10))
     assert (sheet.scale, sheet.paper) == (scale, paper)
     assert {sheet.width, sheet.height} == set(map(float, PAPERS[paper]))
 
 
 def test_a_floor_in_the_wrong_unit_by_far_is_refused() -> None:
     with pytest.raises(InputError, match="check its unit"):
-        fit(Contents((0.0, 0.0, 1e12, 1.0), 8.0, 60.0, 65.0, 10))
+        fit(SheetContents((0.0, 0.0, 1e12, 1.0), 8.0, 60.0, 65.0, 10))
 
 
 def test_inside_is_the_even_odd_rule() -> None:

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
-from bridge.mavlink.auto.confirmed_commands import Denied, Hands
+from bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
 from bridge.mavlink.auto.logbook import Logbook, Ordered, Owed
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.transfer.download import download
@@ -37,19 +37,25 @@ EARLY = ("NAVIGATING", "SETTLING", "SCANNING")
 AT_STOP = ("SETTLING", "SCANNING", "VERIFYING")
 
 
-class Follower:
+class AutoFollower:
     """Looks at each message with what is known by then; `act` tells the vehicle what is owed to it.
 
     One that only looks keeps to itself what it sees, and tells the vehicle nothing.
     """
 
     def __init__(
-        self, book: Logbook, peer: Peer, observer: Observer, hands: Hands, *, looks_only: bool = False
+        self,
+        book: Logbook,
+        peer: Peer,
+        observer: Observer,
+        commands: ConfirmedCommands,
+        *,
+        looks_only: bool = False,
     ) -> None:
         self._book = book
         self._peer = peer
         self._observer = observer
-        self._hands = hands
+        self._commands = commands
         self._looks_only = looks_only
         self._closing = threading.Event()
         self._due = threading.Event()
@@ -128,7 +134,7 @@ class Follower:
         if self._left is None or self._left[0] != stop:
             self._left = (stop, now_ns)
         if observed.scan is None:
-            self._hands.ask_for(MessageId.CAMERA_IMAGE_CAPTURED)
+            self._commands.ask_for(MessageId.CAMERA_IMAGE_CAPTURED)
         beyond = run.at + 1 < len(listed.stops) and observed.place > listed.stops[run.at + 1].at
         return replace(observed, in_vain=beyond or now_ns > self._left[1] + GRACE_NS)
 
@@ -146,7 +152,7 @@ class Follower:
         went_back = began_again(before_ms, self._book.boot_ms)
         if self._looks_only or began_ns is None or not self._book.booted(began_ns, went_back=went_back):
             return
-        self._hands.ask_for_telemetry()
+        self._commands.ask_for_telemetry()
         self.run = self._book.move(_rebooted)
 
     def _happened(self, run: Run, listed: ListedMission, observed: Observation) -> tuple[Change, ...]:
@@ -244,9 +250,9 @@ class Follower:
     def _pay(self, owed: Owed, listed: ListedMission) -> None:
         try:
             if owed.deed == "hold":
-                self._hands.hold()
+                self._commands.hold()
             else:
-                self._hands.jump(listed.sequence(owed.place))
+                self._commands.jump(listed.sequence(owed.place))
         except Denied as denied:
             reason = denied.refused.message
             self._book.move(lambda run: () if run.state != "RUNNING" else (runs.held(run, reason),))

@@ -39,7 +39,7 @@ class Denied(Exception):
         self.refused = refused
 
 
-class Hands:
+class ConfirmedCommands:
     """Orders to one vehicle, by its commands; whether it obeys, the observer tells.
 
     `news` is notified whenever the observer has taken a message.

@@ -44,7 +44,7 @@ class Sent(msgspec.Struct, frozen=True, kw_only=True):
     """Of the items."""
 
 
-class Items(msgspec.Struct, frozen=True):
+class PackedItems(msgspec.Struct, frozen=True):
     """An `ItemList` as msgpack, which knows NaN."""
 
     packed: bytes
@@ -116,7 +116,7 @@ class Logbook:
 
     def _read_course(self, sent: Sent) -> ListedMission:
         stored = self.journal.mission(sent.mission_id, sent.revision)
-        items = self.journal.fact("items", Items)
+        items = self.journal.fact("items", PackedItems)
         assert stored is not None and items is not None
         mission = msgspec.json.decode(stored[1], type=Mission)
         return listed_mission(mission, msgspec.msgpack.decode(items.packed, type=ItemList))
@@ -218,7 +218,7 @@ def remember(book: Logbook, mission: Mission, sent: ItemList) -> None:
         book.move(lambda run: () if run.over else (_replaced(run, "a mission was pushed to the vehicle"),))
         book.journal.store_fact("run", runs.installed(book.run, mission))
         book.journal.store_fact("sent", told)
-        book.journal.store_fact("items", Items(packed))
+        book.journal.store_fact("items", PackedItems(packed))
         book.journal.forget_fact("owed")
 
 

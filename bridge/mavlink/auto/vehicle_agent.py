@@ -2,7 +2,7 @@
 
 `Station`, `follow` and `watch` need not know that there is no robot of stopgo at the other end. What the
 vehicle tells moves the run on in the logbook, what the logbook holds is told as a robot tells it. While the
-vehicle is silent, so is the desk.
+vehicle is silent, so is its agent.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from bridge.link.protocol import (
     MAX_DOCUMENT_BYTES,
     VERSION,
     Info,
-    Keys,
+    KeyExpressions,
     Malformed,
     Reply,
     count_of,
     decode,
     encode,
 )
-from bridge.mavlink.auto.auto_follower import Follower
-from bridge.mavlink.auto.confirmed_commands import Hands
+from bridge.mavlink.auto.auto_follower import AutoFollower
+from bridge.mavlink.auto.confirmed_commands import ConfirmedCommands
 from bridge.mavlink.auto.logbook import Logbook, logbook
-from bridge.mavlink.auto.vehicle_orders import Consent, Orders
+from bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
 from bridge.mavlink.line.peer import Peer, found
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import GROUND_STATION, Box, Who, wire
+from bridge.mavlink.line.wire import GROUND_STATION, MessageQueue, Who, wire
 from bridge.robot.pages import POSES_KEPT, address_of, events_page, mission_part, poses_page
 from bridge.station.station import Station, whoami
 from mission import __version__
@@ -90,7 +90,7 @@ def connect(url: Url, options: Options) -> Iterator[Station]:
         wire(url, me=me, signing_key=options.signing_key) as opened,
         found(opened, options.vehicle, timeout_s=options.timeout_s) as peer,
         logbook(url, peer.who.system, options.state) as book,
-        desk(peer, book, options) as at,
+        vehicle_agent(peer, book, options) as at,
     ):
         at.await_news(options.timeout_s, compares=options.compares)
         who = options.commander or whoami()
@@ -98,9 +98,9 @@ def connect(url: Url, options: Options) -> Iterator[Station]:
 
 
 @contextmanager
-def desk(peer: Peer, book: Logbook, options: Options) -> Iterator[Desk]:
-    """A desk at work, until the block ends; the vehicle stays as it is."""
-    opened = Desk(peer, book, options)
+def vehicle_agent(peer: Peer, book: Logbook, options: Options) -> Iterator[VehicleAgent]:
+    """The agent at work, until the block ends; the vehicle stays as it is."""
+    opened = VehicleAgent(peer, book, options)
     opened.open()
     try:
         yield opened
@@ -108,19 +108,21 @@ def desk(peer: Peer, book: Logbook, options: Options) -> Iterator[Desk]:
         opened.close()
 
 
-class Desk:
+class VehicleAgent:
     """Serves a robot's words for one vehicle."""
 
     def __init__(self, peer: Peer, book: Logbook, options: Options) -> None:
         self.board = Switchboard()
-        self.keys = Keys(book.robot)
+        self.keys = KeyExpressions(book.robot)
         self._peer = peer
         self._book = book
         self._wall: Clock = WallClock()
         self._observer = Observer(peer.autopilot)
-        self._hands = Hands(peer, self._observer, book.clock)
-        self._orders = Orders(book, peer, self._observer, self._hands, self._wall, options.consent)
-        self._follower = Follower(book, peer, self._observer, self._hands, looks_only=options.looks_only)
+        self._commands = ConfirmedCommands(peer, self._observer, book.clock)
+        self._orders = VehicleOrders(book, peer, self._observer, self._commands, self._wall, options.consent)
+        self._follower = AutoFollower(
+            book, peer, self._observer, self._commands, looks_only=options.looks_only
+        )
         self._link: MemoryLink = self.board.link()
         self._poses: deque[PoseReport] = deque(maxlen=POSES_KEPT)
         self._boot_id = ""
@@ -171,9 +173,9 @@ class Desk:
         RobotUnreachable
             If it does not tell.
         """
-        with self._hands.news:
+        with self._commands.news:
             listed = self._book.listed
-            self._hands.news.wait_for(lambda: self._observer.complete(listed), timeout_s)
+            self._commands.news.wait_for(lambda: self._observer.complete(listed), timeout_s)
         if self._observer.sequence is None and self._book.listed is not None:
             raise RobotUnreachable(
                 f"{self._peer} does not tell which item it works on (MISSION_CURRENT) within {timeout_s:g} s;"
@@ -189,22 +191,22 @@ class Desk:
 
     def _look(self) -> None:
         asked_ns = 0
-        with self._peer.box(*TOLD) as box:
+        with self._peer.waiting(*TOLD) as waiting:
             while not self._closing.is_set():
                 now_ns = self._book.clock.now_ns()
                 if now_ns > asked_ns + ASK_AGAIN_S * 1e9 and not self._observer.fresh(ASK_AGAIN_S, now_ns):
                     asked_ns = now_ns
-                    self._hands.ask_for_telemetry()
-                self._take_next(box)
+                    self._commands.ask_for_telemetry()
+                self._take_next(waiting)
 
-    def _take_next(self, box: Box) -> None:
-        message = box.get(TICK_S)
+    def _take_next(self, waiting: MessageQueue) -> None:
+        message = waiting.get(TICK_S)
         self.board.cut = is_lost(self._peer.silent_s)  # then it is not answered for
         if message is None:
             return
-        with self._hands.news:
+        with self._commands.news:
             name = self._observer.take(message, self._book.listed, self._book.clock.now_ns())
-            self._hands.news.notify_all()
+            self._commands.news.notify_all()
         before = self._follower.run
         self._follower.look(name)
         if name in POSES:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import msgspec
 
 from bridge.link.clock import Clock
-from bridge.mavlink.auto.confirmed_commands import Denied, Hands
+from bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
 from bridge.mavlink.auto.logbook import Logbook, Ordered
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.transfer.download import download
@@ -59,16 +59,22 @@ class Consent:
     """The vehicle finds its place by satellites, whatever its metres count from."""
 
 
-class Orders:
+class VehicleOrders:
     """Carries out orders to one vehicle."""
 
     def __init__(
-        self, book: Logbook, peer: Peer, observer: Observer, hands: Hands, wall: Clock, consent: Consent
+        self,
+        book: Logbook,
+        peer: Peer,
+        observer: Observer,
+        commands: ConfirmedCommands,
+        wall: Clock,
+        consent: Consent,
     ) -> None:
         self._book = book
         self._peer = peer
         self._observer = observer
-        self._hands = hands
+        self._commands = commands
         self._wall = wall
         self._consent = consent
 
@@ -102,7 +108,7 @@ class Orders:
             return self._stored(order, refused, None)
         with self._ordering(order):
             try:
-                self._hands.hold()
+                self._commands.hold()
             except Denied as denied:
                 return self._stored(order, denied.refused, None)
             return self._stored(order, Change(self._book.run), None)
@@ -174,7 +180,7 @@ class Orders:
         return self._resumed(run, order, decision)
 
     def _resumed(self, run: Run, order: Order, decision: Decision) -> Change:
-        """The run goes on, in whoever's hands it is now."""
+        """The run goes on, under whoever commands it now."""
         before = self._book.journal.fact("lease", Lease)
         change = runs.resumed(run, order.commander)
         return Change(change.run, (*handed_over(before, decision.lease), *change.events))
@@ -192,7 +198,7 @@ class Orders:
         return self._resumed(run, order, decision)
 
     def _pause(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
-        self._hands.hold()
+        self._commands.hold()
         return runs.paused(self._book.run, f"pause by {order.commander}")
 
     def _skip(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
@@ -201,7 +207,7 @@ class Orders:
         observed = self._observe(after, listed)
         beyond = progress.passed_by(after, listed, observed)
         if after.over:
-            self._hands.hold()
+            self._commands.hold()
         elif before.state == "HELD":
             elsewhere = self._elsewhere(listed)
             if elsewhere is not None:
@@ -209,13 +215,13 @@ class Orders:
             self._ready(listed)
             self._go(listed, resume_place(after, listed, observed, self._here()), observed)
         elif before.state == "RUNNING" and beyond is not None:
-            self._hands.jump(listed.sequence(beyond))
+            self._commands.jump(listed.sequence(beyond))
         return decision.change
 
     def _abort(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
-        self._hands.hold()
+        self._commands.hold()
         if self._consent.disarm:
-            self._hands.arm(False)
+            self._commands.arm(False)
         return decision.change
 
     def _home(self, order: Order, listed: ListedMission, decision: Decision) -> Change:
@@ -249,9 +255,9 @@ class Orders:
         if not armed and not self._consent.arm:
             raise Denied(Refused("not_armed", "the vehicle is disarmed; arm it, or add --arm"))
         if self._observer.mode == AUTO:
-            self._hands.hold()
+            self._commands.hold()
         if not armed:
-            self._hands.arm()
+            self._commands.arm()
 
     def _check_mission(self, listed: ListedMission) -> None:
         found = differences(listed.sent, download(self._peer))
@@ -266,17 +272,17 @@ class Orders:
         anew = observed is None or observed.place >= listed.end
         jumps = anew or observed is None or place != observed.place
         if jumps:
-            self._hands.jump(listed.sequence(place), anew=anew)
-        self._hands.auto()
+            self._commands.jump(listed.sequence(place), anew=anew)
+        self._commands.auto()
         if jumps and place > 0 and listed.speed is not None:
-            self._hands.speed(listed.speed)
+            self._commands.speed(listed.speed)
 
     # Storing
 
     def _ordering(self, order: Order) -> _Ordering:
         mode = HOLD if order.verb in FREE_VERBS else AUTO
         ordered = Ordered(verb=order.verb, by=order.commander, mode=mode, until_ns=0)
-        return _Ordering(self._book, self._hands, ordered)
+        return _Ordering(self._book, self._commands, ordered)
 
     def _stored(self, order: Order, outcome: Change | Refused, lease: Lease | None) -> Answer:
         """The answer, stored together with what the order has changed."""
@@ -296,17 +302,17 @@ class Orders:
 class _Ordering:
     """Shows in the journal that an order is being carried out; one whose outcome is unknown stays there."""
 
-    def __init__(self, book: Logbook, hands: Hands, ordered: Ordered) -> None:
+    def __init__(self, book: Logbook, commands: ConfirmedCommands, ordered: Ordered) -> None:
         self._book = book
-        self._hands = hands
+        self._commands = commands
         self._ordered = ordered
 
     def __enter__(self) -> None:
-        self._hands.working = lambda: self._last(ORDERING_NS)
-        self._hands.working()
+        self._commands.working = lambda: self._last(ORDERING_NS)
+        self._commands.working()
 
     def __exit__(self, kind: object, *exception: object) -> None:
-        self._hands.working = lambda: None
+        self._commands.working = lambda: None
         if kind is None:
             self._book.journal.forget_fact("ordered")
         else:
@@ -318,14 +324,14 @@ class _Ordering:
         self._book.journal.store_fact("ordered", msgspec.structs.replace(self._ordered, until_ns=until_ns))
 
 
-VERBS: dict[str, Callable[[Orders, Order, ListedMission, Decision], Change]] = {
-    "start": Orders._start,
-    "pause": Orders._pause,
-    "resume": Orders._resume,
-    "skip": Orders._skip,
-    "retry": Orders._retry,
-    "abort": Orders._abort,
-    "home": Orders._home,
+VERBS: dict[str, Callable[[VehicleOrders, Order, ListedMission, Decision], Change]] = {
+    "start": VehicleOrders._start,
+    "pause": VehicleOrders._pause,
+    "resume": VehicleOrders._resume,
+    "skip": VehicleOrders._skip,
+    "retry": VehicleOrders._retry,
+    "abort": VehicleOrders._abort,
+    "home": VehicleOrders._home,
 }
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bridge.link.clock import Clock
 from bridge.mavlink.driving.mavlink_base import MavlinkBase
-from bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, Trigger
+from bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, ScanTrigger
 from bridge.mavlink.driving.onboard_autopilot import on_board
 from bridge.mavlink.line.wire import read_line
 from bridge.robot.bodies import Body
@@ -25,7 +25,7 @@ class AutopilotBody:
 
     url: str
     arm: bool = False
-    trigger: Trigger = "camera"
+    trigger: ScanTrigger = "camera"
     signing_key: Path | None = None
     vehicle: int | None = None
     """Its system id, if several are heard."""

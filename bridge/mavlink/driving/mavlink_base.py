@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from threading import Event
 
 from bridge.link.clock import Clock
-from bridge.mavlink.driving.onboard_autopilot import ORDER_S, Autopilot
-from bridge.mavlink.driving.straight_drive import NEAR_M, STALLED_S, Course, Patience
+from bridge.mavlink.driving.onboard_autopilot import ORDER_S, OnboardAutopilot
+from bridge.mavlink.driving.straight_drive import NEAR_M, STALLED_S, Patience, StraightDrive
 from bridge.robot.base import Outcome, Rest
 from mission.document import Mission, Point, RobotSpec, SiteOrigin
 from mission.events import Pose
@@ -32,7 +32,7 @@ ESTIMATED = Rest(metres=0.005, radians=0.005)
 """An estimator of a vehicle that stands wanders by some millimetres."""
 
 
-class Ended(Exception):
+class DriveEnded(Exception):
     """A drive is over before its end."""
 
     def __init__(self, outcome: Outcome, why: str = "") -> None:
@@ -45,7 +45,7 @@ class MavlinkBase:
     """The vehicle of an autopilot."""
 
     def __init__(
-        self, autopilot: Autopilot, *, clock: Clock, arm: bool = False, patience: Patience = Patience()
+        self, autopilot: OnboardAutopilot, *, clock: Clock, arm: bool = False, patience: Patience = Patience()
     ) -> None:
         self.autopilot = autopilot
         self._clock = clock
@@ -121,7 +121,7 @@ class MavlinkBase:
                 self._drive(point, limits, interrupt)
             if heading is not None and self.autopilot.kind.driving.turns:
                 self._turn(heading, interrupt)
-        except Ended as end:
+        except DriveEnded as end:
             self._blocked_by = end.why
             self._leave_off()
             return end.outcome
@@ -156,7 +156,7 @@ class MavlinkBase:
         while self._now_s() < until_s:
             self.autopilot.aim(place)
             if self._clock.wait(TICK_S, interrupt):
-                raise Ended("interrupted")
+                raise DriveEnded("interrupted")
 
     def _limit_speed(self, here: Point, speed: float, interrupt: Event) -> None:
         """A speed counts only for a vehicle that has a place to go to, so it is told where it stands."""
@@ -186,10 +186,10 @@ class MavlinkBase:
                 return
             _must(course.why)
 
-    def _course(self, point: Point, limits: RobotSpec) -> Course:
+    def _course(self, point: Point, limits: RobotSpec) -> StraightDrive:
         pose, stops = self.pose(), () if self._mission is None else self._mission.stops
         near_m = min((NEAR_M, *(stop.tolerance_m for stop in stops)))
-        return Course(
+        return StraightDrive(
             (pose.x, pose.y), point, self._now_s(),
             near_m=near_m, over_m=max(near_m, limits.radius), patience=self._patience,
         )  # fmt: skip
@@ -224,7 +224,7 @@ class MavlinkBase:
     def _tick(self, interrupt: Event) -> None:
         """A moment later, if all is well."""
         if self._clock.wait(TICK_S, interrupt):
-            raise Ended("interrupted")
+            raise DriveEnded("interrupted")
         autopilot = self.autopilot
         began_again = autopilot.peer.boots != self._boots
         _must(
@@ -268,4 +268,4 @@ class MavlinkBase:
 def _must(trouble: str) -> None:
     """End the drive if there is trouble."""
     if trouble:
-        raise Ended("blocked", trouble)
+        raise DriveEnded("blocked", trouble)

@@ -10,23 +10,23 @@ from threading import Event
 from typing import Literal
 
 from bridge.link.clock import Clock
-from bridge.mavlink.driving.onboard_autopilot import Autopilot
-from bridge.mavlink.line.frames import Message
+from bridge.mavlink.driving.onboard_autopilot import OnboardAutopilot
 from bridge.mavlink.line.messages import request
-from bridge.mavlink.line.wire import Box
+from bridge.mavlink.line.wire import MessageQueue
 from mission.document import Mission, Scan
 from mission.errors import OutcomeUnknown, RobotUnreachable
 from mission.mavlink.captures import Picture, picture_of, result_of
 from mission.mavlink.enums import CommandResult, MessageId
 from mission.mavlink.items import Command
 from mission.mavlink.numbers import numbers_of
+from mission.mavlink.telemetry import Message
 from mission.mavlink.writing import SCAN_MESSAGE
 from mission.run.scans import ScanFailed, ScanResult
 
-Order = tuple[int, tuple[float, ...]]
+TriggerCommand = tuple[int, tuple[float, ...]]
 """A command and its params."""
-Trigger = Literal["camera", "script"]
-TRIGGERS: tuple[Trigger, ...] = ("camera", "script")
+ScanTrigger = Literal["camera", "script"]
+TRIGGERS: tuple[ScanTrigger, ...] = ("camera", "script")
 
 LOOK_S = 0.2
 """How often an interruption is looked for."""
@@ -45,7 +45,7 @@ class MavlinkScanner:
     profiles: tuple[str, ...] | None = None
     """Neither trigger carries a profile, so the vehicle scans with the one it is set to."""
 
-    def __init__(self, autopilot: Autopilot, *, clock: Clock, trigger: Trigger = "camera") -> None:
+    def __init__(self, autopilot: OnboardAutopilot, *, clock: Clock, trigger: ScanTrigger = "camera") -> None:
         self._autopilot = autopilot
         self._clock = clock
         self._trigger = trigger
@@ -62,13 +62,13 @@ class MavlinkScanner:
 
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
         until_s = self._now_s() + scan.timeout_s
-        with self._autopilot.peer.wire.box("CAMERA_IMAGE_CAPTURED") as box:
-            taken = self._pictures_taken(box)
+        with self._autopilot.peer.wire.waiting("CAMERA_IMAGE_CAPTURED") as waiting:
+            taken = self._pictures_taken(waiting)
             order = self._order(label, scan, taken)
-            refused = self._ordered(order, box, until_s, interrupt)
+            refused = self._ordered(order, waiting, until_s, interrupt)
             if refused:
                 return ScanFailed(reason=refused)
-            captured = self._captured(box, taken, until_s, interrupt)
+            captured = self._captured(waiting, taken, until_s, interrupt)
         if captured is not None:
             return result_of(captured)
         if interrupt.is_set():
@@ -77,13 +77,13 @@ class MavlinkScanner:
         lost = self._autopilot.out_of_reach()
         return ScanFailed(reason=f"no result within {scan.timeout_s:g} s" + (f": {lost}" if lost else ""))
 
-    def _pictures_taken(self, box: Box) -> int | None:
+    def _pictures_taken(self, waiting: MessageQueue) -> int | None:
         """The least number of the next picture, if the camera tells; all that was told so far is old."""
         status = self._asked(MessageId.CAMERA_CAPTURE_STATUS)
         if status is not None:
             return int(status.image_count)
         last = self._asked(MessageId.CAMERA_IMAGE_CAPTURED)
-        self._forget(box)
+        self._forget(waiting)
         return None if last is None else int(last.image_index) + 1
 
     def _asked(self, number: int) -> Message | None:
@@ -92,7 +92,7 @@ class MavlinkScanner:
         except RobotUnreachable:
             return None
 
-    def _order(self, label: str, scan: Scan, taken: int | None) -> Order:
+    def _order(self, label: str, scan: Scan, taken: int | None) -> TriggerCommand:
         if self._trigger == "script":
             number = self._numbers.get(stop_of(label), 0)
             return Command.DO_SEND_SCRIPT_MESSAGE, (
@@ -103,7 +103,7 @@ class MavlinkScanner:
         self._last = max(self._last, taken or 0) + 1
         return Command.IMAGE_START_CAPTURE, (0.0, scan.duration_s, 1.0, float(self._last))
 
-    def _ordered(self, order: Order, box: Box, until_s: float, interrupt: Event) -> str:
+    def _ordered(self, order: TriggerCommand, waiting: MessageQueue, until_s: float, interrupt: Event) -> str:
         """Why the vehicle does not scan; empty if it does, or may: then the result will tell.
 
         One that is busy is busy with a scan that nobody waits for any more, and is waited for.
@@ -120,13 +120,15 @@ class MavlinkScanner:
                 return "the vehicle's scanner is busy"
             if self._clock.wait(BUSY_S, interrupt):
                 return "interrupted"
-            self._forget(box)
+            self._forget(waiting)
 
-    def _captured(self, box: Box, taken: int | None, until_s: float, interrupt: Event) -> Message | None:
+    def _captured(
+        self, waiting: MessageQueue, taken: int | None, until_s: float, interrupt: Event
+    ) -> Message | None:
         """The picture that was told of for the first time; `None` if the time is up or it was interrupted."""
         asked_s = self._now_s()
         while not interrupt.is_set() and (left := until_s - self._now_s()) > 0:
-            message = box.get(min(LOOK_S, left))
+            message = waiting.get(min(LOOK_S, left))
             if message is not None and self._is_new(message, taken):
                 return message
             if self._now_s() - asked_s >= AGAIN_S:
@@ -141,9 +143,9 @@ class MavlinkScanner:
         self._told.add(picture_of(message))
         return taken is None or message.image_index >= taken
 
-    def _forget(self, box: Box) -> None:
+    def _forget(self, waiting: MessageQueue) -> None:
         """Whatever has been told so far is of older scans."""
-        while (message := box.get(0.0)) is not None:
+        while (message := waiting.get(0.0)) is not None:
             self._told.add(picture_of(message))
 
     def _ask_for(self, index: int) -> None:

@@ -13,11 +13,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from bridge.mavlink.line.frames import Message
 from bridge.mavlink.line.messages import aim_at, aim_yaw, command_long, interval, on_board_beat
 from bridge.mavlink.line.peer import Peer, found
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import Box, Who, wire
+from bridge.mavlink.line.wire import MessageQueue, Who, wire
 from mission.document import Point
 from mission.errors import InputError, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots import AUTOPILOTS
@@ -25,7 +24,7 @@ from mission.mavlink.autopilots.kind import Mode, why_no_rover
 from mission.mavlink.enums import Component, MessageId
 from mission.mavlink.items import Command
 from mission.mavlink.local_frame import VehicleOrigin
-from mission.mavlink.telemetry import charge_of, is_lost, local_speed, origin_of, stands_still
+from mission.mavlink.telemetry import Message, charge_of, is_lost, local_speed, origin_of, stands_still
 
 ON_BOARD = Who(253, Component.ONBOARD_COMPUTER)
 """Ourselves: neither QGroundControl (255) nor a station of ours (254)."""
@@ -50,7 +49,7 @@ STREAMS = {
 """What we want to be told, by name: number of the message, times a second."""
 
 
-class Heard(Box):
+class NewestMessages(MessageQueue):
     """The newest message of each type from the vehicle, and when it came."""
 
     def __init__(self, of: Who) -> None:
@@ -78,7 +77,7 @@ class Heard(Box):
 @contextmanager
 def on_board(
     url: Url, *, signing_key: bytes | None = None, vehicle: int | None = None, timeout_s: float = 30.0
-) -> Iterator[Autopilot]:
+) -> Iterator[OnboardAutopilot]:
     """The autopilot at `url`, once it tells where it is.
 
     Raises
@@ -91,10 +90,10 @@ def on_board(
     with (
         wire(url, me=ON_BOARD, signing_key=signing_key) as opened,
         found(opened, vehicle, timeout_s=timeout_s, beat=on_board_beat) as peer,
-        opened.filling(Heard(peer.who)) as heard,
+        opened.filling(NewestMessages(peer.who)) as heard,
     ):
         _check_drivable(peer)
-        autopilot = Autopilot(peer, heard)
+        autopilot = OnboardAutopilot(peer, heard)
         try:
             autopilot.await_pose(timeout_s)
             with suppress(RobotUnreachable):
@@ -115,10 +114,10 @@ def _check_drivable(peer: Peer) -> None:
         raise InputError(f"--controller: {no_rover}")
 
 
-class Autopilot:
+class OnboardAutopilot:
     """A vehicle that was found. Places are metres north and east of its origin, yaws clockwise from north."""
 
-    def __init__(self, peer: Peer, heard: Heard) -> None:
+    def __init__(self, peer: Peer, heard: NewestMessages) -> None:
         self.peer = peer
         self.kind = peer.autopilot
         self.modes = peer.autopilot.modes

@@ -12,7 +12,7 @@ from typing import Literal
 from mission.document import Point
 from mission.run.way import foot
 
-Verdict = Literal["going", "arrived", "blocked"]
+DriveVerdict = Literal["going", "arrived", "blocked"]
 
 NEAR_M = 0.05
 """Nearer than this nobody asks for more, unless the mission's tolerance does."""
@@ -36,7 +36,7 @@ class Patience:
     astray_s: float = ASTRAY_S
 
 
-class Course:
+class StraightDrive:
     """A straight from where the vehicle is to `end`."""
 
     def __init__(
@@ -53,7 +53,7 @@ class Course:
         self.why = ""
         """What is wrong, once it is blocked."""
 
-    def judge(self, here: Point, *, still: bool, now_s: float) -> Verdict:
+    def judge(self, here: Point, *, still: bool, now_s: float) -> DriveVerdict:
         """Whether the vehicle has arrived, or will not."""
         away = math.dist(here, self._end)
         if away < self._nearest - PROGRESS_M:

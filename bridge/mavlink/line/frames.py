@@ -12,9 +12,8 @@ os.environ.setdefault("MAVLINK20", "1")
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.mavlink.line.transport import Address
+from mission.mavlink.telemetry import Message
 
-Message = Any
-"""A message of the dialect: `dialect.MAVLink_…_message`."""
 MAX_SENDERS = 64
 UNREADABLE = "unreadable"
 """Reason by which is counted what is no frame."""

@@ -14,7 +14,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 
-from bridge.mavlink.line.frames import Message
 from bridge.mavlink.line.messages import (
     command_int,
     command_long,
@@ -27,14 +26,14 @@ from bridge.mavlink.line.messages import (
 )
 from bridge.mavlink.line.round_trips import RoundTrips
 from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import SIGNATURE, Box, Who, Wire, sender, wire
+from bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, sender, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots import autopilot_of
 from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.enums import CommandResult, Component, Firmware, MessageId, ModeFlag, VehicleType
-from mission.mavlink.items import Command, Frame
+from mission.mavlink.items import Command, MavFrame
 from mission.mavlink.local_frame import VehicleOrigin
-from mission.mavlink.telemetry import began_again, origin_of
+from mission.mavlink.telemetry import Message, began_again, origin_of
 
 PATIENCE_S = 5.0
 """Silence after which a vehicle is given up."""
@@ -68,7 +67,7 @@ class Ack:
         return enum_name("MAV_RESULT", self.result)
 
 
-class Newest(Box):
+class Newest(MessageQueue):
     """The newest message of each type from one vehicle, and how often its clock began again.
 
     What is said in words of its other components, or in its name by a tunnel, is kept apart.
@@ -169,10 +168,10 @@ class Peer:
         return self._newest.messages.get(name)
 
     @contextmanager
-    def box(self, *types: str) -> Iterator[Box]:
-        """A box for what this vehicle sends, as `Wire.box`."""
-        with self.wire.box(*types, of=self.who) as box:
-            yield box
+    def waiting(self, *types: str) -> Iterator[MessageQueue]:
+        """A queue of what this vehicle sends, as `Wire.waiting`."""
+        with self.wire.waiting(*types, of=self.who) as waiting:
+            yield waiting
 
     def send(self, message: Message) -> None:
         self.wire.send(message)
@@ -196,7 +195,7 @@ class Peer:
         x: int = 0,
         y: int = 0,
         z: float = 0.0,
-        frame: int = Frame.GLOBAL,
+        frame: int = MavFrame.GLOBAL,
         patience_s: float | None = None,
     ) -> Ack:
         """A COMMAND_INT with up to four params and a place (1e-7 degrees); as `command`."""
@@ -227,10 +226,10 @@ class Peer:
         """
         name = message_name(number)
         taken = 0
-        with self._ordering, self.box(name, "COMMAND_ACK") as box:
+        with self._ordering, self.waiting(name, "COMMAND_ACK") as waiting:
             for _ in self._tries(AGAIN_S, patience_s):
                 self.request(number)
-                reply = self._reply(box, name, AGAIN_S)
+                reply = self._reply(waiting, name, AGAIN_S)
                 if reply is None:
                     continue
                 if reply.get_type() == name:
@@ -276,12 +275,14 @@ class Peer:
         return " (its heartbeats come: does it want signed messages, or is the line one-way?)"
 
     def _commanded(self, number: int, message: Callable[[int], Message], patience_s: float | None) -> Ack:
-        with self._ordering, self.box("COMMAND_ACK") as box:
+        with self._ordering, self.waiting("COMMAND_ACK") as waiting:
             patience = self.patience_s if patience_s is None else patience_s
             until = time.monotonic() + patience
             for nth in count():
                 self.wire.send(message(nth))
-                while (ack := self._acked(box, number, min(AGAIN_S, until - time.monotonic()))) is not None:
+                while (
+                    ack := self._acked(waiting, number, min(AGAIN_S, until - time.monotonic()))
+                ) is not None:
                     if ack.result != CommandResult.IN_PROGRESS:
                         return ack
                     until = time.monotonic() + patience
@@ -292,18 +293,18 @@ class Peer:
             "whether it was carried out is unknown"
         )
 
-    def _acked(self, box: Box, number: int, timeout_s: float) -> Ack | None:
+    def _acked(self, waiting: MessageQueue, number: int, timeout_s: float) -> Ack | None:
         """The next answer to this command."""
         until = time.monotonic() + timeout_s
-        while (message := box.get(until - time.monotonic())) is not None:
+        while (message := waiting.get(until - time.monotonic())) is not None:
             if message.command == number:
                 return Ack(message.command, message.result, message.result_param2)
         return None
 
-    def _reply(self, box: Box, name: str, timeout_s: float) -> Message | None:
+    def _reply(self, waiting: MessageQueue, name: str, timeout_s: float) -> Message | None:
         """The message asked for, else the answer to the question, whichever says more."""
         until, answer = time.monotonic() + timeout_s, None
-        while (message := box.get(until - time.monotonic())) is not None:
+        while (message := waiting.get(until - time.monotonic())) is not None:
             if message.get_type() == name:
                 return message
             if message.command == Command.REQUEST_MESSAGE:
@@ -368,9 +369,9 @@ def found(
     InputError
         If several are, and none was named.
     """
-    with wire.box("HEARTBEAT") as box:
+    with wire.waiting("HEARTBEAT") as waiting:
         wire.beat(beat or station_beat)
-        heard = _heard(box, vehicle, timeout_s, lambda: _knock(wire, vehicle, beat or station_beat))
+        heard = _heard(waiting, vehicle, timeout_s, lambda: _knock(wire, vehicle, beat or station_beat))
     heartbeat = _meant(wire, heard, vehicle, timeout_s)
     newest = Newest(sender(heartbeat))
     newest.put(heartbeat)
@@ -378,12 +379,14 @@ def found(
         yield Peer(wire, newest, autopilot_of(heartbeat.autopilot), timeout_s)
 
 
-def _heard(box: Box, vehicle: int | None, timeout_s: float, knock: Callable[[], None]) -> dict[int, Message]:
+def _heard(
+    waiting: MessageQueue, vehicle: int | None, timeout_s: float, knock: Callable[[], None]
+) -> dict[int, Message]:
     """Heartbeats of autopilots by system id: of the one that is meant, or of all until no other can come."""
     heard: dict[int, Message] = {}
     until = time.monotonic() + timeout_s
     while (left_s := until - time.monotonic()) > 0:
-        message = box.get(min(KNOCK_S, left_s))
+        message = waiting.get(min(KNOCK_S, left_s))
         if message is None and not heard:
             knock()
         if message is None or not _of_autopilot(message):

@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from bridge.mavlink.line.url import Kind, Url
+from bridge.mavlink.line.url import Url, UrlKind
 from mission.errors import InputError, RobotUnreachable
 
 Address = Any
@@ -328,7 +328,7 @@ class Serial:
                 self._line, self.gone = self._opened(), ""
 
 
-OPENING: dict[Kind, Callable[[Url], Transport]] = {
+OPENING: dict[UrlKind, Callable[[Url], Transport]] = {
     "udpin": UdpIn,
     "udpout": UdpOut,
     "tcp": TcpOut,

@@ -7,8 +7,8 @@ from typing import Literal
 
 from mission.errors import InputError
 
-Kind = Literal["udpin", "udpout", "tcp", "tcpin", "serial"]
-KINDS: tuple[Kind, ...] = ("udpin", "udpout", "tcp", "tcpin", "serial")
+UrlKind = Literal["udpin", "udpout", "tcp", "tcpin", "serial"]
+KINDS: tuple[UrlKind, ...] = ("udpin", "udpout", "tcp", "tcpin", "serial")
 HOW = (
     "write it udpin:HOST:PORT (listen), udpout:HOST:PORT (send there), tcp:HOST:PORT (connect),"
     " tcpin:HOST:PORT (listen) or serial:PATH:BAUD, such as udpout:127.0.0.1:14550"
@@ -18,7 +18,7 @@ BAUDS = range(1200, 4_000_001)
 
 @dataclass(frozen=True)
 class Url:
-    kind: Kind
+    kind: UrlKind
     host: str
     """Address, or the serial device's path."""
     number: int

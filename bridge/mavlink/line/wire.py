@@ -1,7 +1,8 @@
 """Messages in and out of a transport: frames, checksums, signatures, and who is where.
 
-One thread reads; whoever waits for messages opens a `box` for their types. Nothing that comes in can stop the
-thread: what is no frame, has a wrong checksum or signature, or is for somebody else is dropped and counted.
+One thread reads; whoever waits for messages opens a queue for their types. Nothing that comes in can stop
+the thread: what is no frame, has a wrong checksum or signature, or is for somebody else is dropped and
+counted.
 """
 
 from __future__ import annotations
@@ -19,13 +20,14 @@ from pathlib import Path
 from typing import TypeVar
 
 from bridge.console import say
-from bridge.mavlink.line.frames import UNREADABLE, Frames, Message, dialect
+from bridge.mavlink.line.frames import UNREADABLE, Frames, dialect
 from bridge.mavlink.line.transport import Address, Transport, open_transport
 from bridge.mavlink.line.url import Url, check_guarded, read_url
 from mission.errors import InputError
 from mission.mavlink.enums import Component, MessageId
+from mission.mavlink.telemetry import Message
 
-BOX_SIZE = 10_000
+QUEUE_SIZE = 10_000
 READ_S = 0.1
 MAVLINK_EPOCH_S = 1_420_070_400
 """2015-01-01, from which signatures count in steps of 10 µs."""
@@ -55,16 +57,16 @@ GROUND_STATION = Who(254, Component.MISSIONPLANNER)
 """Not 255, which QGroundControl has: a vehicle must be able to tell two stations apart."""
 
 
-B = TypeVar("B", bound="Box")
+B = TypeVar("B", bound="MessageQueue")
 
 
-class Box:
+class MessageQueue:
     """Messages that wait for one reader: of these types (empty: all), from one sender (`None`: all)."""
 
     def __init__(self, types: frozenset[str] = frozenset(), of: Who | None = None) -> None:
         self.types = types
         self.of = of
-        self._queue: queue.Queue[Message] = queue.Queue(BOX_SIZE)
+        self._queue: queue.Queue[Message] = queue.Queue(QUEUE_SIZE)
 
     def wants(self, message: Message) -> bool:
         return (not self.types or message.get_type() in self.types) and self.of in (None, sender(message))
@@ -113,7 +115,7 @@ class Wire:
         self._sending = self._mav()
         self._frames = Frames(self.dropped, self._mav)
         self._routes: dict[tuple[int, int], Address] = {}
-        self._boxes: list[Box] = []
+        self._boxes: list[MessageQueue] = []
         self._lock = threading.Lock()
         self._closing = threading.Event()
         self._beat: Callable[[], Message] | None = None
@@ -136,19 +138,19 @@ class Wire:
             self._transport.write(data, self._route(*target))
 
     @contextmanager
-    def box(self, *types: str, of: Who | None = None) -> Iterator[Box]:
+    def waiting(self, *types: str, of: Who | None = None) -> Iterator[MessageQueue]:
         """A box that collects messages of these types (all, if none is given) while it is open."""
-        with self.filling(Box(frozenset(types), of)) as box:
-            yield box
+        with self.filling(MessageQueue(frozenset(types), of)) as waiting:
+            yield waiting
 
     @contextmanager
-    def filling(self, box: B) -> Iterator[B]:
+    def filling(self, waiting: B) -> Iterator[B]:
         """A box of the caller's own, which is filled while this is open."""
-        self._boxes.append(box)
+        self._boxes.append(waiting)
         try:
-            yield box
+            yield waiting
         finally:
-            self._boxes.remove(box)
+            self._boxes.remove(waiting)
 
     def beat(self, heartbeat: Callable[[], Message]) -> None:
         """Send what `heartbeat` makes now and every second."""
@@ -193,9 +195,9 @@ class Wire:
         if not self._for_us(message):
             self.dropped["for others"] += 1
             return
-        for box in list(self._boxes):
-            if box.wants(message):
-                box.put(message)
+        for waiting in list(self._boxes):
+            if waiting.wants(message):
+                waiting.put(message)
 
     def _for_us(self, message: Message) -> bool:
         system = getattr(message, "target_system", 0)

@@ -14,7 +14,7 @@ from typing import Literal
 from bridge.mavlink.simulated.camera import Camera
 from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.vehicle_faults import Mishaps
-from bridge.mavlink.simulated.vehicle_store import Items, Store
+from bridge.mavlink.simulated.vehicle_store import KeptItems, Store
 from mission.document import Point
 from mission.mavlink import recognise as recognised
 from mission.mavlink.autopilots.kind import Autopilot
@@ -26,13 +26,13 @@ STAYS, HOMES = 17, 20
 PLACES = recognised.PLACES | {STAYS}
 NAV = PLACES | WAITS | {HOMES}
 """Commands that take time; every other one is done at once or skipped."""
-State = Literal["idle", "active", "complete"]
-Phase = Literal["driving", "holding", "waiting", "script", "lost", "rebooting"]
+AutoState = Literal["idle", "active", "complete"]
+AutoPhase = Literal["driving", "holding", "waiting", "script", "lost", "rebooting"]
 
 
 @dataclass(frozen=True)
-class Tells:
-    """Whom the course tells what happens, with the time in nanoseconds."""
+class AutoEvents:
+    """Who is told what happens in the mission, with the time in nanoseconds."""
 
     current: Callable[[int], None]
     reached: Callable[[int], None]
@@ -43,7 +43,7 @@ class Tells:
     text: Callable[[str], None]
 
 
-class Course:
+class AutoMission:
     """Where in the mission the vehicle is, and when the next thing happens."""
 
     def __init__(
@@ -53,14 +53,14 @@ class Course:
         rover: Rover,
         camera: Camera,
         mishaps: Mishaps,
-        tells: Tells,
+        tells: AutoEvents,
     ) -> None:
         self._autopilot, self._store, self._rover = autopilot, store, rover
         self._camera, self._mishaps, self._tells = camera, mishaps, tells
         self._first = 1 if autopilot.home_first else 0
-        self._phase: Phase = "lost"
+        self._phase: AutoPhase = "lost"
         self._item: Item | None = None
-        self.state: State = "idle"
+        self.state: AutoState = "idle"
         self.current = 0
         self.due_ns: int | None = None
         """When the next thing happens; None while nothing will."""
@@ -142,7 +142,7 @@ class Course:
         self._rover.brake(now_ns)
         self._tells.finished(now_ns)
 
-    def _act(self, items: Items, number: int, now_ns: int) -> None:
+    def _act(self, items: KeptItems, number: int, now_ns: int) -> None:
         item = items[number]
         if item.command == Command.DO_CHANGE_SPEED:
             self._rover.set_speed(item.params[1])
@@ -197,7 +197,7 @@ class Course:
         return 0.0 if hold > self._autopilot.longest_hold_s else hold
 
 
-def _scan_of(items: Items, number: int) -> tuple[int, float]:
+def _scan_of(items: KeptItems, number: int) -> tuple[int, float]:
     """The number that a trigger carries, and how many seconds its scan takes (0: not said).
 
     A script message says it in param3. A camera command has no field for it: param2, the interval, if it is

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bridge.mavlink.line.frames import Message
 from bridge.mavlink.simulated.replies import picture
 from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.vehicle_faults import Mishaps
-from bridge.mavlink.simulated.vehicle_scanner import Captured, Scanner
+from bridge.mavlink.simulated.vehicle_scanner import ScanEnd, VehicleScanner
 from bridge.mavlink.simulated.vehicle_store import Store
+from mission.mavlink.telemetry import Message
 
 
 class Camera:
@@ -25,7 +25,7 @@ class Camera:
         self, store: Store, rover: Rover, mishaps: Mishaps, *, default_s: Callable[[], float]
     ) -> None:
         self._store, self._rover, self._default_s = store, rover, default_s
-        self._scanner = Scanner(mishaps)
+        self._scanner = VehicleScanner(mishaps)
         self.last = 0
         """The number that the trigger of the newest scan carried."""
         self.told: dict[int, Message] = {}
@@ -75,7 +75,7 @@ class Camera:
         self._scanner.stop()
         self.told.clear()
 
-    def _message(self, done: Captured, now_ns: int, boot_ms: int) -> Message:
+    def _message(self, done: ScanEnd, now_ns: int, boot_ms: int) -> Message:
         pose = self._rover.at(now_ns)[0]
         return picture(
             done.index, boot_ms=boot_ms, now_ns=now_ns, place=self._rover.place((pose.x, pose.y)),

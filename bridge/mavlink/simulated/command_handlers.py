@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bridge.mavlink.line.frames import Message
 from bridge.mavlink.line.wire import Who
 from bridge.mavlink.simulated import replies
 from bridge.mavlink.simulated import vehicle_telemetry as telemetry
@@ -16,13 +15,14 @@ from mission.document import SiteOrigin
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.autopilots.kind import Mode, ModeName
 from mission.mavlink.enums import CommandResult, MessageId, ModeFlag
-from mission.mavlink.items import Command, Frame
+from mission.mavlink.items import Command, MavFrame
+from mission.mavlink.telemetry import Message
 
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 REJECTED, UNSUPPORTED = CommandResult.TEMPORARILY_REJECTED, CommandResult.UNSUPPORTED
 FAILED = CommandResult.FAILED
 IGNORE_X_Y, IGNORE_YAW = 0b11, 1 << 10
-LOCAL_NED, LOCAL_OFFSET_NED = Frame.LOCAL_NED, Frame.LOCAL_OFFSET_NED
+LOCAL_NED, LOCAL_OFFSET_NED = MavFrame.LOCAL_NED, MavFrame.LOCAL_OFFSET_NED
 NORTHMOST = 89.0
 """Degrees; at the poles there is no east."""
 CHANGE_MODE = 1
@@ -30,7 +30,7 @@ CHANGE_MODE = 1
 
 
 @dataclass(frozen=True)
-class Order:
+class ReceivedCommand:
     """A command with its numbers; `x` and `y` are steps of 1e-7 degrees where it has a place."""
 
     command: int
@@ -61,22 +61,22 @@ def handlers(vehicle: Vehicle) -> Handlers:
     }
 
 
-def _long(message: Message) -> Order:
+def _long(message: Message) -> ReceivedCommand:
     params = (message.param1, message.param2, message.param3, message.param4)
     x, y = (_steps(value) for value in (message.param5, message.param6))
-    return Order(message.command, params, x, y, exact=False, again=message.confirmation > 0)
+    return ReceivedCommand(message.command, params, x, y, exact=False, again=message.confirmation > 0)
 
 
-def _int(message: Message) -> Order:
+def _int(message: Message) -> ReceivedCommand:
     params = (message.param1, message.param2, message.param3, message.param4)
-    return Order(message.command, params, message.x, message.y, exact=True, again=False)
+    return ReceivedCommand(message.command, params, message.x, message.y, exact=True, again=False)
 
 
 def _steps(degrees: float) -> int:
     return round(degrees * STEPS_PER_DEGREE) if math.isfinite(degrees) and abs(degrees) < 200 else 2**31 - 1
 
 
-def _answer(vehicle: Vehicle, who: Who, order: Order) -> None:
+def _answer(vehicle: Vehicle, who: Who, order: ReceivedCommand) -> None:
     """Obey and acknowledge; an order that makes the vehicle silent is acknowledged first."""
     if order.command == Command.PREFLIGHT_REBOOT_SHUTDOWN:
         return _reboot(vehicle, who, order)
@@ -90,7 +90,7 @@ def _acknowledge(vehicle: Vehicle, who: Who, command: int, result: int) -> None:
     vehicle.say(replies.command_ack(who, command, result))
 
 
-def _reboot(vehicle: Vehicle, who: Who, order: Order) -> None:
+def _reboot(vehicle: Vehicle, who: Who, order: ReceivedCommand) -> None:
     refused = vehicle.armed or order.whole(0) != 1
     _acknowledge(vehicle, who, order.command, _no(vehicle) if refused else ACCEPTED)
     if not refused:
@@ -102,7 +102,7 @@ def _no(vehicle: Vehicle) -> int:
     return int(vehicle.autopilot.habits.says_no)
 
 
-def _arm(vehicle: Vehicle, order: Order) -> int:
+def _arm(vehicle: Vehicle, order: ReceivedCommand) -> int:
     wanted = order.params[0]
     if wanted not in (0.0, 1.0):
         return int(DENIED)
@@ -110,7 +110,7 @@ def _arm(vehicle: Vehicle, order: Order) -> int:
     return int(ACCEPTED)
 
 
-def _set_mode(vehicle: Vehicle, order: Order) -> int:
+def _set_mode(vehicle: Vehicle, order: ReceivedCommand) -> int:
     main, sub = order.whole(1), order.whole(2)
     return _change_mode(vehicle, order.whole(0, 0), vehicle.autopilot.modes.custom(Mode(main, sub)))
 
@@ -140,22 +140,22 @@ def _set_mode_message(vehicle: Vehicle, who: Who, message: Message) -> None:
         _acknowledge(vehicle, who, MessageId.SET_MODE, result)
 
 
-def _set_current(vehicle: Vehicle, order: Order) -> int:
+def _set_current(vehicle: Vehicle, order: ReceivedCommand) -> int:
     """-1 means: stay; param2 1 means: count everything anew."""
     number = order.whole(0, -2)
     if number == -1:
-        number = vehicle.course.current
-    return int(ACCEPTED if vehicle.course.jump(number, vehicle.now_ns) else DENIED)
+        number = vehicle.auto.current
+    return int(ACCEPTED if vehicle.auto.jump(number, vehicle.now_ns) else DENIED)
 
 
 def _set_current_message(vehicle: Vehicle, message: Message) -> None:
-    if not vehicle.course.jump(message.seq, vehicle.now_ns):
+    if not vehicle.auto.jump(message.seq, vehicle.now_ns):
         vehicle.text(f"Item {message.seq}: not in the mission")
 
 
-def _start(vehicle: Vehicle, order: Order) -> int:
+def _start(vehicle: Vehicle, order: ReceivedCommand) -> int:
     first, habits = order.whole(0, 0), vehicle.autopilot.habits
-    if first > 0 and not (habits.start_takes_item and vehicle.course.jump(first, vehicle.now_ns)):
+    if first > 0 and not (habits.start_takes_item and vehicle.auto.jump(first, vehicle.now_ns)):
         return int(DENIED)
     if not vehicle.set_mode("auto"):
         return _no(vehicle)
@@ -164,13 +164,13 @@ def _start(vehicle: Vehicle, order: Order) -> int:
     return int(ACCEPTED)
 
 
-def _pause(vehicle: Vehicle, order: Order) -> int:
+def _pause(vehicle: Vehicle, order: ReceivedCommand) -> int:
     if not vehicle.autopilot.habits.pauses_by_command:
         return int(UNSUPPORTED)
     return int(ACCEPTED) if vehicle.set_mode("auto" if order.params[0] == 1 else "hold") else int(DENIED)
 
 
-def _reposition(vehicle: Vehicle, order: Order) -> int:
+def _reposition(vehicle: Vehicle, order: ReceivedCommand) -> int:
     """param1 is a speed (-1: as it is), param2 1 allows the change of mode, param4 is radians from north."""
     if not order.exact:
         return int(CommandResult.COMMAND_INT_ONLY)
@@ -180,7 +180,7 @@ def _reposition(vehicle: Vehicle, order: Order) -> int:
         return int(DENIED)
     vehicle.set_mode(mode)
     vehicle.rover.set_speed(order.params[0])
-    vehicle.lead.go(point, _heading(vehicle, order.params[3]), vehicle.now_ns)
+    vehicle.target.go(point, _heading(vehicle, order.params[3]), vehicle.now_ns)
     return int(ACCEPTED)
 
 
@@ -190,21 +190,21 @@ def _heading(vehicle: Vehicle, yaw: float) -> float | None:
     return math.pi / 2 - yaw if turns else None
 
 
-def _change_speed(vehicle: Vehicle, order: Order) -> int:
-    drives = vehicle.course.state == "active" or vehicle.lead.goes_somewhere
+def _change_speed(vehicle: Vehicle, order: ReceivedCommand) -> int:
+    drives = vehicle.auto.state == "active" or vehicle.target.goes_somewhere
     if vehicle.autopilot.habits.speed_while_driving and not drives:
         return int(FAILED)
     if not vehicle.rover.set_speed(order.params[1]):
         return int(DENIED)
-    vehicle.lead.again(vehicle.now_ns)
+    vehicle.target.again(vehicle.now_ns)
     return int(ACCEPTED)
 
 
-def _interval(vehicle: Vehicle, order: Order) -> int:
+def _interval(vehicle: Vehicle, order: ReceivedCommand) -> int:
     return int(ACCEPTED) if vehicle.streams.set(order.whole(0), order.params[1]) else _no(vehicle)
 
 
-def _tell_interval(vehicle: Vehicle, order: Order) -> int:
+def _tell_interval(vehicle: Vehicle, order: ReceivedCommand) -> int:
     number = order.whole(0)
     if not 0 <= number < 2**16:
         return int(DENIED)
@@ -212,39 +212,39 @@ def _tell_interval(vehicle: Vehicle, order: Order) -> int:
     return int(ACCEPTED)
 
 
-def _request(vehicle: Vehicle, order: Order) -> int:
+def _request(vehicle: Vehicle, order: ReceivedCommand) -> int:
     maker = telemetry.MAKERS.get(order.whole(0))
     return int(UNSUPPORTED) if maker is None else int(DENIED if maker(vehicle) is None else ACCEPTED)
 
 
-def _tell_version(vehicle: Vehicle, order: Order) -> int:
+def _tell_version(vehicle: Vehicle, order: ReceivedCommand) -> int:
     vehicle.tell(MessageId.AUTOPILOT_VERSION)
     return int(ACCEPTED)
 
 
-def _tell_home(vehicle: Vehicle, order: Order) -> int:
+def _tell_home(vehicle: Vehicle, order: ReceivedCommand) -> int:
     return int(ACCEPTED) if vehicle.tell(MessageId.HOME_POSITION) else _no(vehicle)
 
 
-def _capture(vehicle: Vehicle, order: Order) -> int:
+def _capture(vehicle: Vehicle, order: ReceivedCommand) -> int:
     """IMAGE_START_CAPTURE: param4 is the number; param2, the interval, which one picture has not, seconds."""
     return _scan(vehicle, order, order.whole(3, 0), order.params[1])
 
 
-def _script_message(vehicle: Vehicle, order: Order) -> int:
+def _script_message(vehicle: Vehicle, order: ReceivedCommand) -> int:
     """DO_SEND_SCRIPT_MESSAGE: param2 is the number, param3 the seconds."""
     if Command.DO_SEND_SCRIPT_MESSAGE not in vehicle.autopilot.commands:
         return int(UNSUPPORTED)
     return _scan(vehicle, order, order.whole(1, 0), order.params[2])
 
 
-def _stop_capture(vehicle: Vehicle, order: Order) -> int:
+def _stop_capture(vehicle: Vehicle, order: ReceivedCommand) -> int:
     """The scan under way is broken off; nothing is said of it."""
     vehicle.break_off()
     return int(ACCEPTED)
 
 
-def _scan(vehicle: Vehicle, order: Order, number: int, seconds: float) -> int:
+def _scan(vehicle: Vehicle, order: ReceivedCommand, number: int, seconds: float) -> int:
     """A trigger that comes again for the scan it began does not begin another."""
     same = number == vehicle.camera.under_way or (order.again and number == vehicle.camera.last)
     if number > 0 and same:
@@ -252,7 +252,7 @@ def _scan(vehicle: Vehicle, order: Order, number: int, seconds: float) -> int:
     return int(ACCEPTED if vehicle.camera.begin(max(0, number), seconds, vehicle.now_ns) else REJECTED)
 
 
-OBEYED: dict[int, Callable[[Vehicle, Order], int]] = {
+OBEYED: dict[int, Callable[[Vehicle, ReceivedCommand], int]] = {
     Command.COMPONENT_ARM_DISARM: _arm,
     Command.DO_SET_MODE: _set_mode,
     Command.DO_SET_MISSION_CURRENT: _set_current,
@@ -280,7 +280,7 @@ def _set_origin(vehicle: Vehicle, message: Message) -> None:
 
 
 def _target_local(vehicle: Vehicle, message: Message) -> None:
-    vehicle.lead.hear()
+    vehicle.target.hear()
     if message.type_mask & IGNORE_X_Y == IGNORE_X_Y:
         return _turn(vehicle, message)
     east, north = message.y, message.x
@@ -294,7 +294,7 @@ def _target_local(vehicle: Vehicle, message: Message) -> None:
 
 
 def _target_global(vehicle: Vehicle, message: Message) -> None:
-    vehicle.lead.hear()
+    vehicle.target.hear()
     point = vehicle.rover.point(message.lat_int, message.lon_int)
     if point is not None:
         _guide(vehicle, message, point)
@@ -304,11 +304,11 @@ def _turn(vehicle: Vehicle, message: Message) -> None:
     """To a yaw without a place. Speeds and accelerations, which may come instead, are not followed."""
     leads = vehicle.mode == "guided" and vehicle.armed and vehicle.autopilot.driving.turns
     if leads and not message.type_mask & IGNORE_YAW and math.isfinite(message.yaw) and abs(message.yaw) < 100:
-        vehicle.lead.turn(math.pi / 2 - message.yaw, vehicle.now_ns)
+        vehicle.target.turn(math.pi / 2 - message.yaw, vehicle.now_ns)
 
 
 def _guide(vehicle: Vehicle, message: Message, point: tuple[float, float]) -> None:
     if vehicle.mode != "guided" or not vehicle.armed or message.type_mask & IGNORE_X_Y:
         return
     heading = None if message.type_mask & IGNORE_YAW else _heading(vehicle, message.yaw)
-    vehicle.lead.go(point, heading, vehicle.now_ns)
+    vehicle.target.go(point, heading, vehicle.now_ns)

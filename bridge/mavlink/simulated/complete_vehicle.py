@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from bridge.link.clock import Clock
-from bridge.mavlink.line.frames import Message
 from bridge.mavlink.simulated.command_handlers import handlers
 from bridge.mavlink.simulated.vehicle import Setting, Vehicle
 from bridge.mavlink.simulated.vehicle_telemetry import MAKERS
+from mission.mavlink.telemetry import Message
 
 
 def complete_vehicle(

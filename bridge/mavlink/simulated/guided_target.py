@@ -10,7 +10,7 @@ PATIENCE_NS = 1_000_000_000
 """An autopilot that wants a stream of setpoints waits so long for the next one, by the wall's clock."""
 
 
-class Lead:
+class GuidedTarget:
     """Where a station wants the vehicle."""
 
     def __init__(self, rover: Rover, wall: Clock) -> None:

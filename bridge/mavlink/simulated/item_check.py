@@ -9,7 +9,7 @@ from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.enums import MissionResult
 from mission.mavlink.fields import PLACED
-from mission.mavlink.items import Frame, Item
+from mission.mavlink.items import Item, MavFrame
 
 ACCEPTED = MissionResult.ACCEPTED
 FENCE_COMMANDS = range(5000, 5005)
@@ -33,7 +33,7 @@ def verdict(autopilot: Autopilot, kind: int, item: Item) -> int:
     placed = item.command in PLACED
     if autopilot.habits.checks_frame_first:
         return _frame_first(item, placed)
-    if placed and item.frame not in GLOBAL_FRAMES | {Frame.MISSION}:
+    if placed and item.frame not in GLOBAL_FRAMES | {MavFrame.MISSION}:
         return MissionResult.UNSUPPORTED_FRAME
     if placed and abs(item.z) >= autopilot.habits.highest_m:
         return MissionResult.INVALID_PARAM7
@@ -42,7 +42,7 @@ def verdict(autopilot: Autopilot, kind: int, item: Item) -> int:
 
 def _frame_first(item: Item, placed: bool) -> int:
     """The frame is looked at first, and numbers hardly; places off the earth are refused here."""
-    if item.frame not in PX4_FRAMES | {Frame.MISSION}:
+    if item.frame not in PX4_FRAMES | {MavFrame.MISSION}:
         return MissionResult.UNSUPPORTED_FRAME
     if placed != (item.frame in PX4_FRAMES):
         return MissionResult.UNSUPPORTED

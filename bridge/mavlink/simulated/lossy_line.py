@@ -9,10 +9,10 @@ import threading
 import time
 
 from bridge.mavlink.line.transport import Address, Transport
-from bridge.mavlink.simulated.vehicle_faults import FaultKind, VehicleFaults
+from bridge.mavlink.simulated.vehicle_faults import VehicleFaultKind, VehicleFaults
 
 
-class RoughLine:
+class LossyLine:
     """A transport whose frames are lost, doubled and delayed by chance, in both directions.
 
     Two threads use it: one reads, another writes.
@@ -68,14 +68,14 @@ class RoughLine:
         return [time.monotonic() + chance.uniform(0.0, self._late_s) for _ in range(copies)]
 
 
-LINE: frozenset[FaultKind] = frozenset({"loss", "duplicates", "jitter"})
+LINE: frozenset[VehicleFaultKind] = frozenset({"loss", "duplicates", "jitter"})
 
 
 def on_line(transport: Transport, faults: VehicleFaults) -> Transport:
     """The transport, made rough where the faults say so."""
-    return RoughLine(transport, faults) if any(fault.kind in LINE for fault in faults.all) else transport
+    return LossyLine(transport, faults) if any(fault.kind in LINE for fault in faults.all) else transport
 
 
-def _share(faults: VehicleFaults, kind: FaultKind) -> float:
+def _share(faults: VehicleFaults, kind: VehicleFaultKind) -> float:
     fault = faults.any(kind)
     return fault.at / 100 if fault else 0.0

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from bridge.mavlink.line.frames import Message
 from bridge.mavlink.line.wire import Who
 from bridge.mavlink.simulated import replies
 from bridge.mavlink.simulated.vehicle_scanner import DEFAULT_S, LONGEST_S
 from mission.mavlink.autopilots.kind import Habits
+from mission.mavlink.telemetry import Message
 
 SCAN_TIME = "SIM_SCAN_TIME"
 """Seconds that a scan takes if its trigger does not say."""

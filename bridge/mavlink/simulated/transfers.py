@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import msgspec
 
 from bridge.link.clock import Clock
-from bridge.mavlink.line.frames import Message
 from bridge.mavlink.line.wire import Who
 from bridge.mavlink.simulated.item_check import ACCEPTED, verdict
 from bridge.mavlink.simulated.replies import (
@@ -20,10 +19,11 @@ from bridge.mavlink.simulated.replies import (
     received_item,
 )
 from bridge.mavlink.simulated.vehicle_faults import Mishaps
-from bridge.mavlink.simulated.vehicle_store import ALL, FENCE, MISSION, RALLY, Items, Store
+from bridge.mavlink.simulated.vehicle_store import ALL, FENCE, MISSION, RALLY, KeptItems, Store
 from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.enums import MissionResult
 from mission.mavlink.items import Item
+from mission.mavlink.telemetry import Message
 
 KINDS = (MISSION, FENCE, RALLY)
 
@@ -118,7 +118,7 @@ class Transfers:
         if down and now - down.heard_ns > habits.give_up_s * 1e9:
             self._download = None
 
-    def items(self, kind: int) -> Items:
+    def items(self, kind: int) -> KeptItems:
         """The list as stations read it: with the vehicle's own home in front where it has one."""
         items = self._store.items(kind)
         if kind == MISSION and self._autopilot.home_first and items:
@@ -288,7 +288,7 @@ class Transfers:
 
     # What is said
 
-    def _replace(self, kind: int, items: Items, marked: int | None) -> None:
+    def _replace(self, kind: int, items: KeptItems, marked: int | None) -> None:
         """The same list again changes nothing on PX4 (source: it compares a checksum)."""
         same = _same(self._store.items(kind), items)
         self._store.put(kind, items)
@@ -307,6 +307,6 @@ class Transfers:
         self._say(mission_count(who, kind, count))
 
 
-def _same(one: Items, other: Items) -> bool:
+def _same(one: KeptItems, other: KeptItems) -> bool:
     """Bit by bit, for a NaN is not equal to itself."""
     return msgspec.msgpack.encode(one) == msgspec.msgpack.encode(other)

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bridge.link.clock import Clock
-from bridge.mavlink.line.frames import Message
 from bridge.mavlink.line.wire import Who, sender
 from bridge.mavlink.simulated import parameters, replies
-from bridge.mavlink.simulated.auto_mission import Course, Tells
+from bridge.mavlink.simulated.auto_mission import AutoEvents, AutoMission
 from bridge.mavlink.simulated.camera import Camera
-from bridge.mavlink.simulated.guided_target import Lead
+from bridge.mavlink.simulated.guided_target import GuidedTarget
 from bridge.mavlink.simulated.parameters import Parameters
 from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.streams import Streams
@@ -23,14 +22,15 @@ from mission.document import SiteOrigin
 from mission.events import Pose
 from mission.mavlink.autopilots.kind import Autopilot, ModeName
 from mission.mavlink.enums import MessageId
-from mission.mavlink.items import Command, Frame, Item
+from mission.mavlink.items import Command, Item, MavFrame
 from mission.mavlink.read_back import home_item
+from mission.mavlink.telemetry import Message
 
 BOOT_NS = KEEP_NS = 1_000_000_000
 FOREVER_NS = 2**63
 BATTERY_NS = 6 * 3600 * 10**9
 """A full battery lasts six hours."""
-NOWHERE = Item(Command.NAV_WAYPOINT, Frame.GLOBAL)
+NOWHERE = Item(Command.NAV_WAYPOINT, MavFrame.GLOBAL)
 
 
 Maker = Callable[["Vehicle"], Message | None]
@@ -91,20 +91,20 @@ class Vehicle:
         self.store = Store(setting.state)
         rule = self.autopilot.rule
         self.rover = Rover(self.store, rule=rule, origin=setting.origin, at=setting.at)
-        self.lead = Lead(self.rover, wall)
+        self.target = GuidedTarget(self.rover, wall)
         self.parameters = Parameters(
             self.autopilot.habits, speed=self.rover.speed, set_speed=self.rover.set_speed
         )
         self.camera = Camera(self.store, self.rover, self._mishaps, default_s=lambda: self.parameters.scan_s)
-        tells = Tells(
+        tells = AutoEvents(
             current=self._went_on, reached=self._reach, trigger=self._triggered, finished=self._finish,
             reboot=self.reboot, text=self.text,
         )  # fmt: skip
-        self.course = Course(self.autopilot, self.store, self.rover, self.camera, self._mishaps, tells)
+        self.auto = AutoMission(self.autopilot, self.store, self.rover, self.camera, self._mishaps, tells)
         self.streams = Streams(wall, makers)
         self.transfers = Transfers(
             self.autopilot, self.store, wall, say=self.say, text=self.text, home=self._home,
-            stored=self._stored, running=lambda: self.course.state == "active", event=self._item_came,
+            stored=self._stored, running=lambda: self.auto.state == "active", event=self._item_came,
             mishaps=self._mishaps,
         )  # fmt: skip
         self._handlers = {
@@ -130,12 +130,12 @@ class Vehicle:
             if self.camera.due_ns is not None and self.camera.due_ns <= due_ns:
                 self._scanned()
             else:
-                self.course.step()
+                self.auto.step()
         self.now_ns = max(self.now_ns, until_ns)
         self._keep()
         if self._quiet():
             return
-        if self.mode == "guided" and self.autopilot.driving.streams and not self.lead.fresh:
+        if self.mode == "guided" and self.autopilot.driving.streams and not self.target.fresh:
             self.text("Offboard: setpoints lost")
             self.set_mode("hold")
         self.transfers.tick()
@@ -182,36 +182,36 @@ class Vehicle:
 
     def set_mode(self, mode: ModeName) -> bool:
         """Change the mode; false if it cannot be."""
-        if mode == "auto" and not self.course.total:
+        if mode == "auto" and not self.auto.total:
             self.text("No mission")
             return False
         if mode == self.mode:
             return True
-        if mode == "guided" and self.autopilot.driving.streams and not self.lead.fresh:
+        if mode == "guided" and self.autopilot.driving.streams and not self.target.fresh:
             self.text("Offboard: no setpoints")
             return False
         self.mode = mode
-        self.lead.forget()
-        self.course.stand(self.now_ns)
+        self.target.forget()
+        self.auto.stand(self.now_ns)
         self.rover.brake(self.now_ns)
         if mode == "auto" and self.armed:
-            self.course.go_on(self.now_ns)
+            self.auto.go_on(self.now_ns)
         self.tell(MessageId.HEARTBEAT)
         return True
 
     def arm(self) -> None:
         was, self.armed = self.armed, True
         if self.mode == "auto" and not was:
-            self.course.go_on(self.now_ns)
+            self.auto.go_on(self.now_ns)
         self.tell(MessageId.HEARTBEAT)
 
     def disarm(self) -> None:
         """Stand still; the mission begins anew next time."""
         self.armed = False
-        self.lead.forget()
-        self.course.stand(self.now_ns)
+        self.target.forget()
+        self.auto.stand(self.now_ns)
         self.rover.brake(self.now_ns)
-        self.course.reset()
+        self.auto.reset()
         self.tell(MessageId.HEARTBEAT)
 
     def set_origin(self, origin: SiteOrigin) -> None:
@@ -221,8 +221,8 @@ class Vehicle:
         self.rover.origin = origin
         self.tell(MessageId.GPS_GLOBAL_ORIGIN)
         self.tell(MessageId.HOME_POSITION)
-        if self.course.state == "active":
-            self.course.jump(self.course.current, self.now_ns)
+        if self.auto.state == "active":
+            self.auto.jump(self.auto.current, self.now_ns)
 
     def requested(self, number: int, index: int) -> None:
         """Send a message that was asked for, if there is something to tell; an older scan's by its number."""
@@ -234,16 +234,16 @@ class Vehicle:
     def break_off(self) -> None:
         """End the scan under way, if there is one, without a result."""
         self.camera.stop()
-        self.course.scan_over(self.now_ns)
+        self.auto.scan_over(self.now_ns)
 
     def reboot(self) -> None:
         """Be away for a while, then wake up with the items but without mode, origin or current item."""
         self.rover.brake(self.now_ns)
         self.rover.origin = self._setting.origin
         self.armed, self.mode, self.reached = False, "manual", None
-        self.lead.forget()
-        self.course.stand(self.now_ns)
-        self.course.reset()
+        self.target.forget()
+        self.auto.stand(self.now_ns)
+        self.auto.reset()
         self.camera.reset()
         self.transfers.reset()
         self.streams = Streams(self._wall, self._makers)
@@ -254,7 +254,7 @@ class Vehicle:
     # What happens to it
 
     def _next_ns(self) -> int | None:
-        dues = [due_ns for due_ns in (self.camera.due_ns, self.course.due_ns) if due_ns is not None]
+        dues = [due_ns for due_ns in (self.camera.due_ns, self.auto.due_ns) if due_ns is not None]
         return min(dues, default=None)
 
     def _keep(self) -> None:
@@ -291,14 +291,14 @@ class Vehicle:
         if why:
             self.text(why)
         self.say(message)
-        self.course.scan_over(self.now_ns)
+        self.auto.scan_over(self.now_ns)
 
     def _home(self) -> Item:
         return home_item(self.rover.origin) if self.rover.origin else NOWHERE
 
     def _stored(self, kind: int, marked: int | None) -> None:
         if kind == MISSION:
-            self.course.replaced(marked, self.now_ns)
+            self.auto.replaced(marked, self.now_ns)
             self.tell(MessageId.MISSION_CURRENT)
 
     def _item_came(self, number: int) -> bool:

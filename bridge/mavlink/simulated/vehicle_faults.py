@@ -9,7 +9,7 @@ import msgspec
 
 from mission.errors import InputError
 
-FaultKind = Literal[
+VehicleFaultKind = Literal[
     "loss", "duplicates", "jitter", "lostack", "nack", "silent", "reboot-upload", "reboot-mission",
     "beside", "finish", "scanner", "unsigned",
 ]  # fmt: skip
@@ -24,12 +24,12 @@ RESULTS = range(15)
 class VehicleFault:
     """Something that goes wrong; what `at` and `amount` mean is in `FAULTS`."""
 
-    kind: FaultKind
+    kind: VehicleFaultKind
     at: int
     amount: float = 0.0
 
 
-FAULTS: dict[FaultKind, str] = {
+FAULTS: dict[VehicleFaultKind, str] = {
     "loss": "N percent of the frames are lost, each way; AMOUNT is the seed",
     "duplicates": "N percent of the frames come twice, each way; AMOUNT is the seed",
     "jitter": "frames are late by up to N ms, each way, and overtake each other; AMOUNT is the seed",
@@ -49,10 +49,10 @@ FAULTS: dict[FaultKind, str] = {
 class VehicleFaults:
     all: tuple[VehicleFault, ...] = ()
 
-    def due(self, kind: FaultKind, at: int) -> VehicleFault | None:
+    def due(self, kind: VehicleFaultKind, at: int) -> VehicleFault | None:
         return next((fault for fault in self.all if (fault.kind, fault.at) == (kind, at)), None)
 
-    def any(self, kind: FaultKind) -> VehicleFault | None:
+    def any(self, kind: VehicleFaultKind) -> VehicleFault | None:
         """The first fault of a kind, wherever it is due."""
         return next((fault for fault in self.all if fault.kind == kind), None)
 
@@ -67,11 +67,11 @@ class Mishaps:
         self._faults = faults
         self._happened: set[VehicleFault] = set()
 
-    def due(self, kind: FaultKind, at: int) -> VehicleFault | None:
+    def due(self, kind: VehicleFaultKind, at: int) -> VehicleFault | None:
         """A fault that happens whenever it is due."""
         return self._faults.due(kind, at)
 
-    def once(self, kind: FaultKind, at: int) -> VehicleFault | None:
+    def once(self, kind: VehicleFaultKind, at: int) -> VehicleFault | None:
         """A fault that happens the first time it is due."""
         fault = self._faults.due(kind, at)
         if fault is None or fault in self._happened:
@@ -85,7 +85,7 @@ def read_vehicle_fault(text: str) -> VehicleFault:
     kind, _, rest = text.partition("@")
     at, _, amount = rest.partition("=")
     try:
-        fault = VehicleFault(msgspec.convert(kind, FaultKind), int(at), float(amount or 0.0))
+        fault = VehicleFault(msgspec.convert(kind, VehicleFaultKind), int(at), float(amount or 0.0))
     except (ValueError, msgspec.ValidationError):
         kinds = ", ".join(FAULTS)
         raise InputError(f"--fault {text}: write it KIND@N or KIND@N=AMOUNT, KIND of {kinds}") from None

@@ -94,9 +94,9 @@ def vehicle_on(
 
 def _live(vehicle: Vehicle, wire: Wire, stop: threading.Event, stopped: Stopped) -> None:
     try:
-        with wire.box() as box:
+        with wire.waiting() as waiting:
             while not stop.is_set():
-                message = box.get(STEP_S)
+                message = waiting.get(STEP_S)
                 if message is None:
                     vehicle.advance()
                 else:

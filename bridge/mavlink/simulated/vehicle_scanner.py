@@ -21,7 +21,7 @@ MOVED_M, TURNED_RAD = 0.01, 0.02
 
 
 @dataclass(frozen=True)
-class Scan:
+class RunningScan:
     """A scan under way."""
 
     number: int
@@ -34,7 +34,7 @@ class Scan:
 
 
 @dataclass(frozen=True)
-class Captured:
+class ScanEnd:
     """How a scan ended."""
 
     index: int
@@ -45,13 +45,13 @@ class Captured:
     """Why it failed."""
 
 
-class Scanner:
+class VehicleScanner:
     """One scan at a time."""
 
     def __init__(self, mishaps: Mishaps) -> None:
         self._mishaps = mishaps
         self._begun = 0
-        self.scan: Scan | None = None
+        self.scan: RunningScan | None = None
 
     def begin(self, number: int, seconds: float, *, index: int, pose: Pose, now_ns: int) -> bool:
         """Begin a scan that takes so long; false if one is under way."""
@@ -59,10 +59,10 @@ class Scanner:
             return False
         self._begun += 1
         lasts = seconds if math.isfinite(seconds) and 0 < seconds <= LONGEST_S else DEFAULT_S
-        self.scan = Scan(number, index, now_ns, now_ns + round(lasts * 1e9), pose)
+        self.scan = RunningScan(number, index, now_ns, now_ns + round(lasts * 1e9), pose)
         return True
 
-    def end(self, pose: Pose) -> Captured:
+    def end(self, pose: Pose) -> ScanEnd:
         """What became of the scan that is due."""
         scan = self.scan
         assert scan is not None
@@ -72,14 +72,14 @@ class Scanner:
             why = "the scanner reported an error"
         elif _moved(scan.began_at, pose):
             why = "the vehicle moved during the scan"
-        return Captured(scan.index, scan.number, "" if why else file_url(scan), why)
+        return ScanEnd(scan.index, scan.number, "" if why else file_url(scan), why)
 
     def stop(self) -> None:
         """Break the scan off."""
         self.scan = None
 
 
-def file_url(scan: Scan) -> str:
+def file_url(scan: RunningScan) -> str:
     """At most 205 characters, which is what CAMERA_IMAGE_CAPTURED holds."""
     name = f"scan-{scan.index + 1:04}-{scan.number}"
     points = max(1, round(POINTS_PER_S * (scan.ends_ns - scan.began_ns) / 1e9))

@@ -11,7 +11,7 @@ from mission.errors import InputError
 from mission.events import Pose
 from mission.mavlink.items import Item
 
-Items = tuple[Item, ...]
+KeptItems = tuple[Item, ...]
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
 """MAV_MISSION_TYPE."""
 
@@ -19,10 +19,10 @@ MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
 class Kept(msgspec.Struct, frozen=True, kw_only=True):
     """All that outlives the vehicle's process."""
 
-    mission: Items = ()
+    mission: KeptItems = ()
     """Numbered as on the vehicle: item 0 is home where the autopilot has it so."""
-    fence: Items = ()
-    rally: Items = ()
+    fence: KeptItems = ()
+    rally: KeptItems = ()
     pose: Pose | None = None
     """Metres east and north of the origin, radians counter-clockwise from east."""
     images: int = 0
@@ -38,10 +38,10 @@ class Store:
             _make(folder)
         self.kept = _read(self._path)
 
-    def items(self, kind: int) -> Items:
+    def items(self, kind: int) -> KeptItems:
         return {MISSION: self.kept.mission, FENCE: self.kept.fence, RALLY: self.kept.rally}[kind]
 
-    def put(self, kind: int, items: Items) -> None:
+    def put(self, kind: int, items: KeptItems) -> None:
         self.keep(**{{MISSION: "mission", FENCE: "fence", RALLY: "rally"}[kind]: items})
 
     def keep(self, **changed: object) -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
-from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.simulated.rover import bearing
 from bridge.mavlink.simulated.vehicle import BATTERY_NS, Maker, Vehicle
 from mission.mavlink.enums import MessageId, MissionState, ModeFlag, VehicleType
+from mission.mavlink.telemetry import Message
 
 CAPABILITIES = (
     dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT
@@ -83,16 +84,16 @@ def gps_raw(vehicle: Vehicle) -> Message:
     pose, speed = vehicle.motion()
     lat, lon = vehicle.rover.place((pose.x, pose.y))
     fix = dialect.GPS_FIX_TYPE_3D_FIX if vehicle.rover.origin else dialect.GPS_FIX_TYPE_NO_FIX
-    course = round(math.degrees(bearing(pose.heading)) % 360 * 100) % 36_000
+    auto = round(math.degrees(bearing(pose.heading)) % 360 * 100) % 36_000
     return dialect.MAVLink_gps_raw_int_message(
-        vehicle.boot_ms * 1000, fix, lat, lon, vehicle.rover.alt_mm, 50, 50, round(100 * speed), course, 12
+        vehicle.boot_ms * 1000, fix, lat, lon, vehicle.rover.alt_mm, 50, 50, round(100 * speed), auto, 12
     )
 
 
 def vfr_hud(vehicle: Vehicle) -> Message:
     pose, speed = vehicle.motion()
-    course = round(math.degrees(bearing(pose.heading))) % 360
-    return dialect.MAVLink_vfr_hud_message(speed, speed, course, 0, vehicle.rover.alt_mm / 1000, 0.0)
+    auto = round(math.degrees(bearing(pose.heading))) % 360
+    return dialect.MAVLink_vfr_hud_message(speed, speed, auto, 0, vehicle.rover.alt_mm / 1000, 0.0)
 
 
 def origin(vehicle: Vehicle) -> Message | None:
@@ -119,20 +120,20 @@ def extended_state(vehicle: Vehicle) -> Message:
 
 
 def mission_current(vehicle: Vehicle) -> Message:
-    course = vehicle.course
+    auto = vehicle.auto
     mode = 1 if vehicle.mode == "auto" else 2
-    return dialect.MAVLink_mission_current_message(course.current, course.total, mission_state(vehicle), mode)
+    return dialect.MAVLink_mission_current_message(auto.current, auto.total, mission_state(vehicle), mode)
 
 
 def mission_state(vehicle: Vehicle) -> int:
-    course = vehicle.course
-    if course.total == 0:
+    auto = vehicle.auto
+    if auto.total == 0:
         return int(MissionState.NO_MISSION)
-    if course.state == "active":
+    if auto.state == "active":
         return int(MissionState.ACTIVE)
-    if course.state == "complete":
+    if auto.state == "complete":
         return int(MissionState.COMPLETE)
-    paused = vehicle.autopilot.habits.pauses and course.current > 0
+    paused = vehicle.autopilot.habits.pauses and auto.current > 0
     return int(MissionState.PAUSED if paused else MissionState.NOT_STARTED)
 
 

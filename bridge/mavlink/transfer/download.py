@@ -6,9 +6,8 @@ Several are asked for at once where the vehicle answers in any order; each is as
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 
-from bridge.mavlink.line.frames import Message
+from bridge.console import Progress
 from bridge.mavlink.line.messages import (
     ack_message,
     item_of,
@@ -18,13 +17,11 @@ from bridge.mavlink.line.messages import (
     result_name,
 )
 from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.transfer.pace import Pace, Silence, window_for
+from bridge.mavlink.transfer.pace import Pace, TransferTimeout, window_for
 from mission.errors import AnswerIsNo, RobotUnreachable
 from mission.mavlink.enums import MissionResult
 from mission.mavlink.items import Item
-
-Progress = Callable[[int, int], None]
-"""Called with what is done and what there is to do."""
+from mission.mavlink.telemetry import Message
 
 STUCK = 12
 """After so many tries without an item others are asked one by one, in order: MAVSDK's vehicle wants it so."""
@@ -68,7 +65,7 @@ class _Reading:
         self.items: dict[int, Item] = {}
         self._peer = peer
         self._pace = Pace(window, peer.round_trips)
-        self._silence = Silence(patience_s)
+        self._silence = TransferTimeout(patience_s)
         self._progress = progress
         self._count: int | None = None
         self._next = 0
@@ -86,12 +83,12 @@ class _Reading:
 
     def run(self) -> int | None:
         """Read everything; what the vehicle refuses with, or `None`."""
-        with self._peer.box("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK") as box:
+        with self._peer.waiting("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK") as waiting:
             self._ask_count()
             while self._count is None or len(self.items) < self._count:
                 if self._silence.over:
                     raise RobotUnreachable(f"{self._peer} did not tell its mission{self._peer.why_silent()}")
-                message = box.get(self._pace.again_s if self._count is None else self._due_s())
+                message = waiting.get(self._pace.again_s if self._count is None else self._due_s())
                 if message is None:
                     self._again()
                 elif of_mission(message):

@@ -88,9 +88,9 @@ def emptied(peer: Peer) -> bool:
         return False
     if _holds(peer, ()):
         return True
-    with peer.box("MISSION_ACK") as box:
+    with peer.waiting("MISSION_ACK") as waiting:
         peer.send(clear_all(peer.who))
-        box.get(CLEARED_S)
+        waiting.get(CLEARED_S)
     return _holds(peer, ())
 
 

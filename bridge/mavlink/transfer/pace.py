@@ -57,7 +57,7 @@ class Pace:
         self._waits = 0
 
 
-class Silence:
+class TransferTimeout:
     """How long nothing has come that counts, and how long nothing has gone on."""
 
     def __init__(self, patience_s: float, stall_s: float | None = None) -> None:

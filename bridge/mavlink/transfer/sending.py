@@ -12,13 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from bridge.mavlink.line.frames import Message
+from bridge.console import Progress
 from bridge.mavlink.line.messages import ack_message, count_message, item_message, list_request, of_mission
 from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.transfer.download import Progress
-from bridge.mavlink.transfer.pace import Pace, Silence
+from bridge.mavlink.transfer.pace import Pace, TransferTimeout
 from mission.mavlink.enums import MissionResult
 from mission.mavlink.items import Item
+from mission.mavlink.telemetry import Message
 
 How = Literal["accepted", "unsure", "refused", "busy", "dropped", "silent", "rebooted"]
 """How a transfer ended, as far as the vehicle says.
@@ -41,7 +41,7 @@ HEARD = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", "MISSION_COUNT
 
 
 @dataclass(frozen=True)
-class Ended:
+class TransferEnd:
     how: How
     at: int
     """How many items are known to have arrived; where one was refused, its number."""
@@ -56,7 +56,7 @@ def send_items(
     window: int,
     patience_s: float | None = None,
     progress: Progress | None = None,
-) -> Ended:
+) -> TransferEnd:
     """Send the items as the whole mission; none of them clears it."""
     pace = Pace(window, peer.round_trips)
     return _Sending(peer, items, pace, patience_s or peer.patience_s, progress).run()
@@ -71,7 +71,7 @@ class _Sending:
         self._peer = peer
         self._items = items
         self._pace = pace
-        self._silence = Silence(patience_s)
+        self._silence = TransferTimeout(patience_s)
         self._progress = progress
         self._boots = peer.boots
         self._begun = False
@@ -93,28 +93,28 @@ class _Sending:
         self._probed = False
         """Whether the vehicle was asked for its mission, which it does not tell while it receives one."""
 
-    def run(self) -> Ended:
-        with self._peer.box(*HEARD) as box:
+    def run(self) -> TransferEnd:
+        with self._peer.waiting(*HEARD) as waiting:
             self._send_count()
             while (ended := self._over()) is None:
-                message = box.get(self._moved_s + self._pace.again_s - time.monotonic())
+                message = waiting.get(self._moved_s + self._pace.again_s - time.monotonic())
                 if message is None:
                     self._again()
                 elif of_mission(message) and (ended := self._take(message)) is not None:
                     return ended
             return ended
 
-    def _over(self) -> Ended | None:
+    def _over(self) -> TransferEnd | None:
         """Whether there is nothing more to wait for."""
         if self._peer.boots != self._boots:
-            return Ended("rebooted", self._base)
+            return TransferEnd("rebooted", self._base)
         if self._errors >= MEANT:
-            return Ended("dropped" if self._begun else "busy", self._base, self._result)
+            return TransferEnd("dropped" if self._begun else "busy", self._base, self._result)
         if self._silence.over:
-            return Ended("unsure" if self._all_sent else "silent", self._base)
+            return TransferEnd("unsure" if self._all_sent else "silent", self._base)
         return None
 
-    def _take(self, message: Message) -> Ended | None:
+    def _take(self, message: Message) -> TransferEnd | None:
         if message.get_type() == "MISSION_ACK":
             return self._take_ack(message.type)
         if message.get_type() == "MISSION_COUNT":
@@ -126,9 +126,9 @@ class _Sending:
     def _all_sent(self) -> bool:
         return self._top == len(self._items) and (self._begun or not self._items)
 
-    def _take_count(self, count: int) -> Ended | None:
+    def _take_count(self, count: int) -> TransferEnd | None:
         """A vehicle that tells a mission of our length has finished receiving, or had one of that length."""
-        return Ended("unsure", self._base) if self._probed and count == len(self._items) else None
+        return TransferEnd("unsure", self._base) if self._probed and count == len(self._items) else None
 
     def _take_request(self, seq: int) -> None:
         if seq >= len(self._items):
@@ -170,23 +170,23 @@ class _Sending:
     def _old_enough(self, seq: int) -> bool:
         return time.monotonic() - self._sent_s.get(seq, 0.0) >= self._pace.soonest_s
 
-    def _take_ack(self, result: int) -> Ended | None:
+    def _take_ack(self, result: int) -> TransferEnd | None:
         self._silence.heard(went_on=False)
         if result == MissionResult.ACCEPTED:
-            return Ended("accepted", len(self._items)) if self._all_sent else None
+            return TransferEnd("accepted", len(self._items)) if self._all_sent else None
         if result in HINTS:
             if self._begun:
                 self._lacks_base()
             return None
         if result in ENDINGS:
             return self._take_ending(result)
-        return Ended("refused", self._base, result)
+        return TransferEnd("refused", self._base, result)
 
-    def _take_ending(self, result: int) -> Ended | None:
+    def _take_ending(self, result: int) -> TransferEnd | None:
         """The vehicle says that no transfer is under way: it is over, or it never began."""
         self._error, self._result = True, result
         if self._all_sent and result != MissionResult.DENIED:
-            return Ended("unsure", self._base, result)
+            return TransferEnd("unsure", self._base, result)
         return None
 
     def _again(self) -> None:

@@ -11,12 +11,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from bridge.console import Progress
 from bridge.mavlink.line.messages import result_name
 from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.transfer.download import Progress, download
+from bridge.mavlink.transfer.download import download
 from bridge.mavlink.transfer.left import cancel, emptied, left_on, own_items, unknown
 from bridge.mavlink.transfer.pace import window_for
-from bridge.mavlink.transfer.sending import Ended, send_items
+from bridge.mavlink.transfer.sending import TransferEnd, send_items
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.enums import MissionResult
@@ -188,7 +189,7 @@ def _read_back(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None
     return Failure(f"all was sent, and read back otherwise: {'; '.join(lines[:SHOWN])}{more}")
 
 
-def _refusal(sent: ItemList, ended: Ended) -> str:
+def _refusal(sent: ItemList, ended: TransferEnd) -> str:
     """Which item was refused, by what it is for, and which of its fields."""
     name = result_name(ended.result)
     if ended.result == MissionResult.NO_SPACE:
@@ -221,7 +222,7 @@ def _field(item: Item, result: int) -> str:
     return f": {field} {value:.10g}"
 
 
-def _given_up(peer: Peer, ended: Ended, count: int) -> Failure:
+def _given_up(peer: Peer, ended: TransferEnd, count: int) -> Failure:
     if ended.how == "busy":
         return Failure(
             f"it takes no mission now ({result_name(ended.result)}); another station may be uploading: "

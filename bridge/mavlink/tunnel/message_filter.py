@@ -6,12 +6,12 @@ commander's lease would count. To stop a vehicle must always be possible.
 
 from __future__ import annotations
 
-from bridge.mavlink.line.frames import Message
 from bridge.mavlink.line.messages import enum_name
 from mission.mavlink.autopilots import autopilot_of
 from mission.mavlink.autopilots.kind import Autopilot, Modes
 from mission.mavlink.enums import Component
 from mission.mavlink.items import Command
+from mission.mavlink.telemetry import Message
 
 LOOKS = frozenset({
     "HEARTBEAT", "PING", "TIMESYNC", "SYSTEM_TIME", "COMMAND_CANCEL",
@@ -30,7 +30,7 @@ ASKS = frozenset({
 COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
 
 
-class Harmless:
+class MessageFilter:
     """Judges what goes to the vehicle by what it knows of it: its kind, from the heartbeats that pass."""
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class Harmless:
             return message.command in ASKS or self._stops(message)
         if name == "SET_MODE":
             return self._holds(message.target_system, message.custom_mode)
-        # A download ends with an ACK; of another result it is a cancel, which is as harmless.
+        # A download ends with an ACK; of another result it is a cancel, which drives nothing either.
         return name in LOOKS or name == "MISSION_ACK"
 
     def _stops(self, message: Message) -> bool:

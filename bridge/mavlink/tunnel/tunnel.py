@@ -16,10 +16,11 @@ from contextlib import contextmanager
 from typing import Any
 
 from bridge.link.link import Link
-from bridge.mavlink.line.frames import Frames, Message, dialect
+from bridge.mavlink.line.frames import Frames, dialect
 from bridge.mavlink.line.messages import on_board_beat
 from bridge.mavlink.line.transport import Transport
 from mission.mavlink.enums import Component
+from mission.mavlink.telemetry import Message
 
 QUEUE = 500
 """Frames that wait in one direction: some seconds of a talkative vehicle."""

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from mission.document import Mission, Point, Stop
 from mission.files.exports.format import Supplements
-from mission.files.exports.way import frame_name, mapped
+from mission.files.exports.waypoints import frame_name, mapped
 from mission.table import printable
 from mission.turning import SAME, turned_back
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from mission.document import Mission, Point
 from mission.files.exports.format import Supplements
 from mission.files.exports.nav2_yaml import unmapped
-from mission.files.exports.way import Waypoint, frame_name, mapped, way
+from mission.files.exports.waypoints import Waypoint, frame_name, mapped, way
 from mission.turning import SAME, turned_back
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ import msgspec
 from mission.document import Mission, Point
 from mission.files.exports.format import Supplements
 from mission.files.imports import qgc_plan
-from mission.files.imports.track import Given
+from mission.files.imports.track import ImportOptions
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.fields import PLACED
-from mission.mavlink.items import Command, Frame, Item, ItemList
+from mission.mavlink.items import Command, Item, ItemList, MavFrame
 from mission.mavlink.translate import translate
 
 FIRMWARE = {"generic": 0, "ardupilot": 3, "px4": 12}
@@ -23,9 +23,12 @@ GROUND_ROVER = 10
 """MAV_TYPE."""
 RELATIVE = 1
 """QGroundControl's AltitudeMode: above home."""
-ABOVE_HOME = (Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT)
+ABOVE_HOME = (MavFrame.GLOBAL_RELATIVE_ALT, MavFrame.GLOBAL_RELATIVE_ALT_INT)
 
-FILE_FRAMES = {Frame.GLOBAL_INT: Frame.GLOBAL, Frame.GLOBAL_RELATIVE_ALT_INT: Frame.GLOBAL_RELATIVE_ALT}
+FILE_FRAMES = {
+    MavFrame.GLOBAL_INT: MavFrame.GLOBAL,
+    MavFrame.GLOBAL_RELATIVE_ALT_INT: MavFrame.GLOBAL_RELATIVE_ALT,
+}
 """In files places are degrees, so their frames are those without INT."""
 
 
@@ -76,7 +79,7 @@ def items_of(mission: Mission, supplements: Supplements) -> ItemList:
 
 def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
     """The stops as `stopgo import` finds them."""
-    return [visit.xy for visit in qgc_plan.read(data, "plan", Given(mission.georeference)).visits]
+    return [visit.xy for visit in qgc_plan.read(data, "plan", ImportOptions(mission.georeference)).visits]
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:

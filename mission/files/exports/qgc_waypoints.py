@@ -10,7 +10,7 @@ from mission.files.exports.format import Supplements
 from mission.files.exports.qgc_plan import FILE_FRAMES, items_of, place
 from mission.files.imports import qgc_waypoints
 from mission.files.imports.qgc_waypoints import HEAD
-from mission.files.imports.track import Given
+from mission.files.imports.track import ImportOptions
 from mission.mavlink.items import Item
 from mission.mavlink.read_back import home_item
 
@@ -28,7 +28,7 @@ def listed(rows: Sequence[Item]) -> bytes:
 
 def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
     """The stops as `stopgo import` finds them."""
-    given = Given(mission.georeference, supplements.autopilot)
+    given = ImportOptions(mission.georeference, supplements.autopilot)
     return [visit.xy for visit in qgc_waypoints.read(data, "waypoints", given).visits]
 
 

@@ -22,7 +22,7 @@ PLACES = 6
 DEGREES = 9
 """Decimals of degrees: 0.1 mm."""
 
-Row = dict[str, str]
+CsvRow = dict[str, str]
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:
@@ -51,7 +51,7 @@ def guarded(text: str) -> str:
     return f"'{text}" if text.startswith(FORMULA) else text
 
 
-def _row(mission: Mission, number: int, stop: Stop) -> Row:
+def _row(mission: Mission, number: int, stop: Stop) -> CsvRow:
     return {
         "number": str(number),
         "id": guarded(stop.id),
@@ -72,7 +72,7 @@ def _row(mission: Mission, number: int, stop: Stop) -> Row:
     }
 
 
-def _geodetic(mission: Mission, stop: Stop) -> Row:
+def _geodetic(mission: Mission, stop: Stop) -> CsvRow:
     origin = mission.georeference
     if origin is None:
         return {}

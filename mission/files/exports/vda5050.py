@@ -17,7 +17,7 @@ import msgspec
 from mission.document import Mission, Point, Stop
 from mission.files.exports.format import Supplements
 from mission.files.exports.nav2_yaml import unmapped
-from mission.files.exports.way import Waypoint, frame_name, mapped, way
+from mission.files.exports.waypoints import Waypoint, frame_name, mapped, way
 from mission.turning import SAME, turned_back
 
 

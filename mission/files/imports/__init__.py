@@ -9,11 +9,11 @@ from mission.document import Mission
 from mission.errors import InputError
 from mission.files.imports import qgc_plan, qgc_waypoints, stops_csv
 from mission.files.imports.assembling import mission_of
-from mission.files.imports.track import Given, Reader, Track
+from mission.files.imports.track import ImportOptions, MissionReader, Track
 from mission.settings import Settings
 from mission.specs import site_origin_of
 
-READERS: dict[str, Reader] = {
+READERS: dict[str, MissionReader] = {
     "plan": qgc_plan.read,
     "waypoints": qgc_waypoints.read,
     "csv": stops_csv.read,
@@ -36,7 +36,7 @@ def read_mission(
     """
     reader = READERS[_kind(path, kind)]
     data = _bytes_of(path)
-    track = reader(data, str(path), Given(site_origin_of(settings), autopilot))
+    track = reader(data, str(path), ImportOptions(site_origin_of(settings), autopilot))
     digest = hashlib.sha256(data).hexdigest()
     return mission_of(track, settings, name=path.stem, file=path.name, digest=digest), track
 

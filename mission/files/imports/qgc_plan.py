@@ -9,8 +9,8 @@ from typing import Any
 
 from mission.document import SiteOrigin
 from mission.errors import InputError
-from mission.files.imports.items import Listed, assumptions, autopilot_for, track_of
-from mission.files.imports.track import Given, Track
+from mission.files.imports.item_track import Listed, assumptions, autopilot_for, track_of
+from mission.files.imports.track import ImportOptions, Track
 
 NAN = float("nan")
 LARGEST_CODE = 65_535
@@ -19,7 +19,7 @@ LARGEST = 1e15
 """No number in a plan is larger."""
 
 
-def read(data: bytes, source: str, given: Given) -> Track:
+def read(data: bytes, source: str, given: ImportOptions) -> Track:
     """The track of a plan.
 
     Raises

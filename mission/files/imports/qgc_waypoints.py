@@ -7,15 +7,15 @@ from dataclasses import replace
 
 from mission.document import SiteOrigin
 from mission.errors import InputError
-from mission.files.imports.items import Listed, assumptions, autopilot_for, track_of
+from mission.files.imports.item_track import Listed, assumptions, autopilot_for, track_of
 from mission.files.imports.qgc_plan import LARGEST_CODE
-from mission.files.imports.track import Given, Track
+from mission.files.imports.track import ImportOptions, Track
 
 HEAD = "QGC WPL 110"
 COLUMNS = 12
 
 
-def read(data: bytes, source: str, given: Given) -> Track:
+def read(data: bytes, source: str, given: ImportOptions) -> Track:
     """The track of a table; degrees by ArduPilot's rule unless another autopilot is given.
 
     Raises

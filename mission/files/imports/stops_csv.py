@@ -17,7 +17,7 @@ from typing import Any, get_args
 
 from mission.document import OnFailure, Point
 from mission.errors import InputError
-from mission.files.imports.track import Given, Track, Visit
+from mission.files.imports.track import ImportOptions, Track, Visit
 from mission.geodesy import Geodetic, from_geodetic, heading_of
 from mission.problems import JOIN
 
@@ -65,7 +65,7 @@ class _Row:
         return value
 
 
-def read(data: bytes, source: str, given: Given) -> Track:
+def read(data: bytes, source: str, given: ImportOptions) -> Track:
     """The track of a table of stops, in metres of the site or in degrees.
 
     Raises
@@ -148,7 +148,7 @@ def _in_order(rows: list[_Row]) -> list[_Row]:
     return [row for _, row in sorted(zip(numbers, rows, strict=True), key=lambda pair: pair[0] or 0.0)]
 
 
-def _placing(columns: dict[str, str], source: str, given: Given) -> Callable[[_Row], Point]:
+def _placing(columns: dict[str, str], source: str, given: ImportOptions) -> Callable[[_Row], Point]:
     """How a row says where its stop is: metres if the table has them, else degrees."""
     if all(name in columns for name in METRES):
         return lambda row: _pair(row, METRES)
@@ -177,7 +177,7 @@ def _pair(row: _Row, columns: tuple[str, str]) -> Point:
     return (one, other)
 
 
-def _visit(row: _Row, xy: Point, given: Given) -> Visit:
+def _visit(row: _Row, xy: Point, given: ImportOptions) -> Visit:
     retries = _least(row, "retries", 0.0)
     if retries is not None and retries != round(retries):
         raise row.refused("retries", "it must be a whole number")
@@ -196,7 +196,7 @@ def _visit(row: _Row, xy: Point, given: Given) -> Visit:
     )
 
 
-def _heading(row: _Row, given: Given) -> float | None:
+def _heading(row: _Row, given: ImportOptions) -> float | None:
     heading, bearing = row.number("heading_deg"), row.number("bearing_deg")
     if heading is not None:
         return math.remainder(math.radians(heading), math.tau)

@@ -44,7 +44,7 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Given:
+class ImportOptions:
     """What the person says that the file may not."""
 
     origin: SiteOrigin | None = None
@@ -52,5 +52,5 @@ class Given:
     """By whose rule degrees are metres, one of `mission.mavlink.autopilots.AUTOPILOTS`."""
 
 
-Reader = Callable[[bytes, str, Given], Track]
+MissionReader = Callable[[bytes, str, ImportOptions], Track]
 """`(data, source, given)`; `source` stands in error messages."""

@@ -33,7 +33,7 @@ from mission.mavlink.fields import (
     uint16,
     whole,
 )
-from mission.mavlink.items import Command, Frame, Item
+from mission.mavlink.items import Command, Item, MavFrame
 
 CUSTOM, MANUAL = ModeFlag.CUSTOM_MODE_ENABLED, ModeFlag.MANUAL_INPUT_ENABLED
 STABILIZE, GUIDED, AUTO = ModeFlag.STABILIZE_ENABLED, ModeFlag.GUIDED_ENABLED, ModeFlag.AUTO_ENABLED
@@ -51,9 +51,9 @@ def keeps(item: Item) -> Item:
     if item.command in PLACED:  # z: measured
         return replace(item, frame=FRAMES.get(item.frame, item.frame), z=centimetres(item.z))
     if item.command == Command.NAV_SCRIPT_TIME:  # measured: x, y are kept, as int16
-        return replace(item, frame=Frame.MISSION, x=int16(item.x), y=int16(item.y), z=0.0)
+        return replace(item, frame=MavFrame.MISSION, x=int16(item.x), y=int16(item.y), z=0.0)
     if item.command in FIELDS:  # measured: nothing but the params is kept
-        return replace(item, frame=Frame.MISSION, x=0, y=0, z=0.0)
+        return replace(item, frame=MavFrame.MISSION, x=0, y=0, z=0.0)
     return item
 
 
@@ -70,10 +70,10 @@ FIELDS: dict[int, Fields] = {
     Command.NAV_SCRIPT_TIME: (uint8, uint8, float16, float16),  # measured
 }
 FRAMES = {
-    Frame.MISSION: Frame.GLOBAL,
-    Frame.GLOBAL_INT: Frame.GLOBAL,
-    Frame.GLOBAL_RELATIVE_ALT_INT: Frame.GLOBAL_RELATIVE_ALT,
-    Frame.GLOBAL_TERRAIN_ALT_INT: Frame.GLOBAL_TERRAIN_ALT,
+    MavFrame.MISSION: MavFrame.GLOBAL,
+    MavFrame.GLOBAL_INT: MavFrame.GLOBAL,
+    MavFrame.GLOBAL_RELATIVE_ALT_INT: MavFrame.GLOBAL_RELATIVE_ALT,
+    MavFrame.GLOBAL_TERRAIN_ALT_INT: MavFrame.GLOBAL_TERRAIN_ALT,
 }
 """Measured. The frames of local coordinates are refused: UNSUPPORTED_FRAME."""
 
@@ -124,7 +124,7 @@ HABITS = Habits(
 # than int16 seconds of hold are kept, and run as 0; whatever item is asked for is given.
 ARDUPILOT = Autopilot(
     name="ardupilot", firmware=Firmware.ARDUPILOTMEGA, rule="ardupilot",
-    frame=Frame.GLOBAL_RELATIVE_ALT_INT, max_items=655, home_first=True,
+    frame=MavFrame.GLOBAL_RELATIVE_ALT_INT, max_items=655, home_first=True,
     commands=frozenset({
         Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.NAV_SCRIPT_TIME,
         Command.DO_SEND_SCRIPT_MESSAGE, Command.IMAGE_START_CAPTURE,

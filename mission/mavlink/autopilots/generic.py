@@ -11,7 +11,7 @@ from mission.mavlink.autopilots import px4
 from mission.mavlink.autopilots.kind import EVERYWHERE, Autopilot, Driving, Habits, Heartbeat
 from mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag
 from mission.mavlink.fields import as_sent
-from mission.mavlink.items import Command, Frame
+from mission.mavlink.items import Command, MavFrame
 
 UINT16_MAX = 65_535
 
@@ -35,7 +35,7 @@ HABITS = Habits(
 
 GENERIC = Autopilot(
     name="generic", firmware=Firmware.GENERIC, rule="wgs84",
-    frame=Frame.GLOBAL_RELATIVE_ALT_INT, max_items=UINT16_MAX, home_first=False,
+    frame=MavFrame.GLOBAL_RELATIVE_ALT_INT, max_items=UINT16_MAX, home_first=False,
     commands=frozenset({
         Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.IMAGE_START_CAPTURE,
     }),

@@ -12,7 +12,7 @@ from dataclasses import replace
 from mission.mavlink.autopilots.kind import EVERYWHERE, Autopilot, Driving, Habits, Heartbeat, Mode, Modes
 from mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag
 from mission.mavlink.fields import as_sent, float32
-from mission.mavlink.items import Command, Frame, Item
+from mission.mavlink.items import Command, Item, MavFrame
 
 CUSTOM, MANUAL = ModeFlag.CUSTOM_MODE_ENABLED, ModeFlag.MANUAL_INPUT_ENABLED
 STABILIZE, GUIDED, AUTO = ModeFlag.STABILIZE_ENABLED, ModeFlag.GUIDED_ENABLED, ModeFlag.AUTO_ENABLED
@@ -21,7 +21,7 @@ STABILIZE, GUIDED, AUTO = ModeFlag.STABILIZE_ENABLED, ModeFlag.GUIDED_ENABLED, M
 def keeps(item: Item) -> Item:
     """What it stores of an item (source): all of one without a place, and hold, radius, yaw of one with."""
     item = as_sent(item)
-    if item.frame == Frame.MISSION or item.command != Command.NAV_WAYPOINT:
+    if item.frame == MavFrame.MISSION or item.command != Command.NAV_WAYPOINT:
         return item
     hold, radius, _, yaw = item.params
     frame = FRAMES.get(item.frame, item.frame)
@@ -29,8 +29,8 @@ def keeps(item: Item) -> Item:
 
 
 FRAMES = {
-    Frame.GLOBAL: Frame.GLOBAL_INT,
-    Frame.GLOBAL_RELATIVE_ALT: Frame.GLOBAL_RELATIVE_ALT_INT,
+    MavFrame.GLOBAL: MavFrame.GLOBAL_INT,
+    MavFrame.GLOBAL_RELATIVE_ALT: MavFrame.GLOBAL_RELATIVE_ALT_INT,
 }
 """Source: it answers requests for MISSION_ITEM_INT with the INT frames."""
 
@@ -87,7 +87,7 @@ HABITS = Habits(
 # item is asked for that is neither the next nor the last.
 PX4 = Autopilot(
     name="px4", firmware=Firmware.PX4, rule="px4",
-    frame=Frame.GLOBAL_RELATIVE_ALT_INT, max_items=500, home_first=False,
+    frame=MavFrame.GLOBAL_RELATIVE_ALT_INT, max_items=500, home_first=False,
     commands=frozenset({
         Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.IMAGE_START_CAPTURE,
     }),

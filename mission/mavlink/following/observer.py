@@ -6,7 +6,6 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from mission.events import Arrived, Pose
 from mission.geodesy import heading_of
@@ -19,6 +18,7 @@ from mission.mavlink.following.steps import Observation
 from mission.mavlink.local_frame import LocalFrame, VehicleOrigin, is_elsewhere, local_frame
 from mission.mavlink.read_back import point_at
 from mission.mavlink.telemetry import (
+    Message,
     charge_of,
     global_speed,
     is_lost,
@@ -28,9 +28,6 @@ from mission.mavlink.telemetry import (
     stands_still,
 )
 from mission.run.states import Run
-
-Message = Any
-"""A MAVLink message as pymavlink gives it, from a line or a log."""
 
 CAPTURES_KEPT = 100
 TOLD = (

@@ -25,7 +25,7 @@ from mission.__main__ import main
 from mission.document import Mission, SiteOrigin, sealed
 from mission.events import Aborted
 from mission.files.imports import qgc_plan, qgc_waypoints
-from mission.files.imports.track import Given
+from mission.files.imports.track import ImportOptions
 from mission.files.mission_json import write
 from mission.mavlink.translate import translate
 from mission.run.states import started
@@ -106,7 +106,7 @@ def test_what_is_fetched_opens_as_a_file(suffix: str, run: Run, mission: Mission
     with at_site(mission) as url:
         assert run("push", "MISSION", "--mavlink", str(url))[0] == 0
         assert run("fetch-mission", "--mavlink", str(url), "-o", str(path))[0] == 0
-    given = Given(mission.georeference, "ardupilot")
+    given = ImportOptions(mission.georeference, "ardupilot")
     read = {"plan": qgc_plan, "waypoints": qgc_waypoints}[suffix].read(path.read_bytes(), suffix, given)
     assert [visit.xy for visit in read.visits] == [
         pytest.approx((stop.x, stop.y), abs=0.008) for stop in mission.stops
@@ -169,8 +169,8 @@ def test_a_lost_last_ack_is_no_failure(run: Run, mission: Mission) -> None:
 
 def test_a_restart_during_the_upload_is_told(run: Run, mission: Mission) -> None:
     with at_site(mission, "ardupilot", "reboot-upload@5") as url:
-        with reached(url, vehicle=1) as peer, peer.box("ATTITUDE") as box:
-            while box.get(10.0).time_boot_ms < 3000:  # longer than it is away
+        with reached(url, vehicle=1) as peer, peer.waiting("ATTITUDE") as waiting:
+            while waiting.get(10.0).time_boot_ms < 3000:  # longer than it is away
                 pass
         code, _, said = run("push", "MISSION", "--mavlink", str(url), "--timeout", "2")
         assert (code, "was started again" in said) == (1, True), said
@@ -242,8 +242,8 @@ def test_ctrl_c_cancels_and_tells_what_is_on_the_vehicle(tmp_path: Path, mission
         command = [sys.executable, "-m", "mission", "push", str(tmp_path / "mission.json"), "--any-origin"]
         command += ["--mavlink", str(stalling.url), "--vehicle", "1", "--state", str(tmp_path / "state")]
         process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-        with stalling.wire.box("MISSION_ITEM_INT") as box:
-            assert box.get(20.0) is not None
+        with stalling.wire.waiting("MISSION_ITEM_INT") as waiting:
+            assert waiting.get(20.0) is not None
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=20.0)
     assert process.returncode == 130

@@ -16,7 +16,7 @@ from bridge.commands.spawn import end_robot, free_port, start_robot
 from bridge.link import keys as site_keys
 from bridge.link.keys import Holder, Signature, Untrusted, holders, init_site, issue, now_utc, read_keys
 from bridge.link.link import Link, Request
-from bridge.link.protocol import Keys, Reply, encode
+from bridge.link.protocol import KeyExpressions, Reply, encode
 from bridge.link.zenoh_link import Guard, check_endpoint, connecting
 from bridge.robot.agent import trusting
 from bridge.station.station import Station, connect
@@ -130,7 +130,7 @@ def test_an_endpoint_must_be_guarded_as_it_should(site: Path) -> None:
         check_endpoint("tls/10.0.0.1:7447", Guard(insecure=True), option="--connect")
 
 
-def issue_until(folder: Path, role: site_keys.Role, name: str, *, seconds: float) -> None:
+def issue_until(folder: Path, role: site_keys.HolderRole, name: str, *, seconds: float) -> None:
     """Keys that were issued for a day, which ends in so many seconds."""
     issue(folder, role, name, now=now_utc() + timedelta(seconds=seconds, days=-1), days=1)
 
@@ -141,7 +141,7 @@ class Presence:
     def __init__(self, link: Link, robot: str) -> None:
         self.changes: list[bool] = []
         self.came, self.went = threading.Event(), threading.Event()
-        link.watch_presence(Keys(robot).alive, self.changed)
+        link.watch_presence(KeyExpressions(robot).alive, self.changed)
 
     def changed(self, key: str, alive: bool) -> None:
         self.changes.append(alive)
@@ -204,7 +204,7 @@ def test_a_link_is_closed_when_the_stations_certificate_ends(site: Path, tmp_pat
                 station.push(corridor())
                 station.command("start")
                 assert len([1 for report in station.reports() if isinstance(report, Scanned)]) == 3
-            assert link.ask(Keys("r1").info, timeout_s=1) is None
+            assert link.ask(KeyExpressions("r1").info, timeout_s=1) is None
         with pytest.raises(InputError, match="issue new keys for brief"):
             read_keys(site / "site" / "brief", now=now_utc())
 
@@ -224,7 +224,7 @@ def test_a_link_is_closed_when_the_robots_certificate_ends(site: Path, tmp_path:
             late = connect(endpoint, robot="r9", keys=site / "site" / "alice", timeout_s=3)
             with pytest.raises(RobotUnreachable), late:
                 pass
-            assert link.ask(Keys("r9").info, timeout_s=1) is None
+            assert link.ask(KeyExpressions("r9").info, timeout_s=1) is None
         # A link that was opened anew in the last second is one that the robot has left.
         assert seen.changes in ([True, False], [True, False, True, False])
         assert robot.poll() is None
@@ -235,7 +235,7 @@ def test_a_link_is_closed_when_the_robots_certificate_ends(site: Path, tmp_path:
 def test_a_viewer_that_forges_is_not_heard_and_a_forged_name_is_not_believed(
     site: Path, tmp_path: Path
 ) -> None:
-    keys = Keys("r1")
+    keys = KeyExpressions("r1")
     with guarded_robot(site, tmp_path) as endpoint:
         with connect(endpoint, robot="r1", keys=site / "site" / "alice") as station:
             station.push(corridor())
@@ -273,9 +273,9 @@ def test_the_commands_make_keys(tmp_path: Path) -> None:
 
 def test_a_command_is_signed_for_one_robot_only(site: Path) -> None:
     command = Order(cmd_id="c", verb="abort", commander="alice", issued_ns=0, valid_for_s=1.0)
-    signature = signed(site, "site/alice", Keys("r1").command("abort"), encode(command))
+    signature = signed(site, "site/alice", KeyExpressions("r1").command("abort"), encode(command))
     with pytest.raises(Untrusted):
-        holder_of(site, Keys("r2").command("abort"), encode(command), signature)
+        holder_of(site, KeyExpressions("r2").command("abort"), encode(command), signature)
 
 
 def test_behind_a_router_signatures_tell_who_orders(site: Path, tmp_path: Path) -> None:
@@ -290,9 +290,9 @@ def test_behind_a_router_signatures_tell_who_orders(site: Path, tmp_path: Path) 
                 station.push(corridor())
                 order = station.order("start", commander="vera")
                 vera = read_keys(site / "site" / "vera", now=NOW)
-                key = Keys("r1").command("start")
+                key = KeyExpressions("r1").command("start")
                 with connecting(endpoint, Guard(vera)) as link:
-                    Station(link, Keys("r1"), commander="vera").reach(endpoint)
+                    Station(link, KeyExpressions("r1"), commander="vera").reach(endpoint)
                     reply = link.ask(key, encode(order), timeout_s=2, signature=vera.sign(key, encode(order)))
                 assert reply is not None
                 assert "vera is a viewer" in msgspec.json.decode(reply, type=Reply).messages[0]

@@ -10,7 +10,7 @@ import pytest
 from msgspec import Struct
 
 from bridge.link import protocol
-from bridge.link.protocol import Keys, Tagged
+from bridge.link.protocol import KeyExpressions, Tagged
 from mission.errors import InputError
 from mission.events import AnyEvent, State, StopState
 from mission.run.decision import STATES
@@ -51,12 +51,12 @@ def test_every_verb_is_in_the_table_with_the_states_it_needs() -> None:
 
 
 def test_keys_are_those_of_the_document() -> None:
-    keys = Keys("r1", "north/hall")
+    keys = KeyExpressions("r1", "north/hall")
     for key in (keys.alive, keys.info, keys.state, keys.pose, keys.event):
         assert key.startswith("north/hall/sx/1/r1/")
         assert f"`{key.removeprefix('north/hall/sx/1/r1/')}`" in TEXT
     assert str(protocol.VERSION) in keys.root
-    assert Keys.of_every_robot("north").robot_of("north/sx/1/r7/alive") == "r7"
+    assert KeyExpressions.of_every_robot("north").robot_of("north/sx/1/r7/alive") == "r7"
 
 
 @pytest.mark.parametrize(
@@ -64,4 +64,4 @@ def test_keys_are_those_of_the_document() -> None:
 )
 def test_names_that_are_no_keys_are_refused(robot: str, site: str | None) -> None:
     with pytest.raises(InputError, match="use letters"):
-        Keys(robot, site)
+        KeyExpressions(robot, site)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from bridge.mavlink.line.frames import Message
 from bridge.mavlink.line.messages import item_message
 from mission.document import SiteOrigin
 from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.items import Command, Frame, Item, ItemList, Placed
+from mission.mavlink.items import Command, Item, ItemList, MavFrame, Placed
 from mission.mavlink.read_back import upload_of
+from mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.scripted import VEHICLE
 
 SITE = SiteOrigin(lat=47.0, lon=8.0, alt=0.0, heading_deg=0.0)
@@ -23,7 +23,7 @@ def _stop(number: int, autopilot: str, east: int) -> tuple[Placed, Placed]:
     frame = autopilot_named(autopilot).frame
     x, y = 470_000_000 + 100 * number, 80_000_000 + east
     there = Item(Command.NAV_WAYPOINT, frame, params=(1.0, 0.0, 0.0, 0.0), x=x, y=y)
-    wait = Item(Command.NAV_DELAY, Frame.MISSION, params=(2.5, -1.0, -1.0, -1.0))
+    wait = Item(Command.NAV_DELAY, MavFrame.MISSION, params=(2.5, -1.0, -1.0, -1.0))
     return Placed(there, "stop", f"S{number}"), Placed(wait, "scan", f"S{number}")
 
 

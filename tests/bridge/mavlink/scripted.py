@@ -12,9 +12,10 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import Who, Wire, sender, wire
+from mission.mavlink.telemetry import Message
 
 ASK_AGAIN_S = 0.25
 VEHICLE = Who(1, dialect.MAV_COMP_ID_AUTOPILOT1)
@@ -74,13 +75,13 @@ class Scripted:
 
     def _work(self) -> None:
         beat_at = 0.0
-        with self.wire.box() as box:
+        with self.wire.waiting() as waiting:
             while not self._closing.is_set():
                 if time.monotonic() >= beat_at:
                     beat_at = time.monotonic() + 0.1
                     self.beat()
                 self.ask_again()
-                message = box.get(0.02)
+                message = waiting.get(0.02)
                 if message is not None and not self.silent:
                     self.take(message)
 

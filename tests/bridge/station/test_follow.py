@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from bridge.link.link import Request, Switchboard
-from bridge.link.protocol import POSE_PAGE, Keys, PosePage, encode
-from bridge.station.follow import Path
+from bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, encode
+from bridge.station.follow import PoseHistory
 from mission.events import Pose, PoseReport
 
 
@@ -12,7 +12,7 @@ class Trail:
     """A robot's end of `poses`, in memory: what it would tell of one boot."""
 
     def __init__(self, board: Switchboard, *, boot_id: str, poses: int) -> None:
-        self.keys = Keys("r1")
+        self.keys = KeyExpressions("r1")
         self.boot_id = boot_id
         self.poses = [self.pose(seq) for seq in range(1, poses + 1)]
         self.asked: list[int] = []
@@ -30,8 +30,8 @@ class Trail:
         return encode(PosePage(boot_id=self.boot_id, poses=tuple(self.poses[since : since + POSE_PAGE])))
 
 
-def followed(board: Switchboard) -> Path:
-    path = Path(board.link(), Keys("r1"))
+def followed(board: Switchboard) -> PoseHistory:
+    path = PoseHistory(board.link(), KeyExpressions("r1"))
     path.run_id = "run"
     return path
 

@@ -15,7 +15,7 @@ from bridge import cli
 from bridge.console import say, tell
 from bridge.link.clock import WallClock
 from bridge.link.link import Switchboard
-from bridge.link.protocol import Keys
+from bridge.link.protocol import KeyExpressions
 from bridge.robot import agent as agents
 from bridge.robot.agent import Agent
 from bridge.robot.bodies import pose_of
@@ -126,11 +126,11 @@ def test_events_missed_while_the_link_was_cut_are_told_once_and_in_order() -> No
         mission_taken=lambda mission: base.stand_at_start(pose_of(mission.start)),
     )  # fmt: skip
     agent = Agent(
-        keys=Keys("r1"), link=board.link(), journal=journal, controller=controller, base=base,
+        keys=KeyExpressions("r1"), link=board.link(), journal=journal, controller=controller, base=base,
         scanner=scanner, clock=wall, command_clock=WallClock(), speed_up=200,
     )  # fmt: skip
     with agents.on_link(agent):
-        station = Station(board.link(), Keys("r1"), commander="test")
+        station = Station(board.link(), KeyExpressions("r1"), commander="test")
         station.push(corridor())
         told: queue.Queue[Report] = queue.Queue()
         watching = threading.Thread(target=lambda: [told.put(report) for report in station.reports()])
@@ -176,8 +176,9 @@ def test_a_robot_whose_work_has_failed_does_not_look_alive() -> None:
     field = Field()
     field.station().push(corridor())
     agent = Agent(
-        keys=Keys("r1"), link=Switchboard().link(), journal=field.journal, controller=field.controller,
-        base=field.base, scanner=field.scanner, clock=field.clock, command_clock=WallClock(),
+        keys=KeyExpressions("r1"), link=Switchboard().link(), journal=field.journal,
+        controller=field.controller, base=field.base, scanner=field.scanner, clock=field.clock,
+        command_clock=WallClock(),
     )  # fmt: skip
 
     def broken(*arguments: object, **options: object) -> None:

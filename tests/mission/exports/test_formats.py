@@ -13,7 +13,7 @@ from mission.errors import InputError, StopgoError
 from mission.files import exports
 from mission.files.exports import FORMATS, exported, format_named
 from mission.files.exports.format import Format, Supplements
-from mission.files.exports.way import mapped
+from mission.files.exports.waypoints import mapped
 from tests.mission.exports.worlds import surveyed
 from tests.mission.worlds import square_tour
 

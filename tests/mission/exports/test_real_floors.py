@@ -20,7 +20,7 @@ from mission.files.exports.stops_dxf import LAYERS
 from mission.files.exports.stretches import read_stretches
 from mission.files.imports import READERS
 from mission.files.imports.assembling import mission_of
-from mission.files.imports.track import Given
+from mission.files.imports.track import ImportOptions
 from mission.settings import Settings
 from planner import plan
 from planner.floors import read_floor
@@ -95,7 +95,7 @@ def test_a_drawing_from_the_wild_keeps_its_entities_or_is_one_line(path: Path) -
 @pytest.mark.parametrize("name", READERS)
 def test_a_real_mission_comes_back(floor: str, name: str) -> None:
     mission, _ = planned(floor)
-    given = Given(mission.georeference, "ardupilot")
+    given = ImportOptions(mission.georeference, "ardupilot")
     track = READERS[name](exported(mission, name, Supplements()), "file", given)
     settings = Settings(start=(mission.start.x, mission.start.y, 0.0))
     back = mission_of(track, settings, name=floor, file="file", digest="0" * 64)

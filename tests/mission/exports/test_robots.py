@@ -20,7 +20,7 @@ from ruamel.yaml import YAML
 from mission.document import Mission, OnFailure, Transform
 from mission.files.exports import FORMATS, exported, format_named
 from mission.files.exports.format import Supplements
-from mission.files.exports.way import mapped, way
+from mission.files.exports.waypoints import mapped, way
 from mission.turning import turned, turned_back
 from tests.mission.exports.vda5050_order import ORDERS
 from tests.mission.exports.worlds import MAP, laboratory, on_a_map

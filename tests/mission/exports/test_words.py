@@ -16,7 +16,7 @@ from mission.document import Mission, sealed
 from mission.files.exports import FORMATS, exported
 from mission.files.exports.format import Supplements
 from mission.files.imports import READERS
-from mission.files.imports.track import Given
+from mission.files.imports.track import ImportOptions
 from tests.mission.exports.worlds import laboratory
 
 words = st.text(st.characters(exclude_categories=("Cs",)), min_size=1, max_size=20)
@@ -70,7 +70,7 @@ def test_a_table_keeps_the_word_and_no_cell_is_a_formula(word: str) -> None:
         assert not cell.startswith(("=", "+", "-", "@", "\t", "\r"))
         assert (cell[1:] if cell.startswith("'") else cell) == word
     if "\0" not in word:
-        assert READERS["csv"](data, "t", Given()).visits[0].id == word
+        assert READERS["csv"](data, "t", ImportOptions()).visits[0].id == word
 
 
 @any_word
@@ -79,6 +79,6 @@ def test_json_formats_keep_the_word(word: str) -> None:
     assert points["name"] == word
     assert points["features"][0]["properties"]["id"] == word
     plan = exported(named(word), "plan", Supplements())
-    assert READERS["plan"](plan, "p", Given()).visits[0].id == word
+    assert READERS["plan"](plan, "p", ImportOptions()).visits[0].id == word
     order = json.loads(exported(named(word), "vda5050", Supplements()))
     assert next(node["nodeId"] for node in order["nodes"] if node["actions"]) == word

@@ -10,7 +10,7 @@ import pytest
 from mission.document import SiteOrigin
 from mission.errors import InputError
 from mission.files.imports import qgc_plan, qgc_waypoints
-from mission.files.imports.track import Given, Track
+from mission.files.imports.track import ImportOptions, Track
 from tests.mission.imports.worlds import CAPTURE, SPEED, Row, command, delay, plan, waypoint, waypoints
 
 Write = Callable[..., bytes]
@@ -18,13 +18,13 @@ BOTH = pytest.mark.parametrize(("write", "read"), [(plan, qgc_plan.read), (waypo
 
 
 def track(*rows: Row, firmware: int = 3, **root: object) -> Track:
-    return qgc_plan.read(plan(*rows, firmware=firmware, **root), "site.plan", Given())
+    return qgc_plan.read(plan(*rows, firmware=firmware, **root), "site.plan", ImportOptions())
 
 
 @BOTH
 def test_a_waypoint_with_a_trigger_is_a_stop_and_others_are_corners(write: Write, read: Callable) -> None:
     rows = (SPEED, waypoint(1), waypoint(2, hold=1), delay(2.5), CAPTURE, delay(60), waypoint(3))
-    made = read(write(*rows), "site", Given())
+    made = read(write(*rows), "site", ImportOptions())
     (visit,) = made.visits
     assert visit.xy == pytest.approx((0.0, 20.0), abs=0.05)
     assert [y for _, y in visit.via] == pytest.approx([10.0], abs=0.05)
@@ -35,7 +35,7 @@ def test_a_waypoint_with_a_trigger_is_a_stop_and_others_are_corners(write: Write
 
 @BOTH
 def test_holds_are_scans_where_nothing_is_triggered(write: Write, read: Callable) -> None:
-    made = read(write(waypoint(1), waypoint(2, hold=45), waypoint(3, hold=30)), "site", Given())
+    made = read(write(waypoint(1), waypoint(2, hold=45), waypoint(3, hold=30)), "site", ImportOptions())
     assert [visit.scan_s for visit in made.visits] == [45.0, 30.0]
     assert [visit.settle_s for visit in made.visits] == [None, None]
     assert len(made.visits[0].via) == 1
@@ -83,14 +83,14 @@ def test_degrees_are_read_by_the_autopilots_rule() -> None:
     far = (waypoint(50, hold=5),)
     ys = [track(*far, firmware=firmware).visits[0].xy[1] for firmware in (3, 12, 0)]
     assert len({round(y, 3) for y in ys}) == 3
-    given = Given(autopilot="px4")
+    given = ImportOptions(autopilot="px4")
     assert qgc_plan.read(plan(*far), "p", given).visits[0].xy[1] == pytest.approx(ys[1])
-    assert qgc_waypoints.read(waypoints(*far), "w", Given()).visits[0].xy[1] == pytest.approx(ys[0])
+    assert qgc_waypoints.read(waypoints(*far), "w", ImportOptions()).visits[0].xy[1] == pytest.approx(ys[0])
 
 
 def test_an_origin_given_turns_the_site() -> None:
     east = SiteOrigin(lat=47.3769, lon=8.5417, alt=408.0, heading_deg=90.0)
-    (visit,) = qgc_plan.read(plan(waypoint(1, hold=5)), "p", Given(east)).visits
+    (visit,) = qgc_plan.read(plan(waypoint(1, hold=5)), "p", ImportOptions(east)).visits
     assert visit.xy == pytest.approx((-10.0, 0.0), abs=0.05)
 
 
@@ -133,6 +133,6 @@ REFUSED: dict[str, tuple[tuple[Row, ...], str]] = {
 def test_what_means_something_else_is_refused_by_item(case: str, write: Write, read: Callable) -> None:
     rows, words = REFUSED[case]
     with pytest.raises(InputError, match=words) as refusal:
-        read(write(*rows), "site.file", Given())
+        read(write(*rows), "site.file", ImportOptions())
     assert str(refusal.value).startswith("site.file: ")
     assert "\n" not in str(refusal.value)

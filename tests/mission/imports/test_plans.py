@@ -9,7 +9,7 @@ import pytest
 
 from mission.errors import InputError
 from mission.files.imports import qgc_plan, qgc_waypoints
-from mission.files.imports.track import Given
+from mission.files.imports.track import ImportOptions
 from tests.mission.imports.worlds import HOME, plan, waypoint, waypoints
 
 MISSIONS = Path(__file__).parents[4] / "shared" / "data" / "missions"
@@ -30,14 +30,14 @@ REAL = {
 @pytest.mark.parametrize("name", REAL)
 def test_a_plan_for_aircraft_is_refused_by_what_it_asks(name: str) -> None:
     with pytest.raises(InputError, match=REAL[name]):
-        qgc_plan.read((MISSIONS / f"{name}.plan").read_bytes(), f"{name}.plan", Given())
+        qgc_plan.read((MISSIONS / f"{name}.plan").read_bytes(), f"{name}.plan", ImportOptions())
 
 
 @pytest.mark.skipif(not MISSIONS.is_dir(), reason=f"the real inputs are not in {MISSIONS}")
 def test_a_real_plan_without_its_aircraft_commands_is_read() -> None:
     document = json.loads((MISSIONS / "qgroundcontrol_sample.plan").read_bytes())
     document["mission"]["items"] = document["mission"]["items"][1:-1]
-    track = qgc_plan.read(json.dumps(document).encode(), "p", Given())
+    track = qgc_plan.read(json.dumps(document).encode(), "p", ImportOptions())
     (visit,) = track.visits
     assert visit.id == "s01"
     # 0.0010047° of longitude on PX4's sphere of 6 371 km at latitude 47.3977°, and 0.00002036° of latitude.
@@ -47,7 +47,7 @@ def test_a_real_plan_without_its_aircraft_commands_is_read() -> None:
 
 def test_ids_and_bearing_that_stopgo_wrote_are_read() -> None:
     ours = {"heading_deg": 90.0, "stops": {"2": "Büro"}}
-    track = qgc_plan.read(plan(waypoint(1), waypoint(2, hold=5), stopgo=ours), "p", Given())
+    track = qgc_plan.read(plan(waypoint(1), waypoint(2, hold=5), stopgo=ours), "p", ImportOptions())
     assert [visit.id for visit in track.visits] == ["Büro"]
     assert track.origin.heading_deg == 90.0
     assert track.visits[0].xy == pytest.approx((-20.0, 0.0), abs=0.1)
@@ -57,7 +57,7 @@ def test_ids_and_bearing_that_stopgo_wrote_are_read() -> None:
     "ours", [None, 3, {"heading_deg": "x", "stops": []}, {"stops": {"1": 7}}, {"stops": 1}]
 )
 def test_a_strange_key_of_ours_is_no_reason_to_fail(ours: object) -> None:
-    track = qgc_plan.read(plan(waypoint(1, hold=5), stopgo=ours), "p", Given())
+    track = qgc_plan.read(plan(waypoint(1, hold=5), stopgo=ours), "p", ImportOptions())
     assert [visit.id for visit in track.visits] == ["s01"]
     assert track.origin.heading_deg == 0.0
 
@@ -96,7 +96,7 @@ BROKEN = {
 @pytest.mark.parametrize("words", BROKEN)
 def test_what_is_no_plan_is_one_line(words: str) -> None:
     with pytest.raises(InputError) as refusal:
-        qgc_plan.read(BROKEN[words], "site.plan", Given())
+        qgc_plan.read(BROKEN[words], "site.plan", ImportOptions())
     assert str(refusal.value).startswith("site.plan: ")
     assert words in str(refusal.value)
     assert "\n" not in str(refusal.value)
@@ -119,10 +119,10 @@ TABLES = {
 @pytest.mark.parametrize("words", TABLES)
 def test_what_is_no_table_of_waypoints_is_one_line(words: str) -> None:
     with pytest.raises(InputError) as refusal:
-        qgc_waypoints.read(TABLES[words].encode(), "site.waypoints", Given())
+        qgc_waypoints.read(TABLES[words].encode(), "site.waypoints", ImportOptions())
     assert words in str(refusal.value)
 
 
 def test_comments_and_windows_lines_are_read_over() -> None:
     text = GOOD.replace("QGC WPL 110\n", "QGC WPL 110\n# drawn on Monday\n").replace("\n", "\r\n")
-    assert len(qgc_waypoints.read(text.encode(), "w", Given()).visits) == 1
+    assert len(qgc_waypoints.read(text.encode(), "w", ImportOptions()).visits) == 1

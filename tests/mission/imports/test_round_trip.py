@@ -16,7 +16,7 @@ from mission.files.exports import exported
 from mission.files.exports.format import Supplements
 from mission.files.imports import READERS, read_mission
 from mission.files.imports.assembling import mission_of
-from mission.files.imports.track import Given
+from mission.files.imports.track import ImportOptions
 from mission.mavlink.autopilots import AUTOPILOTS
 from mission.problems import problems_of
 from mission.settings import Settings
@@ -58,7 +58,7 @@ def missions(draw: st.DrawFn) -> Mission:
 def there_and_back(mission: Mission, name: str, autopilot: str, settings: Settings | None = None) -> Mission:
     data = exported(mission, name, Supplements(autopilot=autopilot))
     assert mission.georeference is not None
-    track = READERS[name](data, f"site.{name}", Given(mission.georeference, autopilot))
+    track = READERS[name](data, f"site.{name}", ImportOptions(mission.georeference, autopilot))
     return mission_of(track, settings or Settings(), name="site", file=f"site.{name}", digest="0" * 64)
 
 
@@ -120,7 +120,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(name: str, data: st.DataO
     noise = data.draw(st.one_of(st.binary(max_size=12), st.sampled_from(NOISE)))
     damaged = seed[:begin] + noise + seed[end:]
     try:
-        track = READERS[name](damaged, "file", Given())
+        track = READERS[name](damaged, "file", ImportOptions())
         mission = mission_of(track, Settings(), name="site", file="file", digest="0" * 64)
     except InputError as error:
         assert "\n" not in str(error)
@@ -150,7 +150,7 @@ NOISE = [
 @given(data=st.binary(max_size=200))
 def test_noise_is_refused_in_one_line(name: str, data: bytes) -> None:
     with pytest.raises(InputError) as refusal:
-        READERS[name](data, "file", Given())
+        READERS[name](data, "file", ImportOptions())
     assert "\n" not in str(refusal.value)
 
 

@@ -11,14 +11,14 @@ from mission.errors import InputError
 from mission.files.exports import exported
 from mission.files.exports.format import Supplements
 from mission.files.imports.stops_csv import read
-from mission.files.imports.track import Given, Track
+from mission.files.imports.track import ImportOptions, Track
 from tests.mission.exports.worlds import laboratory
 
 ZURICH = SiteOrigin(lat=47.3769, lon=8.5417, alt=408.0, heading_deg=0.0)
 
 
 def track(text: str, origin: SiteOrigin | None = None) -> Track:
-    return read(text.encode(), "stops.csv", Given(origin))
+    return read(text.encode(), "stops.csv", ImportOptions(origin))
 
 
 def places(text: str) -> list[tuple[float, float]]:
@@ -67,7 +67,7 @@ def test_a_sorted_table_keeps_its_route() -> None:
 
 def test_the_exports_table_comes_back_whole() -> None:
     mission = laboratory()
-    made = read(exported(mission, "csv", Supplements()), "stops.csv", Given())
+    made = read(exported(mission, "csv", Supplements()), "stops.csv", ImportOptions())
     assert made.start == mission.stops[0].approach[0]
     for visit, stop in zip(made.visits, mission.stops, strict=True):
         assert (visit.id, visit.xy, visit.via) == (stop.id, (stop.x, stop.y), stop.approach[1:-1])
@@ -127,4 +127,4 @@ def test_a_place_far_from_the_origin_is_refused() -> None:
 
 def test_text_that_is_no_utf_8_is_refused() -> None:
     with pytest.raises(InputError, match=r"not UTF-8 text \(byte 14\); save it as CSV UTF-8"):
-        read("id,x_m,y_m\nBü,1,2\n".encode("utf-16-le")[:14] + b"\xd8", "s.csv", Given())
+        read("id,x_m,y_m\nBü,1,2\n".encode("utf-16-le")[:14] + b"\xd8", "s.csv", ImportOptions())

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mission.mavlink.autopilots import AUTOPILOTS
 from mission.mavlink.autopilots.ardupilot import keeps as ardupilot_keeps
 from mission.mavlink.autopilots.px4 import keeps as px4_keeps
-from mission.mavlink.items import NAN, Command, Frame, Item
+from mission.mavlink.items import NAN, Command, Item, MavFrame
 from mission.mavlink.read_back import differences, placed_at, upload_of
 from mission.mavlink.translate import translate
 from tests.mission.mavlink.worlds import NAMES, corner_tour, first_scan, narrow_view, read_back
@@ -97,7 +97,7 @@ def test_sequence_numbers_count_home_where_it_is_an_item(name, first):
     assert placed_at(sent, first - 1) is None
 
 
-def waypoint(*params: float, frame: int = Frame.GLOBAL_RELATIVE_ALT_INT, z: float = 0.0) -> Item:
+def waypoint(*params: float, frame: int = MavFrame.GLOBAL_RELATIVE_ALT_INT, z: float = 0.0) -> Item:
     """A waypoint somewhere."""
     one, two, three, four = params
     return Item(Command.NAV_WAYPOINT, frame, (one, two, three, four), x=473_977_000, y=85_456_000, z=z)
@@ -123,10 +123,10 @@ def test_ardupilot_keeps_whole_centimetres(sent, kept):
 
 
 def test_ardupilot_keeps_script_messages_and_times_in_their_types():
-    message = Item(Command.DO_SEND_SCRIPT_MESSAGE, Frame.MISSION, (100.7, 0.1, 1e7, -3.5), x=5, z=1.0)
+    message = Item(Command.DO_SEND_SCRIPT_MESSAGE, MavFrame.MISSION, (100.7, 0.1, 1e7, -3.5), x=5, z=1.0)
     assert ardupilot_keeps(message).params == (100.0, pytest.approx(0.1, rel=1e-7), 1e7, -3.5)
     assert (ardupilot_keeps(message).x, ardupilot_keeps(message).z) == (0, 0.0)
-    wait = Item(Command.NAV_SCRIPT_TIME, Frame.MISSION, (1.0, 300.0, 0.1, 0.0), x=40_000)
+    wait = Item(Command.NAV_SCRIPT_TIME, MavFrame.MISSION, (1.0, 300.0, 0.1, 0.0), x=40_000)
     assert ardupilot_keeps(wait).params == (1.0, 44.0, 0.0999755859375, 0.0)
     assert ardupilot_keeps(wait).x == 40_000 - 65_536
 
@@ -142,7 +142,7 @@ def test_ardupilot_keeps_script_messages_and_times_in_their_types():
     ],
 )
 def test_ardupilot_keeps_commands_in_their_types(command, sent, kept):
-    assert ardupilot_keeps(Item(command, Frame.MISSION, sent)).params == kept
+    assert ardupilot_keeps(Item(command, MavFrame.MISSION, sent)).params == kept
 
 
 def test_ardupilot_always_goes_on():

@@ -9,9 +9,9 @@ import pytest
 
 from mission.document import SiteOrigin
 from mission.errors import InputError
-from mission.mavlink.items import Command, Frame, Item
+from mission.mavlink.items import Command, Item, MavFrame
 from mission.mavlink.recognise import recognise, stop_of_trigger, stops_of
-from mission.mavlink.recognised_tour import Round, round_of
+from mission.mavlink.recognised_tour import RecognisedTour, recognised_tour
 from mission.mavlink.translate import translate
 from tests.mission.mavlink.worlds import NAMES, corner_tour, read_back
 from tests.mission.worlds import mission_of, square_tour, stop
@@ -23,7 +23,7 @@ def waypoint(steps_east: int, hold: float = 0.0) -> Item:
     """A waypoint so many steps of 1e-7 degrees (7 mm) east of the origin."""
     return Item(
         Command.NAV_WAYPOINT,
-        Frame.GLOBAL_RELATIVE_ALT,
+        MavFrame.GLOBAL_RELATIVE_ALT,
         (hold, 0, 0, 0),
         x=515_000_000,
         y=75_000_000 + steps_east,
@@ -31,15 +31,15 @@ def waypoint(steps_east: int, hold: float = 0.0) -> Item:
 
 
 def wait(seconds: float) -> Item:
-    return Item(Command.NAV_DELAY, Frame.MISSION, (seconds, -1.0, -1.0, -1.0))
+    return Item(Command.NAV_DELAY, MavFrame.MISSION, (seconds, -1.0, -1.0, -1.0))
 
 
 def trigger(number: float) -> Item:
-    return Item(Command.DO_SEND_SCRIPT_MESSAGE, Frame.MISSION, (100.0, number, 0.0, 0.0))
+    return Item(Command.DO_SEND_SCRIPT_MESSAGE, MavFrame.MISSION, (100.0, number, 0.0, 0.0))
 
 
-def round_in(*items: Item, plain_stops: bool = False) -> Round:
-    return round_of(recognise(items, plain_stops=plain_stops), ORIGIN)
+def round_in(*items: Item, plain_stops: bool = False) -> RecognisedTour:
+    return recognised_tour(recognise(items, plain_stops=plain_stops), ORIGIN)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -55,7 +55,7 @@ def test_what_was_sent_is_recognised_from_the_vehicle(name, mission):
 def test_stops_times_and_corners_come_back(name):
     sent = translate(corner_tour(), name)
     home = 1 if name == "ardupilot" else 0
-    found = round_of(recognise(read_back(sent)[home:]), ORIGIN, name)
+    found = recognised_tour(recognise(read_back(sent)[home:]), ORIGIN, name)
     (visit,) = found.visits
     assert math.dist(visit.at, (4.0, 3.0)) <= 0.008
     assert (visit.settle_s, visit.scan_s, visit.number) == (2.0, 60.0, 1)
@@ -71,14 +71,14 @@ def test_stops_times_and_corners_come_back(name):
 def test_a_heading_comes_back_from_who_keeps_it(name, heading):
     sent = translate(square_tour(), name)
     home = 1 if name == "ardupilot" else 0
-    found = round_of(recognise(read_back(sent)[home:]), ORIGIN, name)
+    found = recognised_tour(recognise(read_back(sent)[home:]), ORIGIN, name)
     north = None if heading is None else math.pi / 2
     assert [visit.heading for visit in found.visits] == [pytest.approx(heading), pytest.approx(north)]
 
 
 def test_a_wait_for_a_script_says_no_scan_time():
     sent = translate(square_tour(), scan_wait="script_time", trigger="none", settle="hold")
-    (one, two) = round_of(recognise(sent.items), ORIGIN).visits
+    (one, two) = recognised_tour(recognise(sent.items), ORIGIN).visits
     assert [(visit.settle_s, visit.scan_s, visit.number) for visit in (one, two)] == [
         (2.0, None, 1),
         (2.0, None, 2),
@@ -105,7 +105,7 @@ def test_every_manner_of_writing_is_recognised(name, trigger, settle):
     sent = translate(mission, name, trigger=trigger, settle=settle)
     seen = recognise(sent.items, mission=mission)
     assert [(one.role, one.stop) for one in seen] == [(one.role, one.stop) for one in sent.placed]
-    (visit,) = round_of(seen, ORIGIN, name).visits
+    (visit,) = recognised_tour(seen, ORIGIN, name).visits
     assert (visit.settle_s, visit.scan_s) == (2.0, 60.0)
 
 
@@ -167,14 +167,14 @@ def test_half_a_degree_is_fifty_kilometres_and_one_and_a_half_is_another_site():
     with pytest.raises(InputError, match=r"item 1: 51\.5.*104 km from the site's origin.*--origin"):
         round_in(waypoint(15_000_000), wait(1.0))
     with pytest.raises(InputError, match=r"item 0: "):
-        round_of(recognise([waypoint(15_000_000), wait(1.0)]), ORIGIN, first=0)
+        recognised_tour(recognise([waypoint(15_000_000), wait(1.0)]), ORIGIN, first=0)
 
 
 @pytest.mark.parametrize(
     ("items", "told"),
     [
-        ([waypoint(0), Item(21, Frame.GLOBAL)], r"item 2: NAV_LAND \(21\) has no meaning"),
-        ([waypoint(0), Item(31_010, Frame.MISSION)], r"item 2: command \(31010\) has no meaning"),
+        ([waypoint(0), Item(21, MavFrame.GLOBAL)], r"item 2: NAV_LAND \(21\) has no meaning"),
+        ([waypoint(0), Item(31_010, MavFrame.MISSION)], r"item 2: command \(31010\) has no meaning"),
         ([replace(waypoint(0), frame=1)], r"item 1: NAV_WAYPOINT \(16\) is in frame 1; give latitude"),
         ([replace(waypoint(0), x=0, y=0)], r"item 1: NAV_WAYPOINT \(16\) is at 0, 0"),
         ([wait(1.0), waypoint(0)], r"item 1: waits or triggers come before the first waypoint"),

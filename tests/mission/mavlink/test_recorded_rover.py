@@ -10,9 +10,9 @@ import pytest
 
 from mission.document import SiteOrigin
 from mission.mavlink.autopilots.ardupilot import keeps as ardupilot_keeps
-from mission.mavlink.items import Command, Frame, Item
+from mission.mavlink.items import Command, Item, MavFrame
 from mission.mavlink.recognise import recognise
-from mission.mavlink.recognised_tour import round_of
+from mission.mavlink.recognised_tour import recognised_tour
 
 LOG = Path(__file__).parents[3].parent / "shared" / "data" / "logs" / "rover-stop-and-go.BIN"
 # Where the log's ORGN message says that the vehicle's origin is.
@@ -45,7 +45,7 @@ def test_what_the_rover_kept_is_what_we_say_it_keeps_again(kept):
     for item in kept:
         predicted = ardupilot_keeps(item)
         if item.command != Command.NAV_WAYPOINT:  # the log writes frame 0 where the read-back says MISSION
-            assert predicted.frame == Frame.MISSION
+            assert predicted.frame == MavFrame.MISSION
             predicted = replace(predicted, frame=item.frame)
         assert predicted == item
 
@@ -57,9 +57,9 @@ def test_what_was_sent_to_it_is_predicted_to_be_kept_so(kept):
         lat = 473_977_000 + round(y / step)
         lon = 85_456_000 + round(x / step / math.cos(math.radians(47.3977)))
         sent = [
-            Item(Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT_INT, (1.0, 0.0, 0.0, 0.0), x=lat, y=lon),
-            Item(Command.DO_SEND_SCRIPT_MESSAGE, Frame.MISSION, (100.0 + number, number, y, x)),
-            Item(Command.NAV_DELAY, Frame.MISSION, (3.0, -1.0, -1.0, -1.0)),
+            Item(Command.NAV_WAYPOINT, MavFrame.GLOBAL_RELATIVE_ALT_INT, (1.0, 0.0, 0.0, 0.0), x=lat, y=lon),
+            Item(Command.DO_SEND_SCRIPT_MESSAGE, MavFrame.MISSION, (100.0 + number, number, y, x)),
+            Item(Command.NAV_DELAY, MavFrame.MISSION, (3.0, -1.0, -1.0, -1.0)),
         ]
         for item, own in zip(sent, kept[3 * number : 3 * number + 3], strict=True):
             predicted = ardupilot_keeps(item)
@@ -67,7 +67,7 @@ def test_what_was_sent_to_it_is_predicted_to_be_kept_so(kept):
 
 
 def test_it_is_recognised_as_five_stops_three_metres_apart(kept):
-    found = round_of(recognise(kept), ORIGIN)
+    found = recognised_tour(recognise(kept), ORIGIN)
     assert [(visit.settle_s, visit.scan_s, visit.number) for visit in found.visits] == [
         (1.0, 3.0, number) for number in range(5)
     ]

@@ -14,7 +14,7 @@ from mission.document import SiteOrigin
 from mission.errors import AnswerIsNo, InputError
 from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
 from mission.mavlink.autopilots import AUTOPILOTS
-from mission.mavlink.items import Command, Frame, Item
+from mission.mavlink.items import Command, Item, MavFrame
 from mission.mavlink.translate import translate
 from tests.mission.mavlink.worlds import (
     NAMES,
@@ -90,7 +90,7 @@ def test_only_commands_that_the_autopilot_takes_are_sent(name):
     assert {item.command for item in items} <= AUTOPILOTS[name].commands
     for item in items:
         place = item.command == Command.NAV_WAYPOINT
-        assert item.frame == (Frame.GLOBAL_RELATIVE_ALT_INT if place else Frame.MISSION)
+        assert item.frame == (MavFrame.GLOBAL_RELATIVE_ALT_INT if place else MavFrame.MISSION)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from bridge.link.clock import SimulatedClock
-from bridge.mavlink.auto.auto_follower import Follower
+from bridge.mavlink.auto.auto_follower import AutoFollower
 from bridge.mavlink.auto.logbook import Logbook, remember
-from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.robot.journal import memory_journal
 from mission.events import Paused
 from mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from mission.mavlink.following.observer import Observer
+from mission.mavlink.telemetry import Message
 from mission.mavlink.translate import translate
 from mission.run.states import started
 from tests.mission.mavlink.following.worlds import tour
@@ -34,7 +35,7 @@ def told_at_first_look(boot_ms: int) -> list[str]:
     book.move(lambda run: (started(run, run_id="r", now_ns=clock.now_ns(), by="me"),))
     clock.wait(60.0)
     observer = Observer(ARDUPILOT)
-    follower = Follower(book, None, observer, NoHands())  # type: ignore[arg-type]
+    follower = AutoFollower(book, None, observer, NoHands())  # type: ignore[arg-type]
     for message in found_in_manual(boot_ms):
         clock.wait(0.1)
         follower.look(observer.take(message, book.listed, clock.now_ns()))

@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from bridge.link.clock import SimulatedClock
-from bridge.mavlink.auto.auto_follower import Follower
+from bridge.mavlink.auto.auto_follower import AutoFollower
 from bridge.mavlink.auto.logbook import Logbook, remember
 from bridge.mavlink.line.frames import dialect
 from bridge.robot.journal import memory_journal
@@ -87,7 +87,7 @@ def followed(log: list[Any], tour: Mission) -> tuple[AnyEvent, ...]:
     remember(book, tour, ItemList("ardupilot", ORIGIN, placed))
     book.move(lambda run: (started(run, run_id="r", now_ns=clock.now_ns(), by="log"),))
     observer = Observer(ARDUPILOT)
-    follower = Follower(book, None, observer, NoHands())  # type: ignore[arg-type]
+    follower = AutoFollower(book, None, observer, NoHands())  # type: ignore[arg-type]
     follower.looking = True
     armed_in_auto = dialect.MAVLink_heartbeat_message(10, 3, 128 | 1, 10, 4, 3)
     origin = dialect.MAVLink_gps_global_origin_message(473_977_000, 85_456_000, 488_000)

@@ -75,8 +75,8 @@ def test_a_stop_that_nobody_saw_is_not_said_to_be_scanned(tmp_path: Path) -> Non
     site = Site(tmp_path, "ardupilot", mission=tour(), speed_up=20.0)
     with site.up():
         site.order("start")
-        with found_peer(site.url, vehicle=1) as peer, peer.box("MISSION_CURRENT") as box:
-            while box.get(30.0).mission_state != dialect.MISSION_STATE_COMPLETE:
+        with found_peer(site.url, vehicle=1) as peer, peer.waiting("MISSION_CURRENT") as waiting:
+            while waiting.get(30.0).mission_state != dialect.MISSION_STATE_COMPLETE:
                 pass
         with watched(site):
             pass

@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridge.mavlink.auto.vehicle_orders import Consent, Orders
+from bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
 from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.peer import reached as found_peer
@@ -126,7 +126,7 @@ def test_an_abort_under_a_used_id_is_refused_and_never_told_that_it_was_done(tmp
     abort = msgspec.structs.replace(start, verb="abort")
     with Site(tmp_path).book() as book:
         no_vehicle: Any = None
-        orders = Orders(book, no_vehicle, no_vehicle, no_vehicle, book.clock, Consent())
+        orders = VehicleOrders(book, no_vehicle, no_vehicle, no_vehicle, book.clock, Consent())
         remember_answer(book.journal, start, answer_to(start, None, book.run))
         assert (orders.obey(start).outcome, orders.obey(abort).reason) == ("ok", "id_reused")
 

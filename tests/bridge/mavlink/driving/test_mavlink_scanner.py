@@ -10,11 +10,12 @@ from typing import Any
 
 from bridge.link.clock import WallClock
 from bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, stop_of
-from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.peer import Ack
-from bridge.mavlink.line.wire import Box, Who
+from bridge.mavlink.line.wire import MessageQueue, Who
 from mission.document import Scan
 from mission.errors import OutcomeUnknown
+from mission.mavlink.telemetry import Message
 from mission.run.scans import ScanFailed, ScanResult
 from tests.bridge.mavlink.driving.world import site_mission
 
@@ -42,10 +43,10 @@ class Camera:
         self.asked: list[Message] = []
         self.answers: Callable[[Message], Message | None] = lambda request: None
         self._tells, self._taken, self._acks = list(tells), taken, list(acks)
-        self._box = Box()
+        self._box = MessageQueue()
 
     @contextmanager
-    def box(self, *types: str) -> Iterator[Box]:
+    def waiting(self, *types: str) -> Iterator[MessageQueue]:
         yield self._box
 
     def ask(self, number: int, *, patience_s: float) -> Message | None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from bridge.mavlink.driving.straight_drive import Course, Patience
+from bridge.mavlink.driving.straight_drive import Patience, StraightDrive
 
 
-def course() -> Course:
+def course() -> StraightDrive:
     """Four metres ahead; a vehicle is there within 5 cm, or for good within 35."""
-    return Course((0.0, 0.0), (4.0, 0.0), 0.0, near_m=0.05, over_m=0.35, patience=Patience())
+    return StraightDrive((0.0, 0.0), (4.0, 0.0), 0.0, near_m=0.05, over_m=0.35, patience=Patience())
 
 
-def judged(drive: Course, *seen: tuple[float, float, float, bool]) -> list[str]:
+def judged(drive: StraightDrive, *seen: tuple[float, float, float, bool]) -> list[str]:
     """The verdicts on (time, x, y, still)."""
     return [drive.judge((x, y), still=still, now_s=at) for at, x, y, still in seen]
 

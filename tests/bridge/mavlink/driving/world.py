@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from bridge.link.link import Switchboard
-from bridge.link.protocol import Keys
+from bridge.link.protocol import KeyExpressions
 from bridge.mavlink.driving.autopilot_body import AutopilotBody
 from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.peer import Peer, reached
@@ -128,7 +128,7 @@ def rover(tmp_path: Path, profile: str, **details: Any) -> Iterator[tuple[Rover,
 @contextmanager
 def gateway(tmp_path: Path, url: Url, **details: Any) -> Iterator[Station]:
     """A robot's end that drives the vehicle at `url`, and a station that commands it."""
-    board, keys = Switchboard(), Keys("r1")
+    board, keys = Switchboard(), KeyExpressions("r1")
     body = AutopilotBody(str(url), **{"arm": True, "vehicle": 1, **details})
     options = RobotOptions(name="r1", listen="", state=tmp_path / "robot", body=body)
     with robot_on(board.link(), keys, options):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.messages import station_beat
 from bridge.mavlink.line.peer import found, reached
 from bridge.mavlink.line.url import read_url
@@ -12,6 +12,7 @@ from bridge.mavlink.line.wire import Who, wire
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots.generic import GENERIC
 from mission.mavlink.local_frame import VehicleOrigin
+from mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.scripted import Scripted, free_udp_port
 
 pytestmark = pytest.mark.usefixtures("own_time")
@@ -150,9 +151,13 @@ def test_what_it_does_not_know_is_none() -> None:
 
 
 def test_a_clock_that_goes_back_is_a_new_boot() -> None:
-    with Scripted() as vehicle, reached(vehicle.url, vehicle=1) as peer, peer.box("SYSTEM_TIME") as box:
-        box.get(5.0)
+    with (
+        Scripted() as vehicle,
+        reached(vehicle.url, vehicle=1) as peer,
+        peer.waiting("SYSTEM_TIME") as waiting,
+    ):
+        waiting.get(5.0)
         vehicle.boot_ms = 0
-        while box.get(5.0).time_boot_ms > 10_000:
+        while waiting.get(5.0).time_boot_ms > 10_000:
             pass
         assert peer.boots == 1

@@ -18,11 +18,12 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.transport import open_transport
 from bridge.mavlink.line.url import Url, read_url
-from bridge.mavlink.line.wire import SIGNATURE, Box, Who, Wire, read_signing_key, wire
+from bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, read_signing_key, wire
 from mission.errors import InputError, RobotUnreachable
+from mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.scripted import free_udp_port
 
@@ -40,10 +41,10 @@ def text(number: int) -> Message:
     return dialect.MAVLink_system_time_message(0, number)
 
 
-def heard(box: Box, number: int) -> bool:
+def heard(waiting: MessageQueue, number: int) -> bool:
     """Whether that number comes before the time is up; what comes before it is thrown away."""
     until = time.monotonic() + WAIT_S
-    while (message := box.get(until - time.monotonic())) is not None:
+    while (message := waiting.get(until - time.monotonic())) is not None:
         if message.time_boot_ms == number:
             return True
     return False
@@ -52,11 +53,11 @@ def heard(box: Box, number: int) -> bool:
 def passes(one: Wire, other: Wire, *, start: int = 0) -> None:
     """Messages go both ways, sooner or later."""
     for sends, hears in ((one, other), (other, one), (one, other)):
-        with hears.box("SYSTEM_TIME") as box:
+        with hears.waiting("SYSTEM_TIME") as waiting:
             until = time.monotonic() + WAIT_S
             for number in count(start + 1):
                 sends.send(text(number))
-                if box.get(0.1) is not None:
+                if waiting.get(0.1) is not None:
                     break
                 assert time.monotonic() < until, f"nothing passes: {one.gone or other.gone}"
 
@@ -138,10 +139,10 @@ def cable(tmp_path: Path) -> Iterator[Cable]:
 
 
 def test_a_serial_line_that_is_unplugged_comes_back(cable: Cable) -> None:
-    with wire(Url("serial", str(cable.path), 57600)) as station, station.box("SYSTEM_TIME") as box:
+    with wire(Url("serial", str(cable.path), 57600)) as station, station.waiting("SYSTEM_TIME") as waiting:
         assert station.slow
         cable.say(text(1))
-        assert heard(box, 1)
+        assert heard(waiting, 1)
         station.send(text(7))
         assert os.read(cable.end, 300)[:1] == b"\xfd"
         cable.unplug()
@@ -152,9 +153,9 @@ def test_a_serial_line_that_is_unplugged_comes_back(cable: Cable) -> None:
         cable.plug()
         while station.gone:
             assert time.monotonic() < until
-            box.get(0.01)
+            waiting.get(0.01)
         cable.say(text(3))
-        assert heard(box, 3)
+        assert heard(waiting, 3)
 
 
 def test_a_device_that_is_not_there_is_named(tmp_path: Path) -> None:
@@ -174,16 +175,16 @@ def test_a_port_that_is_taken_is_named(kind: str) -> None:
 
 
 @contextmanager
-def listening(signing_key: bytes | None = None) -> Iterator[tuple[Wire, Box, Any]]:
+def listening(signing_key: bytes | None = None) -> Iterator[tuple[Wire, MessageQueue, Any]]:
     """A station, what it hears of the time, and a way to throw bytes at it."""
     port = free_udp_port()
     with (
         wire(udp("udpin", port), signing_key=signing_key) as station,
-        station.box("SYSTEM_TIME") as box,
+        station.waiting("SYSTEM_TIME") as waiting,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as thrower,
     ):
         thrower.connect(("127.0.0.1", port))
-        yield station, box, thrower.send
+        yield station, waiting, thrower.send
 
 
 def packed(number: int, *, key: bytes | None = None, ahead_s: float = 0.0) -> bytes:
@@ -196,47 +197,47 @@ def packed(number: int, *, key: bytes | None = None, ahead_s: float = 0.0) -> by
 
 
 def test_half_a_datagram_does_not_swallow_the_next() -> None:
-    with listening() as (_, box, throw):
+    with listening() as (_, waiting, throw):
         throw(packed(1)[:9])
         throw(packed(2))
-        assert box.get(WAIT_S).time_boot_ms == 2
+        assert waiting.get(WAIT_S).time_boot_ms == 2
 
 
 def test_what_is_for_others_is_left_to_them() -> None:
-    with listening() as (station, _, throw), station.box() as box:
+    with listening() as (station, _, throw), station.waiting() as waiting:
         coder = dialect.MAVLink(None, 1, 1)
         ack = dialect.MAVLink_mission_ack_message
         throw(ack(255, 190, 0, 0).pack(coder))
         throw(ack(254, 190, 1, 0).pack(coder))
-        assert box.get(WAIT_S).type == 1
+        assert waiting.get(WAIT_S).type == 1
         assert station.dropped["for others"] == 1
 
 
 def test_a_signed_wire_hears_only_its_key() -> None:
-    with listening(KEY) as (station, box, throw):
+    with listening(KEY) as (station, waiting, throw):
         throw(packed(1))
         throw(packed(2, key=OTHER_KEY))
         throw(packed(3, key=KEY))
-        assert box.get(WAIT_S).time_boot_ms == 3
+        assert waiting.get(WAIT_S).time_boot_ms == 3
         assert station.dropped[SIGNATURE] == 2
 
 
 def test_a_replay_is_not_heard_again_nor_is_what_was_signed_long_ago() -> None:
-    with listening(KEY) as (station, box, throw):
+    with listening(KEY) as (station, waiting, throw):
         throw(packed(1, key=KEY, ahead_s=-120.0))
         first = packed(2, key=KEY)
         throw(first)
         throw(first)
         throw(packed(3, key=KEY, ahead_s=1.0))
-        assert [box.get(WAIT_S).time_boot_ms for _ in range(2)] == [2, 3]
+        assert [waiting.get(WAIT_S).time_boot_ms for _ in range(2)] == [2, 3]
         assert station.dropped[SIGNATURE] == 2
 
 
 def test_a_forged_far_future_does_not_lock_out_the_vehicle() -> None:
-    with listening(KEY) as (_, box, throw):
+    with listening(KEY) as (_, waiting, throw):
         throw(packed(1, key=OTHER_KEY, ahead_s=1e8))
         throw(packed(2, key=KEY))
-        assert box.get(WAIT_S).time_boot_ms == 2
+        assert waiting.get(WAIT_S).time_boot_ms == 2
 
 
 def test_two_signed_wires_understand_each_other() -> None:
@@ -250,13 +251,13 @@ def test_two_signed_wires_understand_each_other() -> None:
 
 @pytest.mark.parametrize("key", [None, KEY], ids=["unsigned", "signed"])
 def test_ten_thousand_hostile_datagrams_stop_nothing(key: bytes | None) -> None:
-    with listening(key) as (station, box, throw):
+    with listening(key) as (station, waiting, throw):
         for number, datagram in enumerate(Hostile(seed=5).datagrams(10_000)):
             throw(datagram)
             if number % 100 == 99:  # one at a time, or the system drops what is not read
                 mark = 1_000_000 + number
                 throw(packed(mark, key=key))
-                assert heard(box, mark), station.gone
+                assert heard(waiting, mark), station.gone
         assert station.gone == ""
         assert station.dropped["unreadable"] > 1000
         assert key is None or station.dropped[SIGNATURE] > 1000

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bridge.link.clock import SimulatedClock
-from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.wire import Who
 from bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from bridge.mavlink.simulated.profiles import PROFILES
@@ -17,11 +17,12 @@ from bridge.mavlink.simulated.vehicle import Setting
 from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from mission.document import SiteOrigin
 from mission.events import Pose
-from mission.mavlink.items import Command, Frame, Item
+from mission.mavlink.items import Command, Item, MavFrame
+from mission.mavlink.telemetry import Message
 
 ORIGIN = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=0.0)
 STATION, OTHER = Who(254, 190), Who(253, 190)
-HOME = Item(Command.NAV_WAYPOINT, Frame.GLOBAL)
+HOME = Item(Command.NAV_WAYPOINT, MavFrame.GLOBAL)
 ACCEPTED = dialect.MAV_MISSION_ACCEPTED
 OBEYED = dialect.MAV_RESULT_ACCEPTED
 
@@ -31,19 +32,19 @@ def waypoint(north_m: float, east_m: float, *, hold: float = 1.0) -> Item:
     step = 0.011131884502145034
     lat, lon = 474_000_000 + north_m / step, 85_000_000 + east_m / (step * 0.6768752)
     params = (hold, 0.0, 0.0, 0.0)
-    return Item(Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT_INT, params, round(lat), round(lon))
+    return Item(Command.NAV_WAYPOINT, MavFrame.GLOBAL_RELATIVE_ALT_INT, params, round(lat), round(lon))
 
 
 def delay(seconds: float) -> Item:
-    return Item(Command.NAV_DELAY, Frame.MISSION, (seconds, -1.0, -1.0, -1.0))
+    return Item(Command.NAV_DELAY, MavFrame.MISSION, (seconds, -1.0, -1.0, -1.0))
 
 
 def camera(number: int) -> Item:
-    return Item(Command.IMAGE_START_CAPTURE, Frame.MISSION, (0.0, 0.0, 1.0, float(number)))
+    return Item(Command.IMAGE_START_CAPTURE, MavFrame.MISSION, (0.0, 0.0, 1.0, float(number)))
 
 
 def script(number: int, seconds: float) -> Item:
-    return Item(Command.DO_SEND_SCRIPT_MESSAGE, Frame.MISSION, (100.0, float(number), seconds, 60.0))
+    return Item(Command.DO_SEND_SCRIPT_MESSAGE, MavFrame.MISSION, (100.0, float(number), seconds, 60.0))
 
 
 class Bench:

@@ -158,11 +158,11 @@ def test_mavsdk_and_another_station_use_one_vehicle() -> None:
         vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES["strict"])),
         wire(Url("udpout", "127.0.0.1", port)) as other,
         station(port, way="udpout") as system,
-        other.box("MISSION_REQUEST_INT", "MISSION_ACK") as box,
+        other.waiting("MISSION_REQUEST_INT", "MISSION_ACK") as waiting,
     ):
         missions = MissionRaw(system)
         other.send(dialect.MAVLink_mission_count_message(1, 1, 1, 0))
-        assert box.get(PATIENCE_S).get_type() == "MISSION_REQUEST_INT"
+        assert waiting.get(PATIENCE_S).get_type() == "MISSION_REQUEST_INT"
         with pytest.raises(MissionRawError):
             missions.upload_mission(raw([delay(1.0)] * 3))
         item = delay(7.0)
@@ -172,7 +172,7 @@ def test_mavsdk_and_another_station_use_one_vehicle() -> None:
                 1, 1, 0, 2, item.command, 0, 1, *item.params, 0, 0, 0.0, 0
             )
         )
-        while (got := box.get(PATIENCE_S)).get_type() != "MISSION_ACK":
+        while (got := waiting.get(PATIENCE_S)).get_type() != "MISSION_ACK":
             pass
         assert got.type == dialect.MAV_MISSION_ACCEPTED
         assert [read.param1 for read in missions.download_mission()] == [7.0]

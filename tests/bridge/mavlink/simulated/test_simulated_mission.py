@@ -27,12 +27,12 @@ NEAR_M = 0.02
 """Two steps of 1e-7 degrees."""
 
 
-@pytest.mark.parametrize(("profile", "autopilot", "manner"), WAYS)
+@pytest.mark.parametrize(("profile", "autopilot", "choices"), WAYS)
 def test_every_scan_is_made_where_and_for_as_long_as_it_was_planned(
-    profile: str, autopilot: str, manner: dict[str, Any]
+    profile: str, autopilot: str, choices: dict[str, Any]
 ) -> None:
     mission = square_tour()
-    sent = translate(mission, autopilot, **manner)
+    sent = translate(mission, autopilot, **choices)
     bench = Bench(profile, origin=sent.origin)
     bench.count(len(upload_of(sent)))
     for number, item in enumerate(upload_of(sent)):

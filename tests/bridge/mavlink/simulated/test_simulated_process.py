@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.transport import Address
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import SIGNATURE, Who, Wire, wire
@@ -32,6 +32,7 @@ from bridge.mavlink.simulated.vehicle_process import VehicleOptions, setting_of,
 from bridge.mavlink.simulated.vehicle_store import Store
 from mission.errors import InputError
 from mission.mavlink.items import Item
+from mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.scripted import free_udp_port
 from tests.bridge.mavlink.simulated.bench import delay, item_message
 
@@ -49,10 +50,10 @@ def here(port: int) -> Url:
 
 def answer(station: Wire, message: Message, kind: str, *, tries: int = 40) -> Message:
     """The next message of a kind; `message` is sent again twice a second until it comes."""
-    with station.box(kind) as box:
+    with station.waiting(kind) as waiting:
         for _ in range(tries):
             station.send(message)
-            got = box.get(0.5)
+            got = waiting.get(0.5)
             if got is not None:
                 return got
     raise AssertionError(f"no {kind}")
@@ -62,10 +63,10 @@ def upload(station: Wire, items: list[Item], *, home: bool = False) -> bool:
     """All items, each as often as it is asked for; true once they are accepted."""
     listed = [item_message(number, item) for number, item in enumerate([items[0], *items] if home else items)]
     count = dialect.MAVLink_mission_count_message(1, 1, len(listed), 0)
-    with station.box("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK") as box:
+    with station.waiting("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK") as waiting:
         station.send(count)
         for _ in range(400):
-            got = box.get(1.5)
+            got = waiting.get(1.5)
             if got is None:
                 station.send(count)
             elif got.get_type() != "MISSION_ACK":
@@ -210,9 +211,9 @@ def test_two_stations_on_streams_are_told_the_same() -> None:
     ):
         assert upload(one, [delay(1.0), delay(2.0)])
         assert count_of(other) == 2
-        with one.box("HEARTBEAT") as here_, other.box("HEARTBEAT") as there_:
-            for box in (here_, there_):
-                beat = box.get(PATIENCE_S)
+        with one.waiting("HEARTBEAT") as here_, other.waiting("HEARTBEAT") as there_:
+            for waiting in (here_, there_):
+                beat = waiting.get(PATIENCE_S)
                 assert beat is not None and beat.type == dialect.MAV_TYPE_GROUND_ROVER
 
 
@@ -237,9 +238,9 @@ def test_a_signing_vehicle_hears_who_has_the_key_only() -> None:
     with vehicle_on(here(port), setting, signing_key=KEY):
         with wire(there(port), signing_key=KEY) as station:
             assert upload(station, [delay(1.0)])
-        with wire(there(port)) as stranger, stranger.box("MISSION_ACK") as box:
+        with wire(there(port)) as stranger, stranger.waiting("MISSION_ACK") as waiting:
             stranger.send(dialect.MAVLink_mission_clear_all_message(1, 1, 0))
-            assert box.get(0.5) is None
+            assert waiting.get(0.5) is None
         with wire(there(port), signing_key=KEY) as station:
             assert count_of(station) == 1
 
@@ -248,13 +249,13 @@ def test_a_vehicle_that_should_sign_and_does_not() -> None:
     port = free_udp_port()
     setting = Setting(PROFILES["strict"], faults=VehicleFaults((VehicleFault("unsigned", 0),)))
     with vehicle_on(here(port), setting, signing_key=KEY):
-        with wire(there(port), signing_key=KEY) as careful, careful.box() as box:
+        with wire(there(port), signing_key=KEY) as careful, careful.waiting() as waiting:
             careful.send(dialect.MAVLink_mission_request_list_message(1, 1, 0))
-            assert box.get(0.5) is None
+            assert waiting.get(0.5) is None
             assert careful.dropped[SIGNATURE] > 0
-        with wire(there(port)) as careless, careless.box("MISSION_COUNT") as box:
+        with wire(there(port)) as careless, careless.waiting("MISSION_COUNT") as waiting:
             careless.send(dialect.MAVLink_mission_request_list_message(1, 1, 0))
-            assert box.get(0.5) is None, "it hears only what is signed"
+            assert waiting.get(0.5) is None, "it hears only what is signed"
 
 
 @pytest.mark.parametrize("profile", list(PROFILES))

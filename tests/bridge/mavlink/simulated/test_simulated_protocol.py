@@ -11,7 +11,7 @@ import pytest
 
 from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.simulated.profiles import PROFILES
-from mission.mavlink.items import Command, Frame, Item
+from mission.mavlink.items import Command, Item, MavFrame
 from tests.bridge.mavlink.simulated.bench import (
     ACCEPTED,
     OTHER,
@@ -77,7 +77,7 @@ def test_no_items_is_a_list_too(make: Make) -> None:
 
 def test_clearing_clears_one_kind_or_all(make: Make) -> None:
     bench = make()
-    rally = Item(5100, Frame.GLOBAL_RELATIVE_ALT_INT, x=474_000_000, y=85_000_000)
+    rally = Item(5100, MavFrame.GLOBAL_RELATIVE_ALT_INT, x=474_000_000, y=85_000_000)
     assert (bench.upload(TOUR), bench.upload([rally], kind=2)) == (ACCEPTED, ACCEPTED)
     bench.say(d.MAVLink_mission_clear_all_message(1, 1, 0))
     assert (len(bench.download()), len(bench.download(kind=2))) == (0, 1)
@@ -88,7 +88,7 @@ def test_clearing_clears_one_kind_or_all(make: Make) -> None:
 def test_kinds_are_kept_apart(make: Make) -> None:
     bench = make()
     place = {"x": 474_000_000, "y": 85_000_000}
-    corners = [Item(5001, Frame.GLOBAL, (3.0, 0.0, 0.0, 0.0), **place)] * 3
+    corners = [Item(5001, MavFrame.GLOBAL, (3.0, 0.0, 0.0, 0.0), **place)] * 3
     assert bench.upload(corners, kind=1) == ACCEPTED
     assert [m.mission_type for m in bench.download(kind=1)] == [1, 1, 1]
     assert (bench.held(), bench.download(kind=2)) == ([], [])
@@ -145,7 +145,7 @@ def test_an_item_is_given_in_degrees_to_a_station_that_asks_so(make: Make) -> No
 @pytest.mark.parametrize(
     ("item", "result"),
     [
-        (Item(31010, Frame.MISSION), d.MAV_MISSION_UNSUPPORTED),
+        (Item(31010, MavFrame.MISSION), d.MAV_MISSION_UNSUPPORTED),
         (replace(TOUR[0], frame=d.MAV_FRAME_LOCAL_NED), d.MAV_MISSION_UNSUPPORTED_FRAME),
         (replace(TOUR[0], frame=d.MAV_FRAME_LOCAL_FLU), d.MAV_MISSION_UNSUPPORTED_FRAME),
         (replace(TOUR[0], x=910_000_000), d.MAV_MISSION_INVALID_PARAM5_X),
@@ -304,7 +304,7 @@ def test_clearing_while_the_mission_runs(make: Make) -> None:
     assert bench.results()[-1] == (d.MAV_MISSION_ERROR if ardupilot else ACCEPTED)
     bench.count(0)
     assert bench.results()[-1] == ACCEPTED
-    assert bench.vehicle.course.due_ns is None
+    assert bench.vehicle.auto.due_ns is None
 
 
 @pytest.mark.parametrize("profile", ["strict", "ardupilot"])
@@ -335,9 +335,10 @@ def test_px4_gives_items_in_order_each_once_more_and_is_busy_until_acknowledged(
 def test_px4_takes_no_command_without_a_place_in_a_global_frame() -> None:
     bench = Bench("px4")
     assert (
-        bench.upload([replace(delay(1.0), frame=Frame.GLOBAL_RELATIVE_ALT_INT)]) == d.MAV_MISSION_UNSUPPORTED
+        bench.upload([replace(delay(1.0), frame=MavFrame.GLOBAL_RELATIVE_ALT_INT)])
+        == d.MAV_MISSION_UNSUPPORTED
     )
-    assert bench.upload([Item(Command.DO_SET_SERVO, Frame.MISSION)]) == d.MAV_MISSION_UNSUPPORTED
+    assert bench.upload([Item(Command.DO_SET_SERVO, MavFrame.MISSION)]) == d.MAV_MISSION_UNSUPPORTED
 
 
 def test_px4_lets_a_mission_go_on_when_it_is_sent_the_same_again() -> None:
@@ -346,9 +347,9 @@ def test_px4_lets_a_mission_go_on_when_it_is_sent_the_same_again() -> None:
     bench.start()
     bench.pass_time(6.0)
     bench.upload([delay(5.0), delay(50.0)])
-    assert bench.vehicle.course.current == 1
+    assert bench.vehicle.auto.current == 1
     bench.upload([delay(5.0), delay(51.0)])
-    assert bench.vehicle.course.current == 0
+    assert bench.vehicle.auto.current == 0
 
 
 def test_ardupilot_puts_its_own_home_in_front() -> None:
@@ -407,4 +408,4 @@ def test_items_marked_as_current(make: Make) -> None:
     for number, item in enumerate(listed):
         bench.say(item_message(number, item, current=int(number == 1 + bench.first)))
     marked = 0 if bench.vehicle.autopilot.habits.restarts_item else 1
-    assert bench.vehicle.course.current == marked
+    assert bench.vehicle.auto.current == marked

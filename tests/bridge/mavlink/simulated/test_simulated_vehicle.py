@@ -9,14 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.simulated.profiles import PROFILES
 from bridge.mavlink.simulated.rover import to_east
 from bridge.mavlink.simulated.vehicle_process import read_origin
 from bridge.mavlink.simulated.vehicle_telemetry import MAKERS
 from mission.document import SiteOrigin
 from mission.events import Pose
-from mission.mavlink.items import Command, Frame, Item
+from mission.mavlink.items import Command, Item, MavFrame
+from mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.simulated.bench import (
     OBEYED,
     OTHER,
@@ -44,7 +45,7 @@ def trigger(bench: Bench, number: int, seconds: float) -> Item:
 
 
 def speed(metres_per_s: float) -> Item:
-    return Item(Command.DO_CHANGE_SPEED, Frame.MISSION, (1.0, metres_per_s, -1.0, 0.0))
+    return Item(Command.DO_CHANGE_SPEED, MavFrame.MISSION, (1.0, metres_per_s, -1.0, 0.0))
 
 
 def captures(bench: Bench) -> list[tuple[int, int]]:
@@ -133,9 +134,9 @@ def test_disarming_and_rebooting_begin_the_mission_anew_and_keep_the_items(make:
     bench.upload([delay(5.0), delay(5.0), delay(5.0)])
     bench.start()
     bench.pass_time(7.0)
-    assert bench.vehicle.course.current == 1 + bench.first
+    assert bench.vehicle.auto.current == 1 + bench.first
     assert bench.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 0) == OBEYED
-    assert (bench.vehicle.course.current, bench.vehicle.course.state) == (0, "idle")
+    assert (bench.vehicle.auto.current, bench.vehicle.auto.state) == (0, "idle")
     assert bench.command(d.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1) == OBEYED
     said = len(bench.all)
     bench.command(d.MAV_CMD_COMPONENT_ARM_DISARM, 1)
@@ -192,8 +193,8 @@ def test_an_upload_while_the_mission_runs(make: Make) -> None:
     bench.pass_time(7.0)
     bench.upload([delay(50.0), delay(60.0), delay(70.0)])
     restarts = bench.vehicle.autopilot.habits.restarts_item
-    assert bench.vehicle.course.current == (1 if restarts else 0) + bench.first
-    assert bench.vehicle.course.state == "active"
+    assert bench.vehicle.auto.current == (1 if restarts else 0) + bench.first
+    assert bench.vehicle.auto.state == "active"
     bench.pass_time(49.0)
     assert bench.reached() == [0]
 
@@ -207,7 +208,7 @@ def test_an_upload_that_is_shorter_than_the_run_is_far(make: Make) -> None:
     bench.pass_time(20.0)
     bench.upload([delay(3.0)])
     bench.pass_time(10.0)
-    assert bench.vehicle.course.state in ("complete", "idle")
+    assert bench.vehicle.auto.state in ("complete", "idle")
 
 
 def test_a_vehicle_with_nothing_to_drive_stays_out_of_auto(make: Make) -> None:
@@ -236,7 +237,7 @@ def test_ardupilot_runs_too_long_a_hold_as_none() -> None:
 
 def test_ardupilot_waits_until_the_script_says_that_the_scan_is_done() -> None:
     bench = Bench("ardupilot")
-    wait = Item(Command.NAV_SCRIPT_TIME, Frame.MISSION, (1.0, 120.0, 0.0, 0.0), x=5)
+    wait = Item(Command.NAV_SCRIPT_TIME, MavFrame.MISSION, (1.0, 120.0, 0.0, 0.0), x=5)
     bench.upload([script(5, 20.0), wait, delay(5.0)])
     bench.start()
     bench.pass_time(19.0)
@@ -247,7 +248,7 @@ def test_ardupilot_waits_until_the_script_says_that_the_scan_is_done() -> None:
 
 def test_ardupilot_waits_for_a_script_no_longer_than_it_may() -> None:
     bench = Bench("ardupilot")
-    wait = Item(Command.NAV_SCRIPT_TIME, Frame.MISSION, (1.0, 10.0, 0.0, 0.0), x=5)
+    wait = Item(Command.NAV_SCRIPT_TIME, MavFrame.MISSION, (1.0, 10.0, 0.0, 0.0), x=5)
     bench.upload([script(5, 60.0), wait])
     bench.start()
     bench.pass_time(11.0)
@@ -349,7 +350,7 @@ def setpoint(
     )
 
 
-def lead(bench: Bench, message: Message, seconds: float) -> None:
+def target(bench: Bench, message: Message, seconds: float) -> None:
     """Setpoints twice a second, as PX4 wants them."""
     for _ in range(round(2 * seconds)):
         bench.say(message)
@@ -361,12 +362,12 @@ def test_guided_drives_to_a_target(make: Make) -> None:
     bench.arm()
     bench.say(setpoint(2.0, 1.0))
     assert bench.mode("guided") == OBEYED
-    lead(bench, setpoint(2.0, 1.0), 15.0)
+    target(bench, setpoint(2.0, 1.0), 15.0)
     assert bench.at() == pytest.approx((2.0, 1.0))
-    lead(bench, setpoint(math.nan, 1e30), 5.0)
+    target(bench, setpoint(math.nan, 1e30), 5.0)
     assert bench.at() == pytest.approx((2.0, 1.0))
     bench.say(setpoint(1.0, 0.0, frame=d.MAV_FRAME_LOCAL_OFFSET_NED))
-    lead(bench, setpoint(0.0, 0.0, frame=d.MAV_FRAME_BODY_NED), 15.0)
+    target(bench, setpoint(0.0, 0.0, frame=d.MAV_FRAME_BODY_NED), 15.0)
     assert bench.at() == pytest.approx((3.0, 1.0))
 
 
@@ -374,9 +375,9 @@ def test_px4_leaves_offboard_when_setpoints_cease_and_does_not_enter_without() -
     bench = Bench("px4")
     bench.arm()
     assert bench.mode("guided") == d.MAV_RESULT_DENIED
-    lead(bench, setpoint(9.0, 0.0), 1.0)
+    target(bench, setpoint(9.0, 0.0), 1.0)
     assert bench.mode("guided") == OBEYED
-    lead(bench, setpoint(9.0, 0.0), 5.0)
+    target(bench, setpoint(9.0, 0.0), 5.0)
     assert bench.vehicle.mode == "guided"
     bench.pass_time(10.0)
     assert bench.vehicle.mode == "hold"
@@ -388,7 +389,7 @@ def test_a_yaw_alone_turns_on_the_spot_where_the_autopilot_does(make: Make) -> N
     bench.arm()
     bench.say(setpoint(0.0, 0.0))
     bench.mode("guided")
-    lead(bench, setpoint(0.0, 0.0, mask=YAW_ONLY, yaw=-1.0), 5.0)
+    target(bench, setpoint(0.0, 0.0, mask=YAW_ONLY, yaw=-1.0), 5.0)
     bench.say(request_message(d.MAVLINK_MSG_ID_ATTITUDE))
     turned = -1.0 if bench.vehicle.autopilot.driving.turns else 0.0
     assert bench.last("ATTITUDE").yaw == pytest.approx(turned)
@@ -405,7 +406,7 @@ def test_a_speed_is_taken_on_the_way(make: Make) -> None:
     bench.mode("guided")
     bench.say(setpoint(8.0, 0.0))
     assert bench.command(Command.DO_CHANGE_SPEED, 1, 2.0) == OBEYED
-    lead(bench, setpoint(8.0, 0.0), 8.5)
+    target(bench, setpoint(8.0, 0.0), 8.5)
     assert bench.at() == pytest.approx((8.0, 0.0))
     assert bench.command(Command.DO_CHANGE_SPEED, 1, math.nan) == d.MAV_RESULT_DENIED
 
@@ -419,7 +420,7 @@ def test_a_target_on_the_globe_repeated_is_one_target(make: Make) -> None:
     bench.say(message)
     bench.arm()
     bench.mode("guided")
-    lead(bench, message, 20.0)
+    target(bench, message, 20.0)
     assert bench.at() == pytest.approx((0.0, 4.0), abs=0.05)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.line.frames import Message, dialect
+from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.messages import item_message, item_of
 from bridge.mavlink.line.origin import check_origin
 from bridge.mavlink.line.peer import Peer, reached
@@ -18,6 +18,7 @@ from bridge.mavlink.transfer.upload import Uploaded, clear, upload
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import Item
+from mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.lists import SITE, held, stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.bridge.mavlink.scripted import Scripted

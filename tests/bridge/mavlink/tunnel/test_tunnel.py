@@ -15,21 +15,21 @@ from bridge.commands.spawn import end_robot, free_port, robot_process, start
 from bridge.commands.tunnel_commands import Refusals, RefusalsHeard
 from bridge.link.keys import init_site, issue, now_utc, read_keys
 from bridge.link.link import MemoryLink, Switchboard
-from bridge.link.protocol import Keys
+from bridge.link.protocol import KeyExpressions
 from bridge.link.zenoh_link import Guard, connecting
 from bridge.mavlink.line.frames import Frames, dialect
 from bridge.mavlink.line.peer import Peer, reached
 from bridge.mavlink.line.transport import Address, open_transport
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.tunnel import tunnel as tunnels
-from bridge.mavlink.tunnel.message_filter import Harmless
+from bridge.mavlink.tunnel.message_filter import MessageFilter
 from bridge.mavlink.tunnel.tunnel import QUEUE, Tunnel, open_tunnel
 from mission.errors import OutcomeUnknown, RobotUnreachable
 from tests.bridge.mavlink.driving.world import rover
 from tests.bridge.mavlink.scripted import Scripted, free_udp_port
 from tests.bridge.mavlink.simulated.test_simulated_mavsdk import item_of, raw, station, tour
 
-KEYS = Keys("r1")
+KEYS = KeyExpressions("r1")
 COMMAND = dialect.MAVLink_command_long_message
 
 
@@ -134,7 +134,7 @@ def test_a_link_that_is_stuck_costs_the_oldest_frames_and_never_waits() -> None:
 
 
 def test_without_raw_orders_one_can_look_and_stop_and_nothing_else() -> None:
-    judge = Harmless()
+    judge = MessageFilter()
     reader = Frames(tunnels.Counter())
     for _, message in reader.whole(frames(1)[0], datagram=True):
         judge.sees(message)
@@ -164,7 +164,7 @@ def test_without_raw_orders_one_can_look_and_stop_and_nothing_else() -> None:
 
 
 def test_on_px4_holding_is_another_number() -> None:
-    judge = Harmless()
+    judge = MessageFilter()
     coder = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
     beat = bytes(dialect.MAVLink_heartbeat_message(10, 12, 0, 0, 4, 3).pack(coder))
     for _, message in Frames(tunnels.Counter()).whole(beat, datagram=True):
@@ -216,10 +216,10 @@ def test_without_raw_orders_arming_is_refused_in_words_and_hold_passes(tmp_path:
         operator.manual()
         with reached(Url("udpout", "127.0.0.1", port), vehicle=1, timeout_s=20) as peer:
             assert isinstance(peer, Peer)
-            with peer.wire.box("STATUSTEXT") as box:
+            with peer.wire.waiting("STATUSTEXT") as waiting:
                 with pytest.raises(OutcomeUnknown):
                     peer.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, patience_s=1.0)
-                told = box.get(5)
+                told = waiting.get(5)
             assert told is not None
             assert told.text == "tunnel refused COMPONENT_ARM_DISARM (COMMAND_LONG)"
             assert peer.command(dialect.MAV_CMD_DO_SET_MODE, *operator.autopilot.modes.hold.params).accepted

@@ -14,12 +14,12 @@ from itertools import takewhile
 from mission.document import SiteOrigin
 from mission.errors import InputError
 from mission.files.imports import track
-from mission.files.imports.track import Given, Track
+from mission.files.imports.track import ImportOptions, Track
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import NAMES, Command, Item, Placed
 from mission.mavlink.recognise import GLOBAL_FRAMES, PLACES, TRIGGERS, WAITS, recognise
-from mission.mavlink.recognised_tour import Round, Visit, round_of
+from mission.mavlink.recognised_tour import RecognisedStop, RecognisedTour, recognised_tour
 from mission.mavlink.writing import SCAN_MESSAGE
 
 MOST = 65_535
@@ -63,18 +63,18 @@ def track_of(items: Sequence[Listed], *, origin: SiteOrigin, autopilot: str, sou
     try:
         placed = recognise(told)
         _check_pauses(placed, items)
-        round_ = round_of(placed, origin, autopilot)
+        tour = recognised_tour(placed, origin, autopilot)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
-    for visit in round_.visits:
+    for visit in tour.visits:
         if math.hypot(*visit.at) > FARTHEST:
             raise InputError(
                 f"{source}: {items[visit.index]} is {math.hypot(*visit.at) / 1000:.0f} km from the site's "
                 "origin; give the site's own with --origin"
             )
-    names = _names(round_, items)
-    visits = [_visit(visit, name, items, autopilot) for visit, name in zip(round_.visits, names, strict=True)]
-    return Track(tuple(visits), back=round_.back, origin=origin, speed=round_.speed)
+    names = _names(tour, items)
+    visits = [_visit(visit, name, items, autopilot) for visit, name in zip(tour.visits, names, strict=True)]
+    return Track(tuple(visits), back=tour.back, origin=origin, speed=tour.speed)
 
 
 def autopilot_for(given: str | None, firmware: int | None = None) -> str:
@@ -84,7 +84,7 @@ def autopilot_for(given: str | None, firmware: int | None = None) -> str:
     return "ardupilot" if firmware is None else {3: "ardupilot", 12: "px4"}.get(firmware, "generic")
 
 
-def assumptions(given: Given, *, heading: bool, firmware: bool) -> tuple[str, ...]:
+def assumptions(given: ImportOptions, *, heading: bool, firmware: bool) -> tuple[str, ...]:
     """What was taken for granted, a line each: `heading`, `firmware` tell what the file itself says."""
     lines = []
     if given.origin is None and not heading:
@@ -177,19 +177,19 @@ def _item(item: Listed) -> Item:
     return Item(item.command, item.frame, params=(p1, p2, p3, p4), x=whole[0], y=whole[1], z=z)
 
 
-def _names(round_: Round, items: Sequence[Listed]) -> list[str]:
+def _names(tour: RecognisedTour, items: Sequence[Listed]) -> list[str]:
     """Ids that the file names, else those that stopgo gives to the numbers the triggers carry."""
-    named = [name for visit in round_.visits if (name := items[visit.index].id) is not None]
-    if len(set(named)) == len(round_.visits):
+    named = [name for visit in tour.visits if (name := items[visit.index].id) is not None]
+    if len(set(named)) == len(tour.visits):
         return named
-    numbers = [visit.number for visit in round_.visits if visit.number]
-    if len(set(numbers)) < len(round_.visits):
-        numbers = list(range(1, len(round_.visits) + 1))
+    numbers = [visit.number for visit in tour.visits if visit.number]
+    if len(set(numbers)) < len(tour.visits):
+        numbers = list(range(1, len(tour.visits) + 1))
     width = max(2, len(str(max(numbers))))
     return [f"s{number:0{width}d}" for number in numbers]
 
 
-def _visit(visit: Visit, name: str, items: Sequence[Listed], autopilot: str) -> track.Visit:
+def _visit(visit: RecognisedStop, name: str, items: Sequence[Listed], autopilot: str) -> track.Visit:
     done = _done_at(visit, items)
     radius = items[visit.index].params[1]
     kept = autopilot_named(autopilot).keeps_arrival and 0 < radius < math.inf
@@ -206,7 +206,7 @@ def _visit(visit: Visit, name: str, items: Sequence[Listed], autopilot: str) -> 
     )
 
 
-def _done_at(visit: Visit, items: Sequence[Listed]) -> list[Listed]:
+def _done_at(visit: RecognisedStop, items: Sequence[Listed]) -> list[Listed]:
     """The items between a stop's waypoint and the next."""
     after = (items[index] for index in range(visit.index + 1, len(items)))
     return list(takewhile(lambda item: item.command not in PLACES, after))
