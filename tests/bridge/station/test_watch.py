@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge import cli
+from bridge.commands import watch_commands
 from bridge.console import say, tell
 from bridge.link.clock import WallClock
 from bridge.link.link import Switchboard
@@ -229,7 +229,7 @@ def test_a_run_is_followed_to_its_end_though_its_recording_finds_no_room(
     field.order(verb)
     field.order("resume")
     field.work()
-    monkeypatch.setattr(cli, "reached", lambda way: nullcontext(field.station()))
+    monkeypatch.setattr(watch_commands, "reached", lambda way: nullcontext(field.station()))
     rrd = tmp_path / "field.rrd"
     with small_disk(0):
         assert main(["watch", "--robot", "r1", "--rrd", str(rrd), "--json"]) == code
