@@ -13,7 +13,6 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from benchmarks.table import median_seconds, put, table, versions
@@ -182,7 +181,7 @@ def measured(case: Case, strategy: str) -> Ours:
         seconds[name] = median_seconds(action, runs=RUNS)
         return action()
 
-    settings = msgspec.structs.replace(case.settings, candidates=strategy)
+    settings = replace(case.settings, candidates=strategy)
     space = timed("navigable", lambda: navigable(case.floor, settings))
     found = timed("candidates", lambda: candidates(space))
     seen = timed("exact", lambda: exact(found))
@@ -246,7 +245,7 @@ def _its_way() -> dict[str, str]:
 def _changed(seen: Visibility, **changes: Any) -> Visibility:
     """The same visibility under other settings."""
     found = seen.candidates
-    settings = msgspec.structs.replace(found.space.settings, **changes)
+    settings = replace(found.space.settings, **changes)
     return replace(seen, candidates=replace(found, space=replace(found.space, settings=settings)))
 
 
@@ -405,7 +404,7 @@ def range_table() -> str:
     """Case 1 structural with r = 10 m, the paper's second range."""
     rows = []
     for strategy, paper_s in (("grid", 89.59), ("triangulation", 21.18)):
-        settings = msgspec.structs.replace(STRUCTURAL, candidates=strategy, range=10.0)
+        settings = replace(STRUCTURAL, candidates=strategy, range=10.0)
         found = candidates(navigable(CASES[0].floor, settings))
         methods = (bresenham, exact, exact_compiled)
         times = [median_seconds(partial(method, found), runs=RUNS) for method in methods]

@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import msgspec
-
 from benchmarks.table import put, table, versions
 from mission.figures import Figures, Share, percent
 from mission.planning import Selection, Visibility
@@ -81,7 +79,7 @@ def cost_row(name: str, path: Path, options: dict[str, float]) -> list[str]:
 def _selections(seen: Visibility) -> Iterator[Selection]:
     for share in SHARES:
         space = seen.candidates.space
-        settings = msgspec.structs.replace(space.settings, room_coverage=share, kind_coverage=share)
+        settings = replace(space.settings, room_coverage=share, kind_coverage=share)
         again = replace(seen, candidates=replace(seen.candidates, space=replace(space, settings=settings)))
         yield refined(select(again))
 
@@ -108,7 +106,7 @@ def _by_length(selection: Selection, figures: Figures) -> Figures:
     from planner.appraisal.figures_of_route import shares_of
 
     space = selection.visibility.candidates.space
-    by_length = replace(space, settings=msgspec.structs.replace(space.settings, coverage_rule="length"))
+    by_length = replace(space, settings=replace(space.settings, coverage_rule="length"))
     found = replace(selection.visibility.candidates, space=by_length)
     again = replace(selection, visibility=replace(selection.visibility, candidates=found))
     whole, rooms, kinds = shares_of(again)

@@ -320,14 +320,12 @@ def import_command(
 
     from mission.document import sealed
     from mission.files.atomic import write_checked
-    from mission.files.exports.placing import numbers
     from mission.files.imports import read_mission
     from mission.files.mission_json import encode, next_revision, read
-    from mission.settings import HOW, read_settings
+    from mission.settings import PARAMETERS, read_settings
 
     given = {"origin": origin, "start": start}
-    told = {key: numbers(text, key, HOW[key]) for key, text in given.items() if text is not None}
-    settings = read_settings(parameters, told)
+    settings = read_settings(parameters, {key: PARAMETERS[key].given(text) for key, text in given.items()})
     made, track = read_mission(file, settings, kind=kind, autopilot=autopilot)
     mission = sealed(replace(made, revision=next_revision(out, made)))
     write_checked(out, encode(mission))

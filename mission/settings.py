@@ -1,111 +1,158 @@
-"""Every parameter of a plan, with its default; read from plan.toml, overridden by options.
+"""Every parameter of a plan, declared once: type, default, unit, limits, and what it is for.
 
-Names are those of the command's options with underscores. What a person types is metres, seconds and
-degrees, as here; docs/planning.md tells what each one does.
+From this declaration plan.toml is read and printed, `stopgo plan` has its options, and values are checked:
+a new parameter is one more field of `Settings`, and nothing else.
+Names are those of the options with underscores. What a person types is metres, seconds and degrees, as here;
+docs/planning.md tells what each one does.
 """
 
 from __future__ import annotations
 
-import math
-import re
+import json
 import tomllib
+from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
-
-import msgspec
+from typing import Annotated, Any, Literal, get_type_hints
 
 from mission.errors import InputError
 from mission.kinds import KINDS
+from mission.parameter import Parameter, words
+
+LEAST_SHARE = 0.7
+"""Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""
+LAYER_ROLES = ("floor", "rooms", "doors", "passages", *KINDS, "ignore")
+"""What a layer of a drawing can stand for."""
+
+_plan, _robot, _scanner, _policy = (
+    partial(Parameter, table) for table in ("plan", "robot", "scanner", "policy")
+)
+_share = partial(_plan, least=0, most=1, why="0.7 is 70 %", undecided=f"{LEAST_SHARE:g}; none by units")
+
+Place = tuple[float, float]
+Triple = tuple[float, float, float]
 
 
-class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class Settings:
     """All parameters of a plan. `None` means: decided from the others or from the floor."""
 
-    # [plan]
-    candidates: str = "grid"
-    visibility: str = "exact"
-    selector: str = "default"
-    router: str = "default"
-    graph: str = "exact"
-    den_grid_min: float = 0.5
-    """Least nodes per m² of a room's grid. The paper gives no value for this and the next: ours."""
-    max_err_dist: float = 0.5
-    """Greatest distance in metres from a stop to the grid's node that stands for it."""
-    coverage: float = 0.9
-    """c_min: least share of what is visible that the chosen stops must see, of the whole …"""
-    room_coverage: float | None = None
-    """… of what each room shows …"""
-    kind_coverage: float | None = None
-    """… and of each kind of element. None: LEAST_SHARE; by the paper's rule there are no such shares."""
-    coverage_rule: Literal["length", "paper"] = "length"
-    """Whether coverage counts metres of boundary; or units of the whole only, as the paper does."""
-    d_sec: float = 0.7
-    """Least distance from a stop to any element."""
-    d_dis: float = 0.05
-    """Greatest length of a unit (Eq. 1)."""
-    grid: float = 1.0
-    """r_grid: greatest spacing of grid candidates."""
-    d_max: float = 1.6
-    """Greatest distance of triangulation seeds along a line. The paper gives no value for this and the
-    next two: ours come closest to its Table 3."""
-    l_min: float = 2.6
-    """Least side of a triangle whose middle is a candidate."""
-    dens_min: float = 0.25
-    """Least candidates per m² of a room, below which it is triangulated again."""
-    door_access: float = 0.7
-    """Least clear width of an opening that is driven through."""
-    edge: float = 0.35
-    """Least distance of stops and legs from floor edges and holes."""
-    doors: Literal["open", "closed"] = "open"
-    """Whether the laser passes doors; closed is the paper's "range restricted to rooms"."""
-    targets: tuple[str, ...] | None = None
-    """Element kinds to be scanned."""
-    layers: tuple[str, ...] = ()
-    """What layers of other names stand for, such as `A-WALL=walls`; `DIM=ignore` is nothing in the way."""
-    tour: Literal["closed", "open"] | None = None
-    start: tuple[float, float, float] | None = None
-    """x, y in metres and heading in degrees counter-clockwise from +x."""
-    end: tuple[float, float] | None = None
-    use: tuple[tuple[float, float], ...] = ()
-    """Places where a stop must be."""
-    avoid: tuple[tuple[float, float, float], ...] = ()
-    """Circles x, y, radius in which no stop may be."""
-    refine: bool | None = None
-    """Whether places beside the chosen stops are offered too; None: where that takes at most a second."""
-    door_scan: bool = False
-    """Whether a stop is added in every doorway that is driven through, to help registration."""
-    door_candidates: bool = False
-    """Whether doorways are candidates."""
-    node_limit: int = 20_000
-    """Branch-and-bound nodes of the exact selector, after which it reports its gap."""
-    time_limit: float | None = None
-    """Seconds after which the exact selector stops; makes a plan depend on the machine's speed."""
-    origin: tuple[float, float, float, float] | None = None
-    """Latitude, longitude, altitude of the drawing's origin, and the bearing of its +y axis."""
-    seed: int = 1
-    # [robot]
-    robot_radius: float | None = None
-    speed: float = 0.5
-    turn_rate: float = 45.0
-    """Degrees per second."""
-    acceleration: float = 0.5
-    """Metres per second squared."""
-    # [scanner]
-    range: float = 5.0
-    """r: the scanner's range."""
-    fov: float = 360.0
-    """v: the scanner's field of view in degrees; below 360 every stop has a heading to scan along."""
-    profile: str = "default"
-    settle: float = 2.0
-    scan_time: float = 60.0
-    # [policy]
-    tolerance: float = 0.05
-    """Greatest distance of the robot from a stop at the start of its scan."""
-    on_failure: Literal["retry", "skip", "ask", "abort", "home"] = "ask"
-    retries: int = 1
-    link_loss: Literal["continue", "finish_stop", "hold", "home"] = "continue"
-    link_loss_after: float = 30.0
-    battery_min: float = 0.15
+    candidates: Annotated[str, _plan("grid, triangulation, or module:function")] = "grid"
+    visibility: Annotated[str, _plan("exact or bresenham")] = "exact"
+    selector: Annotated[str, _plan("default, greedy, or exact")] = "default"
+    router: Annotated[str, _plan("default or aco (the paper's ant colony)")] = "default"
+    graph: Annotated[str, _plan("exact, or grid (the paper's room grids)")] = "exact"
+    den_grid_min: Annotated[float, _plan("Least nodes of a room's grid", "per m²", least=0)] = 0.5
+    max_err_dist: Annotated[float, _plan("Stop to the grid's node that stands for it", "m", above=0)] = 0.5
+    coverage: Annotated[
+        float, _plan("Least share of all that is visible", above=0, most=1, why="0.9 is 90 %")
+    ] = 0.9
+    room_coverage: Annotated[float | None, _share("Least share of what each room shows")] = None
+    kind_coverage: Annotated[float | None, _share("Least share of each kind of element")] = None
+    coverage_rule: Annotated[
+        Literal["length", "paper"],
+        _plan("Count metres; or, as the paper does, units of the whole"),
+    ] = "length"
+    d_sec: Annotated[float, _plan("Stop to element", "m", least=0)] = 0.7
+    d_dis: Annotated[
+        float, _plan("Length of a unit", "m", least=1e-3, why="units below 1 mm are not planned")
+    ] = 0.05
+    grid: Annotated[
+        float, _plan("Spacing of grid candidates", "m", least=0.05, why="less than 5 cm is not planned")
+    ] = 1.0
+    # The paper gives no value for the next three: ours come closest to its Table 3.
+    d_max: Annotated[
+        float,
+        _plan("Longest seed segment of triangulation", "m", least=0.05, why="less than 5 cm is not planned"),
+    ] = 1.6
+    l_min: Annotated[float, _plan("Least side of a triangle", "m", least=0)] = 2.6
+    dens_min: Annotated[float, _plan("Least candidates of a room", "per m²", least=0)] = 0.25
+    door_access: Annotated[float, _plan("Least clear width of an opening", "m", above=0)] = 0.7
+    edge: Annotated[float, _plan("Stops and legs to floor edges and holes", "m", least=0)] = 0.35
+    doors: Annotated[Literal["open", "closed"], _plan("Whether the laser passes doors")] = "open"
+    targets: Annotated[
+        tuple[str, ...] | None,
+        _plan(
+            "Kinds to scan",
+            undecided=",".join(kind.name for kind in KINDS.values() if kind.target),
+            form="kinds",
+            example="walls,columns",
+            read=words,
+            known=tuple(KINDS),
+        ),
+    ] = None
+    layers: Annotated[
+        tuple[str, ...],
+        _plan(
+            "What a layer stands for",
+            form="NAME=KIND",
+            example="A-WALL=walls or DIM=ignore",
+            read=str,
+            option="layer",
+        ),
+    ] = ()
+    tour: Annotated[
+        Literal["closed", "open"] | None,
+        _plan("Whether the route comes back to its start", undecided="closed if only start is given"),
+    ] = None
+    start: Annotated[
+        Triple | None,
+        _plan(
+            "Where the robot starts",
+            "m and degrees counter-clockwise from +x",
+            form="X,Y,HEADING",
+            example="2.5,3.0,90",
+        ),
+    ] = None
+    end: Annotated[Place | None, _plan("Where the robot's way ends", "m", form="X,Y", example="2.5,3.0")] = (
+        None
+    )
+    use: Annotated[tuple[Place, ...], _plan("A stop that must be", "m", form="X,Y", example="2.5,3.0")] = ()
+    avoid: Annotated[
+        tuple[Triple, ...], _plan("Circle without stops", "m", form="X,Y,RADIUS", example="2.5,3.0,1")
+    ] = ()
+    refine: Annotated[
+        bool | None, _plan("Offer places beside the chosen stops too", undecided="up to 25 stops")
+    ] = None
+    door_scan: Annotated[bool, _plan("Add a stop in every doorway driven through")] = False
+    door_candidates: Annotated[bool, _plan("Offer doorways as candidates")] = False
+    node_limit: Annotated[int, _plan("Nodes of the exact selector's search", least=0)] = 20_000
+    time_limit: Annotated[
+        float | None, _plan("Limit of that search; plans then depend on the machine", "s", above=0)
+    ] = None
+    origin: Annotated[
+        tuple[float, float, float, float] | None,
+        _plan(
+            "Where on earth the drawing's origin is, and the bearing of its +y axis",
+            "degrees and m",
+            form="LAT,LON,ALT,HEADING",
+            example="47.3769,8.5417,408,0",
+        ),
+    ] = None
+    seed: Annotated[int, _plan("Seed of the tour search", least=0)] = 1
+    robot_radius: Annotated[
+        float | None, _robot("The robot's radius", "m", above=0, undecided="half of door_access")
+    ] = None
+    speed: Annotated[float, _robot("The robot's speed", "m/s", above=0)] = 0.5
+    turn_rate: Annotated[float, _robot("How fast it turns", "degrees/s", above=0)] = 45.0
+    acceleration: Annotated[float, _robot("How fast it speeds up", "m/s²", above=0)] = 0.5
+    range: Annotated[float, _scanner("The scanner's range", "m", above=0)] = 5.0
+    fov: Annotated[float, _scanner("The scanner's field of view", "degrees", least=10, most=360)] = 360.0
+    profile: Annotated[str, _scanner("The scanner's own name for how it scans")] = "default"
+    settle: Annotated[float, _scanner("Standing still before a scan", "s", least=0)] = 2.0
+    scan_time: Annotated[float, _scanner("Duration of a scan", "s", least=0)] = 60.0
+    tolerance: Annotated[float, _policy("Robot to stop at the start of a scan", "m", above=0)] = 0.05
+    on_failure: Annotated[
+        Literal["retry", "skip", "ask", "abort", "home"], _policy("What is done when a scan fails")
+    ] = "ask"
+    retries: Annotated[int, _policy("How often a failed scan is tried again", least=0)] = 1
+    link_loss: Annotated[
+        Literal["continue", "finish_stop", "hold", "home"], _policy("What is done without a link")
+    ] = "continue"
+    link_loss_after: Annotated[float, _policy("How long a link is missing until then", "s", least=0)] = 30.0
+    battery_min: Annotated[
+        float, _policy("Least charge with which the run goes on", least=0, below=1, why="0.15 is 15 %")
+    ] = 0.15
 
     @property
     def layer_roles(self) -> dict[str, str]:
@@ -134,41 +181,22 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return self.door_access / 2 if self.robot_radius is None else self.robot_radius
 
 
-LEAST_SHARE = 0.7
-"""Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""
-LAYER_ROLES = ("floor", "rooms", "doors", "passages", *KINDS, "ignore")
-"""What a layer of a drawing can stand for."""
+def _declared() -> dict[str, Parameter]:
+    """Each parameter with its name, type and default."""
+    hints = get_type_hints(Settings, include_extras=True)
+    return {
+        field.name: replace(
+            hints[field.name].__metadata__[0],
+            name=field.name,
+            type=hints[field.name].__origin__,
+            default=field.default,
+        )
+        for field in fields(Settings)
+    }
 
-SECTIONS: dict[str, tuple[str, ...]] = {
-    "plan": (
-        *("candidates", "visibility", "selector", "router", "coverage", "d_sec", "d_dis", "grid"),
-        *("room_coverage", "kind_coverage", "coverage_rule", "refine"),
-        *("graph", "den_grid_min", "max_err_dist"),
-        *("d_max", "l_min", "dens_min"),
-        *("door_access", "edge", "doors", "targets", "layers", "tour", "start", "end", "use", "avoid"),
-        *("door_scan", "door_candidates", "node_limit", "time_limit", "origin", "seed"),
-    ),
-    "robot": ("robot_radius", "speed", "turn_rate", "acceleration"),
-    "scanner": ("range", "fov", "profile", "settle", "scan_time"),
-    "policy": (*("tolerance", "on_failure", "retries", "link_loss", "link_loss_after", "battery_min"),),
-}
-"""The tables of plan.toml and the keys in each."""
 
-_POSITIVE = (
-    *("d_dis", "grid", "d_max", "door_access", "robot_radius", "speed", "turn_rate"),
-    "acceleration",
-    "time_limit",
-    "max_err_dist",
-    "range",
-    "tolerance",
-)
-_NOT_NEGATIVE = (
-    *("d_sec", "l_min", "dens_min", "edge", "settle", "scan_time", "retries", "link_loss_after"),
-    *("den_grid_min", "seed", "node_limit"),
-)
-_LARGEST = 1e6
-_FARTHEST = 1e9
-"""Coordinates of a site may be this large, in metres."""
+PARAMETERS = _declared()
+"""Every parameter of a plan by name, in the order of their declaration."""
 
 
 def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
@@ -179,44 +207,27 @@ def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
     InputError
         Naming the file or option, the key, the value and what would be right.
     """
+    import msgspec
+
     values = {} if path is None else _read_toml(path)
     values.update({key: value for key, value in overrides.items() if value is not None})
+    for key in values:
+        if key not in PARAMETERS:
+            raise InputError(f"{key}: no such parameter; known: {', '.join(PARAMETERS)}")
     try:
-        settings = msgspec.convert(values, Settings)
+        typed = msgspec.convert(values, Settings)
     except msgspec.ValidationError as error:
         raise InputError(_said(str(error), values, path)) from None
+    settings = Settings(**{key: getattr(typed, key) for key in values})  # typed itself lacks the defaults
     check_settings(settings)
     return settings
 
 
-HOW = {
-    "start": "write X,Y,HEADING, such as 2.5,3.0,90",
-    "end": "write X,Y, such as 2.5,3.0",
-    "origin": "write LAT,LON,ALT,HEADING, such as 47.3769,8.5417,408,0",
-    "use": "write X,Y for each, such as 2.5,3.0",
-    "avoid": "write X,Y,RADIUS for each, such as 2.5,3.0,1",
-    "layers": "write NAME=KIND for each, such as A-WALL=walls or DIM=ignore",
-    "targets": f"write kinds, such as walls,columns; known: {', '.join(KINDS)}",
-}
-"""How to write the parameters that are more than one number or word."""
-
-
 def _said(error: str, values: dict[str, Any], path: Path | None) -> str:
     """A refused value as one line: key, value, and what would be right."""
-    found = re.search(r"`\$\.(\w+)", error)
-    key = found.group(1) if found else ""
-    choices = [choice for choice in _choices(key) if choice is not None]
-    right = HOW.get(key) or (f"known: {', '.join(choices)}" if choices else error.partition(" - at ")[0])
-    where = f"{path}: " if path else ""
-    return f"{where}{key} = {_shown(values.get(key))}: {right}" if key else f"{where}{error}"
-
-
-def _choices(key: str) -> tuple[str, ...]:
-    """The words a parameter may be, where they are fixed."""
-    hint = get_type_hints(Settings).get(key)
-    parts = get_args(hint)
-    literals = [part for part in (hint, *parts) if get_origin(part) is Literal]
-    return tuple(word for part in literals for word in get_args(part))
+    what, _, where = error.partition(" - at `$.")
+    key = where.rstrip("`").partition("[")[0]
+    return f"{f'{path}: ' if path else ''}{key} = {_shown(values[key])}: {PARAMETERS[key].right or what}"
 
 
 def _shown(value: object) -> str:
@@ -232,78 +243,47 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not a TOML file ({error})") from None
+    tables = _tables()
+    known = ", ".join(f"[{table}]" for table in tables)
     values: dict[str, Any] = {}
     for table, content in document.items():
         if not isinstance(content, dict):
-            raise InputError(f"{path}: {table} = {content} stands in no table; known: {_tables()}")
-        if table not in SECTIONS:
-            raise InputError(f"{path}: unknown table [{table}]; known: {_tables()}")
-        for key, value in content.items():
-            if key not in SECTIONS[table]:
+            raise InputError(f"{path}: {table} = {content} stands in no table; known: {known}")
+        if table not in tables:
+            raise InputError(f"{path}: unknown table [{table}]; known: {known}")
+        for key in content:
+            if key not in PARAMETERS or PARAMETERS[key].section != table:
                 raise InputError(f"{path}: unknown key {key} in [{table}]; {_home_of(key, table)}")
-            values[key] = value
+        values.update(content)
     return values
 
 
-def _tables() -> str:
-    return ", ".join(f"[{table}]" for table in SECTIONS)
+def _tables() -> dict[str, list[Parameter]]:
+    """The tables of plan.toml and the parameters in each."""
+    found: dict[str, list[Parameter]] = {}
+    for parameter in PARAMETERS.values():
+        found.setdefault(parameter.section, []).append(parameter)
+    return found
 
 
 def _home_of(key: str, table: str) -> str:
-    for section, keys in SECTIONS.items():
-        if key in keys:
-            return f"it belongs in [{section}]"
-    return f"known there: {', '.join(SECTIONS[table])}"
+    if key in PARAMETERS:
+        return f"it belongs in [{PARAMETERS[key].section}]"
+    return f"known there: {', '.join(parameter.name for parameter in _tables()[table])}"
 
 
 def check_settings(settings: Settings) -> None:
     """Refuse values that no plan can be made with, naming key and value."""
-    for key in settings.__struct_fields__:
-        value = getattr(settings, key)
-        limit = _FARTHEST if isinstance(value, tuple) else _LARGEST
-        for number in _numbers(value):
-            if not math.isfinite(number) or abs(number) > limit:
-                raise InputError(f"{key} = {number}: must be a finite number below {limit:g}")
-    for key in _POSITIVE:
-        value = getattr(settings, key)
-        if value is not None and value <= 0:
-            raise InputError(f"{key} = {value}: must be greater than 0")
-    for key in _NOT_NEGATIVE:
-        if getattr(settings, key) < 0:
-            raise InputError(f"{key} = {getattr(settings, key)}: must not be negative")
-    _check_shares(settings)
-    _check_rule(settings)
-    _check_choices(settings)
+    for key, parameter in PARAMETERS.items():
+        parameter.check(getattr(settings, key))
+    _check_together(settings)
+    _check_lists(settings)
 
 
-def _numbers(value: object) -> list[float]:
-    """All numbers in a value, however deep."""
-    if isinstance(value, tuple):
-        return [number for item in value for number in _numbers(item)]
-    return [value] if isinstance(value, int | float) and not isinstance(value, bool) else []
-
-
-def _check_shares(settings: Settings) -> None:
-    if not 0 < settings.coverage <= 1:
-        raise InputError(f"coverage = {settings.coverage}: must be above 0 and at most 1 (0.9 is 90 %)")
-    if not 0 <= settings.battery_min < 1:
-        raise InputError(f"battery_min = {settings.battery_min}: must be at least 0 and below 1")
-    if settings.d_dis < 1e-3:
-        raise InputError(f"d_dis = {settings.d_dis}: units below 1 mm are not planned; use 0.001 or more")
-    if not 10 <= settings.fov <= 360:
-        raise InputError(f"fov = {settings.fov}: must be at least 10 and at most 360 degrees")
-    if settings.d_max < 0.05:
-        raise InputError(f"d_max = {settings.d_max}: seeds below 5 cm are not planned; use 0.05 or more")
-    if settings.grid < 0.05:
-        raise InputError(f"grid = {settings.grid}: spacing below 5 cm is not planned; use 0.05 or more")
-
-
-def _check_rule(settings: Settings) -> None:
-    """Refuse what a coverage rule or a field of view has no use for."""
+def _check_together(settings: Settings) -> None:
+    """Refuse what a coverage rule, a field of view or a closed tour has no use for."""
     for key in ("room_coverage", "kind_coverage"):
         share = getattr(settings, key)
-        if share is not None and not 0 <= share <= 1:
-            raise InputError(f"{key} = {share}: must be between 0 and 1 (0.7 is 70 %)")
         if share is not None and settings.coverage_rule == "paper":
             raise InputError(
                 f"{key} = {share}: the paper's rule has no such share; use coverage_rule = length"
@@ -311,9 +291,11 @@ def _check_rule(settings: Settings) -> None:
     if settings.refine and (settings.coverage_rule == "paper" or settings.fov < 360):
         other = "coverage_rule = paper" if settings.coverage_rule == "paper" else f"fov = {settings.fov:g}"
         raise InputError(f"refine = true: is not done with {other}; leave one of them out")
+    if settings.tour == "closed" and settings.end is not None:
+        raise InputError("tour = closed and end are both given; a closed tour ends where it starts")
 
 
-def _check_choices(settings: Settings) -> None:
+def _check_lists(settings: Settings) -> None:
     for kind in settings.targets or ():
         if kind not in KINDS:
             raise InputError(f"targets = {kind}: unknown kind; known: {', '.join(KINDS)}")
@@ -326,8 +308,6 @@ def _check_choices(settings: Settings) -> None:
             raise InputError(f"avoid = {x:g},{y:g},{radius:g}: the radius must be greater than 0")
     if settings.targets == ():
         raise InputError(f"targets is empty; known: {', '.join(KINDS)}")
-    if settings.tour == "closed" and settings.end is not None:
-        raise InputError("tour = closed and end are both given; a closed tour ends where it starts")
     if settings.origin is not None and not (abs(settings.origin[0]) <= 90 and abs(settings.origin[1]) <= 180):
         raise InputError(f"origin = {settings.origin}: latitude must be within ±90, longitude ±180")
 
@@ -335,11 +315,13 @@ def _check_choices(settings: Settings) -> None:
 def settings_toml(settings: Settings) -> str:
     """The settings as a plan.toml that reads back the same; what is undecided stands as a comment."""
     lines: list[str] = []
-    for section, keys in SECTIONS.items():
-        lines.append(f"[{section}]")
-        for key in keys:
-            value = getattr(settings, key)
-            lines.append(f"# {key} = (decided by stopgo)" if value is None else f"{key} = {_toml(value)}")
+    for table, parameters in _tables().items():
+        lines.append(f"[{table}]")
+        for parameter in parameters:
+            value = getattr(settings, parameter.name)
+            undecided = f"# {parameter.name} = ({parameter.undecided})"
+            lines.append(f"# {parameter.meaning}")
+            lines.append(undecided if value is None else f"{parameter.name} = {_toml(value)}")
         lines.append("")
     return "\n".join(lines)
 
@@ -349,4 +331,4 @@ def _toml(value: object) -> str:
         return "[" + ", ".join(_toml(item) for item in value) + "]"
     if isinstance(value, bool):
         return str(value).lower()
-    return f'"{value}"' if isinstance(value, str) else repr(value)
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -32,16 +32,10 @@ EXAMPLE = "Example: stopgo plan floor.dxf -o plan --range 8 --start 2.5,3.0,90"
 
 def add_commands(app: typer.Typer) -> None:
     """Add this folder's verbs to the front door."""
-    app.command(name="plan", epilog=EXAMPLE)(plan_command)
+    from planner.options import with_options
+
+    app.command(name="plan", epilog=EXAMPLE)(with_options(plan_command))
     app.command(name="demo", epilog="Example: stopgo demo -o recordings/demo")(demo_command)
-
-
-def numbers(text: str, name: str) -> tuple[float, ...]:
-    """The numbers in `1,2.5,-3`, given for the option `name`."""
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(f"{name} = {text}: must be numbers separated by commas, such as 2.5,3.0") from None
 
 
 def plan_command(
@@ -52,87 +46,24 @@ def plan_command(
     parameters: Annotated[
         Path | None, typer.Option("-p", "--parameters", help="plan.toml; options override it.")
     ] = None,
-    candidates: Annotated[str | None, typer.Option(help="grid, triangulation, or module:function")] = None,
-    visibility: Annotated[str | None, typer.Option(help="exact or bresenham")] = None,
-    selector: Annotated[str | None, typer.Option(help="default, greedy, or exact")] = None,
-    node_limit: Annotated[int | None, typer.Option(help="Nodes of the exact selector's search.")] = None,
-    time_limit: Annotated[
-        float | None, typer.Option(help="Seconds of that search; plans then depend on the machine.")
-    ] = None,
-    router: Annotated[str | None, typer.Option(help="default or aco (the paper's ant colony)")] = None,
-    graph: Annotated[str | None, typer.Option(help="exact, or grid (the paper's room grids)")] = None,
-    den_grid_min: Annotated[float | None, typer.Option(help="Least nodes per m² of a room's grid.")] = None,
-    max_err_dist: Annotated[float | None, typer.Option(help="Stop to its grid node at most, m.")] = None,
-    range_: Annotated[float | None, typer.Option("--range", help="Scanner's range, m.")] = None,
-    fov: Annotated[float | None, typer.Option(help="Scanner's field of view, degrees.")] = None,
-    coverage: Annotated[float | None, typer.Option(help="Least share of all that is visible.")] = None,
-    room_coverage: Annotated[float | None, typer.Option(help="Least share of what each room shows.")] = None,
-    kind_coverage: Annotated[float | None, typer.Option(help="Least share of each kind of element.")] = None,
-    coverage_rule: Annotated[
-        str | None, typer.Option(help="length, or paper (units of the whole, no least share of a room)")
-    ] = None,
-    d_sec: Annotated[float | None, typer.Option(help="Stop to element, m.")] = None,
-    d_dis: Annotated[float | None, typer.Option(help="Length of a unit, m.")] = None,
-    grid: Annotated[float | None, typer.Option(help="Spacing of grid candidates, m.")] = None,
-    d_max: Annotated[float | None, typer.Option(help="Longest seed segment of triangulation, m.")] = None,
-    l_min: Annotated[float | None, typer.Option(help="Least side of a triangle, m.")] = None,
-    dens_min: Annotated[float | None, typer.Option(help="Least candidates per m² of a room.")] = None,
-    door_access: Annotated[float | None, typer.Option(help="Least clear width of an opening, m.")] = None,
-    edge: Annotated[float | None, typer.Option(help="Stops and legs to floor edges, m.")] = None,
-    doors: Annotated[str | None, typer.Option(help="open or closed, for the laser")] = None,
-    door_scan: Annotated[
-        bool | None, typer.Option("--door-scan", help="Add a stop in every doorway driven through.")
-    ] = None,
-    door_candidates: Annotated[
-        bool | None, typer.Option("--door-candidates", help="Offer doorways as candidates.")
-    ] = None,
-    refine: Annotated[
-        bool | None,
-        typer.Option(
-            "--refine/--no-refine", help="Offer places beside the chosen stops too.", show_default=False
-        ),
-    ] = None,
-    use: Annotated[list[str] | None, typer.Option(help="X,Y of a stop that must be; repeatable.")] = None,
-    avoid: Annotated[list[str] | None, typer.Option(help="X,Y,RADIUS without stops; repeatable.")] = None,
-    targets: Annotated[str | None, typer.Option(help="Kinds to scan, such as walls,columns.")] = None,
-    layer: Annotated[
-        list[str] | None,
-        typer.Option(help="NAME=KIND of a layer, such as A-WALL=walls or DIM=ignore; repeatable."),
-    ] = None,
-    tour: Annotated[str | None, typer.Option(help="closed or open")] = None,
-    start: Annotated[str | None, typer.Option(help="X,Y,HEADING in m and degrees.")] = None,
-    end: Annotated[str | None, typer.Option(help="X,Y in m.")] = None,
-    origin: Annotated[str | None, typer.Option(help="LAT,LON,ALT,HEADING of the drawing's origin.")] = None,
-    robot_radius: Annotated[float | None, typer.Option(help="m; default half of door_access.")] = None,
-    speed: Annotated[float | None, typer.Option(help="Robot's speed, m/s.")] = None,
-    settle: Annotated[float | None, typer.Option(help="Standing still before a scan, s.")] = None,
-    scan_time: Annotated[float | None, typer.Option(help="Duration of a scan, s.")] = None,
-    tolerance: Annotated[float | None, typer.Option(help="Robot to stop at the start of a scan, m.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the tour search.")] = None,
+    *,
     all_parts: Annotated[bool, typer.Option(help="Also plan parts not connected with the first.")] = False,
     strict: Annotated[
         bool, typer.Option(help="Exit 1 if floor is left out or the plan is doubtful.")
     ] = False,
     print_config: Annotated[bool, typer.Option(help="Print plan.toml with these options and leave.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+    **given: Any,
 ) -> int:
     """Plan where the scanner must stand on a floor, and the route that visits those stops.
 
     Exit code 1: no plan can be made, or the robot would drive over lines that were not read; with --strict
     also where floor is left out or the plan is doubtful.
     """
-    options = dict(locals())
     from mission.settings import read_settings, settings_toml
+    from planner.options import values_of
 
-    given = {key.rstrip("_"): value for key, value in options.items() if key not in NOT_SETTINGS}
-    for key in ("start", "end", "origin"):
-        given[key] = None if given[key] is None else numbers(given[key], key)
-    for key in ("use", "avoid"):
-        given[key] = tuple(numbers(text, key) for text in given[key]) if given[key] else None
-    given["layers"] = tuple(given.pop("layer")) if layer else None
-    given.pop("layer", None)
-    given["targets"] = None if targets is None else tuple(kind.strip() for kind in targets.split(","))
-    settings = read_settings(parameters, given)
+    settings = read_settings(parameters, values_of(given))
     if print_config:
         typer.echo(settings_toml(settings))
         return 0
@@ -141,9 +72,6 @@ def plan_command(
     reports = plan_files(floor, out, settings, all_parts=all_parts)
     _print(reports, as_json=as_json)
     return max(report.strict_answer if strict else report.answer for report in reports)
-
-
-NOT_SETTINGS = ("floor", "out", "parameters", "all_parts", "strict", "print_config", "as_json")
 
 
 def _print(reports: list[PlanReport], *, as_json: bool) -> None:

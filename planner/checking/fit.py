@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
-import msgspec
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
@@ -35,7 +34,7 @@ ALLOWED = SLACK + CLEAR_SLACK
 def misfits_on(floor: FloorPlan, mission: Mission, settings: Settings) -> Iterator[Problem]:
     """Stops and legs that come too near an element, a closed opening or a floor edge, or leave the floor."""
     radius = max(settings.radius, mission.robot.radius)
-    fit = _Fit(floor, msgspec.structs.replace(settings, robot_radius=radius))
+    fit = _Fit(floor, replace(settings, robot_radius=radius))
     for index, stop in enumerate(mission.stops):
         path = f"$.stops[{index}]"
         yield from fit.stop(path, stop)

@@ -14,7 +14,7 @@ from mission.document import Mission
 from mission.floor import Element, FloorPlan, Opening, Room
 from mission.geometry import FloatArray, Polygon, frozen
 from mission.kinds import KINDS
-from mission.settings import Settings
+from mission.settings import PARAMETERS, Settings
 from planner import plan
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
@@ -169,5 +169,5 @@ def planned(floor: FloorPlan, settings: Settings | None = None) -> tuple[Mission
 
 def changed(settings: Settings) -> list[str]:
     """The settings that are not the default."""
-    values = {key: getattr(settings, key) for key in settings.__struct_fields__}
+    values = {key: getattr(settings, key) for key in PARAMETERS}
     return [f"{key}={value}" for key, value in values.items() if value != getattr(Settings(), key)]

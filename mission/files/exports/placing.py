@@ -8,8 +8,9 @@ import msgspec
 
 from mission.document import Frame, Mission, SiteOrigin, Transform
 from mission.errors import InputError
+from mission.parameter import numbers
 from mission.problems import FAR
-from mission.settings import HOW, read_settings
+from mission.settings import PARAMETERS, read_settings
 
 MAP = "write X,Y,HEADING in metres and degrees, such as 1.5,2,90"
 
@@ -41,24 +42,19 @@ def moved(mission: Mission, there: Mission) -> tuple[str, ...]:
     )
 
 
-def numbers(text: str, option: str, how: str) -> tuple[float, ...]:
-    """The numbers in `1,2.5,-3`, given for an option; `how` says how to write them."""
-    try:
-        return tuple(map(float, text.split(",")))
-    except ValueError:
-        raise InputError(f"--{option} {text}: {how}") from None
-
-
 def _site_origin(text: str) -> SiteOrigin:
     """Checked as the same option of `stopgo plan`."""
-    place = read_settings(None, {"origin": numbers(text, "origin", HOW["origin"])}).origin
+    place = read_settings(None, {"origin": PARAMETERS["origin"].given(text)}).origin
     assert place is not None
     lat, lon, alt, heading = place
     return SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=heading)
 
 
 def _transform(text: str) -> Transform:
-    found = numbers(text, "map", MAP)
+    try:
+        found = numbers(text)
+    except ValueError:
+        raise InputError(f"--map {text}: {MAP}") from None
     if len(found) != 3 or not all(abs(number) < FAR for number in found):
         raise InputError(f"--map {text}: {MAP}")
     return Transform(x=found[0], y=found[1], heading=math.radians(found[2]))

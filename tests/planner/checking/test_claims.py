@@ -114,7 +114,7 @@ def test_both_figures_are_told() -> None:
 def test_less_than_the_coverage_asked_for_is_told_with_its_share() -> None:
     mission, nouns = planned(HALL, Settings(coverage=0.5, room_coverage=0, kind_coverage=0, range=3))
     space = nouns[NavigableSpace]
-    asked = replace(space, settings=change(space.settings, coverage=1.0))
+    asked = replace(space, settings=replace(space.settings, coverage=1.0))
     found = recount(mission, asked)
     (problem,) = overclaims(mission, found, None)
     assert str(problem) == f"$.origin.parameters.coverage: is 1, but the stops see {found.in_words()}"
@@ -133,7 +133,7 @@ def test_candidates_of_another_program_are_not_loaded() -> None:
     """A mission may come from anywhere: checking it must run nothing that it names."""
     mission, nouns = planned(HALL)
     space = nouns[NavigableSpace]
-    settings = change(space.settings, candidates="tests.planner.no_such_module:generate")
+    settings = replace(space.settings, candidates="tests.planner.no_such_module:generate")
     found = recount(mission, replace(space, settings=settings))
     assert found.visible is None
     assert found.as_json()["share"] is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise, permutations
 
 import networkx as nx
@@ -187,9 +188,7 @@ def check_route(found: Route, xy: np.ndarray, settings: Settings) -> None:
 @pytest.mark.parametrize("name", sorted(ROUTERS))
 @pytest.mark.parametrize("kind", TOURS)
 def test_every_router_lies_between_its_bound_and_the_worst(kind: str, name: str) -> None:
-    import msgspec
-
-    settings = msgspec.structs.replace(TOURS[kind], router=name)
+    settings = replace(TOURS[kind], router=name)
     for seed, count in enumerate((1, 2, 3, 4, 5, 6, 7)):
         xy = free_points(count, seed)
         found = route(selection_at(floor_with_things(), xy, settings))
@@ -255,7 +254,6 @@ def test_the_part_that_holds_the_start_is_planned() -> None:
 
 
 def test_without_a_start_the_route_begins_at_the_widest_exterior_door() -> None:
-    from dataclasses import replace
 
     from tests.planner.worlds import door
 

@@ -1,0 +1,138 @@
+"""One parameter of a plan as it is declared once: what it means, what it may be, and how it is written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin
+
+from mission.errors import InputError
+
+LARGEST = 1e6
+FARTHEST = 1e9
+"""Coordinates of a site may be this large, in metres."""
+
+
+def numbers(text: str) -> tuple[float, ...]:
+    """The numbers in `1,2.5,-3`."""
+    return tuple(map(float, text.split(",")))
+
+
+def words(text: str) -> tuple[str, ...]:
+    """The words in `walls,columns`."""
+    return tuple(part.strip() for part in text.split(","))
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What is said of a parameter where it is declared; its name, type and default stand beside it."""
+
+    section: str
+    """The table of plan.toml it stands in."""
+    help: str
+    unit: str = ""
+    above: float | None = None
+    least: float | None = None
+    below: float | None = None
+    most: float | None = None
+    why: str = ""
+    """Why the limits are as they are, or an example."""
+    undecided: str = "none"
+    """What is taken if nothing is given."""
+    form: str = ""
+    """How a value of more than one number or word is written …"""
+    example: str = ""
+    read: Callable[[str], Any] = numbers
+    """… and read."""
+    known: tuple[str, ...] = ()
+    """What such words may be."""
+    option: str = ""
+    """The option's name, where it is another. Such an option, as every list of lists, may be repeated."""
+    name: str = ""
+    type: Any = None
+    default: Any = None
+
+    @property
+    def meaning(self) -> str:
+        """What it is for, with its unit or the words it may be."""
+        unit = f", {self.unit}" if self.unit else ""
+        return f"{self.help}{unit}{': ' if self.choices else ''}{', '.join(self.choices)}"
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The words it may be, where they are fixed."""
+        parts = (self.type, *get_args(self.type))
+        return tuple(word for part in parts if get_origin(part) is Literal for word in get_args(part))
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether the option may be given several times."""
+        return self.default == ()
+
+    @property
+    def plain(self) -> type:
+        """The type of the option's value: bool, int, float or str."""
+        return next((kind for kind in (bool, int, float) if kind in (self.type, *get_args(self.type))), str)
+
+    @property
+    def right(self) -> str:
+        """How to write it, if it is more than one number or word, or what it may be."""
+        if self.form:
+            each = " for each" if self.repeatable else ""
+            known = f"; known: {', '.join(self.known)}" if self.known else ""
+            return f"write {self.form}{each}, such as {self.example}{known}"
+        return f"known: {', '.join(self.choices)}" if self.choices else ""
+
+    def given(self, text: Any) -> Any:
+        """The value of what was given as the option.
+
+        Raises
+        ------
+        InputError
+            Naming the parameter, the text and how it is written.
+        """
+        if text is None or not self.form:
+            return text
+        return (tuple(map(self._read, text)) or None) if self.repeatable else self._read(text)
+
+    def _read(self, text: str) -> Any:
+        try:
+            return self.read(text)
+        except ValueError:
+            raise InputError(f"{self.name} = {text}: {self.right}") from None
+
+    def check(self, value: Any) -> None:
+        """Refuse a value beyond the limits, naming the parameter and the value."""
+        limit = FARTHEST if isinstance(value, tuple) else LARGEST
+        for number in _numbers_in(value):
+            if not math.isfinite(number) or abs(number) > limit:
+                raise InputError(f"{self.name} = {number}: must be a finite number below {limit:g}")
+        if value is not None and not self._within(value):
+            raise InputError(f"{self.name} = {value}: {self.limits}")
+
+    def _within(self, value: Any) -> bool:
+        return (
+            (self.above is None or value > self.above)
+            and (self.least is None or value >= self.least)
+            and (self.below is None or value < self.below)
+            and (self.most is None or value <= self.most)
+            and (not self.choices or value in self.choices)
+        )
+
+    @property
+    def limits(self) -> str:
+        """What the value must be, in words."""
+        if self.choices:
+            return self.right
+        bounds = {"above": self.above, "at least": self.least, "below": self.below, "at most": self.most}
+        told = " and ".join(f"{word} {bound:g}" for word, bound in bounds.items() if bound is not None)
+        usual = {"above 0": "must be greater than 0", "at least 0": "must not be negative"}
+        return usual.get(told, f"must be {told}") + (f" ({self.why})" if self.why else "")
+
+
+def _numbers_in(value: object) -> list[float]:
+    """All numbers in a value, however deep."""
+    if isinstance(value, tuple):
+        return [number for item in value for number in _numbers_in(item)]
+    return [value] if isinstance(value, int | float) and not isinstance(value, bool) else []

@@ -1,0 +1,59 @@
+"""The options of `stopgo plan`: one for every parameter, as mission/settings.py declares it."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Annotated, Any, cast
+
+import typer
+
+from mission.parameter import Parameter
+from mission.settings import PARAMETERS
+
+
+def with_options(command: Callable[..., int]) -> Callable[..., int]:
+    """The command with an option for every parameter in place of its `**given`, after its positional ones."""
+    *own, _ = inspect.signature(command, eval_str=True).parameters.values()
+    first, last = [[p for p in own if (p.kind == p.KEYWORD_ONLY) is late] for late in (False, True)]
+    whole: Any = functools.wraps(command)(functools.partial(command))
+    whole.__signature__ = inspect.Signature([*first, *map(_option, PARAMETERS.values()), *last])
+    return cast(Callable[..., int], whole)
+
+
+def values_of(options: dict[str, Any]) -> dict[str, Any]:
+    """The values of the options that were given, by the parameters' names."""
+    return {name: parameter.given(options[_key(parameter)]) for name, parameter in PARAMETERS.items()}
+
+
+def _key(parameter: Parameter) -> str:
+    return parameter.option or parameter.name
+
+
+def _option(parameter: Parameter) -> inspect.Parameter:
+    kind = list[str] if parameter.repeatable else parameter.plain
+    name = "--" + _key(parameter).replace("_", "-")
+    told = typer.Option(
+        *([f"{name}/--no-{name[2:]}"] if parameter.default is None and kind is bool else [name]),
+        metavar=parameter.form.upper() or "|".join(parameter.choices) or None,
+        help=f"{_help(parameter)}  [default: {_default(parameter)}]",
+        show_default=False,
+    )
+    return inspect.Parameter(
+        _key(parameter), inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, told]
+    )
+
+
+def _help(parameter: Parameter) -> str:
+    unit = f", {parameter.unit}" if parameter.unit else ""
+    return f"{parameter.help}{unit}{'; repeatable' * parameter.repeatable}."
+
+
+def _default(parameter: Parameter) -> str:
+    value = parameter.default
+    if value in (None, ()):
+        return parameter.undecided
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,137 @@
+"""Parameters are declared once: file, options, help, checks and Python say the same of each."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+import stopgo
+from mission.__main__ import main
+from mission.errors import InputError
+from mission.settings import PARAMETERS, Settings, check_settings, read_settings, settings_toml
+
+OTHER: dict[str, Any] = {
+    "room_coverage": 0.5,
+    "kind_coverage": 0.5,
+    "targets": ("walls",),
+    "layers": ('odd "\\ name=walls',),
+    "start": (1.0, 2.0, 90.0),
+    "end": (3.0, 4.0),
+    "use": ((1.0, 2.0), (3.0, 4.0)),
+    "avoid": ((1.0, 2.0, 3.0),),
+    "refine": False,
+    "time_limit": 3.0,
+    "origin": (47.0, 8.5, 400.0, 10.0),
+    "robot_radius": 0.3,
+    "coverage": 0.8,
+    "fov": 180.0,
+    "battery_min": 0.2,
+}
+
+
+def other(name: str) -> Any:
+    """A value that is not the default."""
+    parameter = PARAMETERS[name]
+    if name in OTHER:
+        return OTHER[name]
+    if parameter.choices:
+        return next(word for word in parameter.choices if word != parameter.default)
+    if isinstance(parameter.default, bool):
+        return not parameter.default
+    return parameter.default + 1 if isinstance(parameter.default, int | float) else "other"
+
+
+def typed(name: str, value: Any) -> list[str]:
+    """The options with which a person gives a value."""
+    option = "--" + (PARAMETERS[name].option or name).replace("_", "-")
+    if isinstance(value, bool):
+        return [option if value else f"--no-{option[2:]}"]
+    many = value if PARAMETERS[name].repeatable else (value,)
+    return [f"{option}={','.join(map(str, one)) if isinstance(one, tuple) else one}" for one in many]
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_a_parameter_is_the_same_as_option_in_the_file_and_in_python(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    expected = replace(Settings(), **{name: other(name)})
+    assert expected != Settings()
+    made = stopgo.settings(**{name: other(name)})
+    assert made == expected
+    assert msgspec.to_builtins(made) == msgspec.to_builtins(expected)  # as missions and recordings tell it
+    assert main(["plan", "--print-config", *typed(name, other(name))]) == 0
+    (tmp_path / "plan.toml").write_text(capsys.readouterr().out, encoding="utf-8")
+    assert read_settings(tmp_path / "plan.toml", {}) == expected
+
+
+def test_help_shows_every_option_with_its_default(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "--help"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    for name, parameter in PARAMETERS.items():
+        option = "--" + (parameter.option or name).replace("_", "-")
+        said = told[told.index(f" {option} ") :]
+        shown = re.match(r".*?\[default: (.*?)\]", said)
+        assert shown, name
+        if isinstance(parameter.default, float):
+            assert float(shown.group(1)) == parameter.default
+
+
+def limits() -> list[tuple[str, float]]:
+    """Values just beyond each declared limit."""
+    found = []
+    for name, parameter in PARAMETERS.items():
+        found += [(name, limit) for limit in (parameter.above, parameter.below) if limit is not None]
+        if parameter.least is not None:
+            found.append((name, math.nextafter(parameter.least, -math.inf)))
+        if parameter.most is not None:
+            found.append((name, math.nextafter(parameter.most, math.inf)))
+    return found
+
+
+@pytest.mark.parametrize(("name", "value"), limits())
+def test_a_value_beyond_a_limit_is_refused_by_name(name: str, value: float) -> None:
+    with pytest.raises(InputError, match=f"^{name} = .*: must "):
+        check_settings(replace(Settings(), **{name: value}))
+
+
+@pytest.mark.parametrize("name", [name for name, p in PARAMETERS.items() if p.plain in (int, float)])
+def test_no_number_is_endless(name: str) -> None:
+    for value in (math.nan, math.inf, -math.inf, 1e7):
+        with pytest.raises(InputError, match=f"^{name} = "):
+            check_settings(replace(Settings(), **{name: value}))
+
+
+MESSAGES = {
+    "speed": (0.0, "speed = 0.0: must be greater than 0"),
+    "settle": (-1.0, "settle = -1.0: must not be negative"),
+    "coverage": (90.0, "coverage = 90.0: must be above 0 and at most 1 (0.9 is 90 %)"),
+    "battery_min": (1.0, "battery_min = 1.0: must be at least 0 and below 1 (0.15 is 15 %)"),
+    "doors": ("ajar", "doors = ajar: known: open, closed"),
+    "start": ((1.0,), "start = 1: write X,Y,HEADING, such as 2.5,3.0,90"),
+    "use": ((1.0,), "use = 1: write X,Y for each, such as 2.5,3.0"),
+    "range": ("far", "range = far: Expected `float`, got `str`"),
+}
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_a_refusal_says_what_would_be_right(name: str) -> None:
+    value, message = MESSAGES[name]
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        stopgo.settings(**{name: value})
+
+
+def test_a_parameter_that_is_none_is_named() -> None:
+    with pytest.raises(InputError, match=r"^colour: no such parameter; known: candidates, "):
+        stopgo.settings(colour="red")
+
+
+def test_the_printed_file_explains_itself() -> None:
+    lines = settings_toml(Settings()).splitlines()
+    assert lines[lines.index("d_sec = 0.7") - 1] == "# Stop to element, m"
+    assert "# robot_radius = (half of door_access)" in lines
