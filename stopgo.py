@@ -43,23 +43,22 @@ def settings(parameters: str | Path | None = None, **changes: Any) -> Settings:
     return read_settings(None if parameters is None else Path(parameters), changes)
 
 
-def read_floor(
-    path: str | Path, *, layers: Mapping[str, str] | None = None, d_dis: float = 0.05
-) -> FloorPlan:
-    """The floor drawn in a file, in metres.
+def read_floor(path: str | Path, *, layers: Mapping[str, str] | None = None, **options: Any) -> FloorPlan:
+    """The floor in a file, in metres.
 
     `layers` says what layers of other names stand for, such as `{"A-WALL": "walls", "DIM": "ignore"}`;
-    curves are cut for units of `d_dis` metres.
+    `options` are the others of planner.floors.FloorOptions, such as `d_dis` for how curves are cut.
 
     Raises
     ------
     InputError
         Naming the file, what is wrong with it, and the way out.
     """
+    from planner.floors import FloorOptions
     from planner.floors import read_floor as read
 
     told = {name.upper(): role for name, role in (layers or {}).items()}
-    return read(Path(path), d_dis=d_dis, layers=told)
+    return read(Path(path), FloorOptions(layers=told, **options))
 
 
 def plan(
@@ -91,12 +90,14 @@ def plan(
         A file, parameter or place that does not fit.
     """
     from planner import plan as planned
+    from planner.floors import options_of
+    from planner.floors import read_floor as read
 
     if given is not None and changes:
         raise TypeError(f"give settings, or parameters by name, not both: {', '.join(changes)}")
     used = settings(**changes) if given is None else given
     if isinstance(floor, str | Path):
-        floor = read_floor(floor, layers=used.layer_roles, d_dis=used.d_dis)
+        floor = read(Path(floor), options_of(used))
     return planned(floor, used, observe=observe, all_parts=all_parts)
 
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from mission.floor import Element, FloorPlan, Opening, Room
+from mission.floor_source import FloorSource
 from mission.geometry import Polygon, frozen
 from mission.kinds import KINDS
 
@@ -28,7 +29,7 @@ def office(width: float, height: float, *, seed: int) -> FloorPlan:
     _outer(width, height, elements)
     return FloorPlan(
         name=f"office {width:.0f} x {height:.0f} m, seed {seed}",
-        digest=f"{seed:064x}",
+        source=FloorSource("office.dxf", f"{seed:064x}"),
         outline=(_box(0, 0, width, height),),
         rooms=tuple(rooms),
         openings=tuple(openings),

@@ -32,13 +32,13 @@ from mission.planning import (
 )
 from mission.settings import Settings
 from planner.candidates import candidates
-from planner.floors import read_floor
+from planner.floors import FloorOptions, read_floor
 from planner.routing import GRAPHS, ROUTERS, route
 from planner.selection import select
 from planner.selection.cover import cover_of
 from planner.selection.demands import demands_of
 from planner.selection.greedy import greedy as choose_greedily
-from planner.sight.sight import sight
+from planner.sight import sight
 from planner.space.navigable import navigable
 from planner.visibility.bresenham import bresenham
 from planner.visibility.exact_sight import exact
@@ -80,7 +80,7 @@ class Case:
 
     @cached_property
     def floor(self) -> FloorPlan:
-        return read_floor(FLOORS / f"synthetic_{self.name}.dxf", d_dis=self.settings.d_dis)
+        return read_floor(FLOORS / f"synthetic_{self.name}.dxf", FloorOptions(d_dis=self.settings.d_dis))
 
 
 STRUCTURAL = Settings(edge=0.0, coverage_rule="paper")

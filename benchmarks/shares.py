@@ -13,7 +13,7 @@ from mission.planning import Selection, Visibility
 from mission.settings import Settings
 from planner import plan
 from planner.candidates import candidates
-from planner.floors import read_floor
+from planner.floors import FloorOptions, read_floor
 from planner.refine import refined
 from planner.selection import select
 from planner.space.navigable import navigable
@@ -71,7 +71,7 @@ def main() -> None:
 def cost_row(name: str, path: Path, options: dict[str, float]) -> list[str]:
     """Stops and bound at each share."""
     settings = Settings(**options)
-    floor = read_floor(path, d_dis=settings.d_dis)
+    floor = read_floor(path, FloorOptions(d_dis=settings.d_dis))
     seen = visibility(candidates(navigable(floor, settings)))
     return [name, *(f"{len(s.chosen)} / {s.bound}" for s in _selections(seen))]
 
@@ -89,7 +89,7 @@ def plan_rows(name: str, path: Path, options: dict[str, float]) -> Iterator[list
     for rule in ("paper", "length"):
         settings = Settings(**options, coverage_rule=rule)
         begin = time.perf_counter()
-        made = plan(read_floor(path, d_dis=settings.d_dis), settings)
+        made = plan(read_floor(path, FloorOptions(d_dis=settings.d_dis)), settings)
         took = time.perf_counter() - begin
         selection, figures = made.selection, made.figures
         told = _by_length(selection, figures)

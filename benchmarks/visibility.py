@@ -17,10 +17,10 @@ from benchmarks.table import median_seconds, put, table, versions
 from mission.floor import FloorPlan
 from mission.settings import Settings
 from planner.candidates import candidates
-from planner.floors import read_floor
+from planner.floors import FloorOptions, read_floor
 from planner.shapes import local_origin, to_grid, to_shape
+from planner.sight import sight as sight_module
 from planner.sight.sight import Scene, scene_of, sight
-from planner.sight.sight import sight as sight_module
 from planner.space.navigable import navigable
 from planner.visibility.exact_sight import open_space
 
@@ -69,7 +69,9 @@ def paper_rows() -> list[list[object]]:
             continue
         rooms = name.endswith("rooms")
         settings = Settings(edge=0.35 if rooms else 0.0, doors="closed" if rooms else "open")
-        scene, points, found = scene_and_points(read_floor(path, d_dis=settings.d_dis), settings)
+        scene, points, found = scene_and_points(
+            read_floor(path, FloorOptions(d_dis=settings.d_dis)), settings
+        )
         slow = timed(scene, points, reach=5.0, compiled=False)
         fast = timed(scene, points, reach=5.0, compiled=True)
         far = timed(scene, points, reach=None, compiled=True)

@@ -32,7 +32,7 @@ THINNER = 0.2
 
 def draw(folder: Path) -> None:
     """Plan the office, export it over its drawing, and draw what is then in the file."""
-    made = plan(read_floor(OFFICE, d_dis=0.05), Settings())
+    made = plan(read_floor(OFFICE), Settings())
     drawing = _layers(made.mission, made.route, folder)
     (folder / "exports-dxf.svg").write_text(_picture(drawing), encoding="utf-8")
 

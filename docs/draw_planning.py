@@ -36,7 +36,7 @@ from mission.planning import (
 from mission.seen import runs_of, seen_units
 from mission.settings import Settings
 from planner import plan
-from planner.floors import read_floor
+from planner.floors import FloorOptions, read_floor
 from planner.visibility.bresenham import bresenham
 
 OFFICE = Path("recordings/samples/office.dxf")
@@ -82,7 +82,7 @@ class Window:
 def office(**changes: Any) -> PartPlan:
     """The sample office, planned."""
     settings = Settings(**changes)
-    return plan(read_floor(OFFICE, d_dis=settings.d_dis), settings).first
+    return plan(read_floor(OFFICE, FloorOptions(d_dis=settings.d_dis)), settings).first
 
 
 def picture(window: Window, layers: Iterable[str], legend: Iterable[Mark]) -> str:

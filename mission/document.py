@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 
 import msgspec
 
+from mission.floor_source import FloorSource
 from mission.settings import Settings
 
 SCHEMA: Final = "stopgo/mission"
@@ -148,7 +149,7 @@ def sealed(mission: Mission) -> Mission:
     return msgspec.structs.replace(mission, digest=digest_of(mission))
 
 
-def mission_id(floor_digest: str, settings: Settings, version: str, part: int = 0) -> str:
+def mission_id(source: FloorSource, settings: Settings, version: str, part: int = 0) -> str:
     """Hash of floor, parameters, version and part: known before planning, and the recording id."""
-    basis = [floor_digest, msgspec.to_builtins(settings), version, part]
+    basis = [source.basis, msgspec.to_builtins(settings), version, part]
     return hashlib.sha256(canonical({"basis": basis})).hexdigest()[:32]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
+from mission.floor_source import FloorSource
 from mission.geometry import FloatArray, Polygon
 
 
@@ -120,8 +121,7 @@ class FloorPlan:
     """A floor in the drawing's own coordinates, in metres."""
 
     name: str
-    digest: str
-    """sha256 of the file's bytes, hexadecimal."""
+    source: FloorSource
     outline: tuple[Polygon, ...]
     """The floor layer: every part of it, holes included."""
     rooms: tuple[Room, ...] = ()
@@ -132,6 +132,11 @@ class FloorPlan:
     findings: tuple[Finding, ...] = ()
     ignored: tuple[IgnoredLine, ...] = ()
     """Lines that no plan may cross unsaid: nobody knows what they stand for."""
+
+    @property
+    def digest(self) -> str:
+        """sha256 of the file's bytes, hexadecimal."""
+        return self.source.digest
 
     @property
     def area(self) -> float:

@@ -48,7 +48,7 @@ def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
     check_legs(route)
     return sealed(
         Mission(
-            id=mission_id(floor.digest, settings, __version__, part),
+            id=mission_id(floor.source, settings, __version__, part),
             revision=revision,
             name=floor.name if part == 0 else f"{floor.name}-{part + 1}",
             digest="",

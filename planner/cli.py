@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mission.errors import InputError, StopgoError
+from planner.floor_commands import add_floor_commands
 
 if TYPE_CHECKING:
     from bridge.station.station import Station
@@ -35,6 +36,8 @@ def add_commands(app: typer.Typer) -> None:
     from planner.options import with_options
 
     app.command(name="plan", epilog=EXAMPLE)(with_options(plan_command))
+    add_floor_commands(app)
+    app.command(name="plan", epilog=EXAMPLE)(plan_command)
     app.command(name="demo", epilog="Example: stopgo demo -o recordings/demo")(demo_command)
 
 
@@ -90,11 +93,11 @@ def plan_files(floor: Path, out: Path, settings: Settings, *, all_parts: bool = 
     """Plan a floor's file into a folder; one report per part, the main part first."""
     from mission.files.atomic import must_be_writable
     from planner import plan
-    from planner.floors import read_floor
+    from planner.floors import options_of, read_floor
     from planner.outputs import names
 
     watch = Stopwatch()
-    read = read_floor(floor, d_dis=settings.d_dis, layers=settings.layer_roles)
+    read = read_floor(floor, options_of(settings))
     folder = _folder(out)
     for path in names(folder, 0).values():
         must_be_writable(path)
@@ -123,7 +126,7 @@ def _telling_findings(floor: FloorPlan) -> Iterator[None]:
 def _set_aside(folder: Path, parts: int, floor: FloorPlan, settings: Settings) -> None:
     from planner.outputs import set_aside
 
-    moved = set_aside(folder, parts, floor.digest, settings)
+    moved = set_aside(folder, parts, floor.source, settings)
     if moved:
         told = f"{folder}: of another plan, renamed so that nobody drives it: "
         typer.echo(f"{told}{', '.join(path.name for path in moved)}", err=True)

@@ -11,6 +11,7 @@ from mission import __version__
 from mission.document import mission_id
 from mission.errors import InputError
 from mission.files.mission_json import read
+from mission.floor_source import FloorSource
 from mission.settings import Settings
 
 NAMES = {
@@ -28,17 +29,17 @@ def names(folder: Path, number: int) -> dict[str, Path]:
     return {key: path.with_name(f"{path.stem}{suffix}{path.suffix}") for key, path in paths.items()}
 
 
-def set_aside(folder: Path, parts: int, digest: str, settings: Settings) -> list[Path]:
+def set_aside(folder: Path, parts: int, source: FloorSource, settings: Settings) -> list[Path]:
     """Rename what other plans left of further parts, so that nobody takes it for one of this plan.
 
-    `parts` have just been planned of the floor with this digest. A further part's mission stays if the
+    `parts` have just been planned of the floor from this source. A further part's mission stays if the
     same floor and settings would give it again; otherwise it and the files beside it get `.old` behind
     their names. Gives their new names. What cannot be read as a mission is somebody else's, and stays.
     """
     moved = []
     for number in _further(folder, parts):
         files = names(folder, number)
-        if _is_other(files["mission"], mission_id(digest, settings, __version__, number)):
+        if _is_other(files["mission"], mission_id(source, settings, __version__, number)):
             moved += [_renamed(path) for path in files.values() if path.exists()]
     return moved
 

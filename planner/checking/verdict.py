@@ -12,7 +12,7 @@ from mission.problems import Problem
 from mission.settings import read_settings
 from planner.checking.claims import Recount, overclaims, recount
 from planner.checking.fit import misfits_on, other_machine
-from planner.floors import read_floor
+from planner.floors import options_of, read_floor
 from planner.space.navigable import navigable
 
 
@@ -36,7 +36,7 @@ def verdict(mission: Mission, path: Path, coverage: Coverage | None) -> Verdict:
         settings = read_settings(None, mission.origin.parameters)
     except InputError as error:
         return Verdict((Problem("$.origin.parameters", f"are not those of a plan: {error}"),))
-    floor = read_floor(path, d_dis=settings.d_dis, layers=settings.layer_roles)
+    floor = read_floor(path, options_of(settings))
     misfits = (*other_machine(mission, settings), *misfits_on(floor, mission, settings))
     try:
         counted = recount(mission, navigable(floor, settings))

@@ -1,39 +1,97 @@
-"""Reads a building floor from a file: one reader per suffix, one line in `READERS` per new format."""
+"""Reads a building floor from a file: one module per kind of file, one entry in `READERS` for each.
+
+A reader's module has two functions, `survey(file, options) -> Survey` and `read(file, options) -> FloorPlan`
+(planner.floors.reader.ReaderModule). It is found by the file's suffix and by what its bytes look like.
+"""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mission.errors import InputError
 from mission.floor import FloorPlan
-from planner.floors.dxf import read_dxf
+from planner.floors.reader import FloorFile, FloorOptions, Reader
+from planner.floors.survey import Survey
 
-Reader = Callable[..., FloorPlan]
-"""`(data: bytes, *, source: Path, digest: str, d_dis: float, layers: Mapping[str, str]) -> FloorPlan`."""
+if TYPE_CHECKING:
+    from mission.settings import Settings
 
-READERS: dict[str, Reader] = {".dxf": read_dxf}
-"""Reader of each suffix."""
+READERS: tuple[Reader, ...] = (
+    Reader(
+        kind="DXF drawing",
+        suffixes=(".dxf",),
+        holds=lambda data: data.startswith(b"AutoCAD Binary DXF") or b"\nSECTION" in data[:4096],
+        module="planner.floors.dxf",
+        takes=frozenset({"layers"}),
+    ),
+)
+"""Every kind of file that floors are read from."""
 
 
-def read_floor(path: Path, *, d_dis: float, layers: Mapping[str, str] | None = None) -> FloorPlan:
-    """The floor drawn in `path`, in metres; circles are cut by Eq. 1 for units of `d_dis` metres.
-
-    `layers` says what layers of other names stand for: names in capitals, kinds as in LAYER_ROLES.
+def read_floor(path: Path, options: FloorOptions | None = None) -> FloorPlan:
+    """The floor in a file, in metres.
 
     Raises
     ------
     InputError
-        One line naming the file, what is wrong with it, and the way out.
+        One line naming the file, what is wrong with it, and the way out; also for an option that means
+        nothing to such a file.
     """
-    data = _bytes_of(path)
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        known = ", ".join(READERS)
-        raise InputError(f"{path}: unknown kind of file '{path.suffix}'; floors are read from {known}")
-    digest = hashlib.sha256(data).hexdigest()
-    return reader(data, source=path, digest=digest, d_dis=d_dis, layers=layers or {})
+    file, reader, options = _opened(path, options)
+    return reader.load().read(file, options)
+
+
+def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
+    """What is in a floor's file, and what would be read of it with these options.
+
+    Raises
+    ------
+    InputError
+        As `read_floor` does.
+    """
+    file, reader, options = _opened(path, options)
+    return reader.load().survey(file, options)
+
+
+def options_of(settings: Settings) -> FloorOptions:
+    """What a plan's settings tell a reader."""
+    return FloorOptions(d_dis=settings.d_dis, layers=settings.layer_roles)
+
+
+def _opened(path: Path, options: FloorOptions | None) -> tuple[FloorFile, Reader, FloorOptions]:
+    """The file, its reader, and the options, all of which mean something to the reader."""
+    options = options or FloorOptions()
+    file = FloorFile(path, _bytes_of(path))
+    reader = _reader_of(file)
+    vain = [name for name in options.given if name not in reader.takes]
+    if vain:
+        raise InputError(
+            f"{path}: --{_option(vain[0])} means nothing for a {reader.kind}; "
+            f"leave it out (known for it: {_listed(reader.takes)})"
+        )
+    return file, reader, options
+
+
+def _reader_of(file: FloorFile) -> Reader:
+    """By suffix, unless the bytes are plainly those of another kind."""
+    suffix = file.path.suffix.lower()
+    named = [reader for reader in READERS if suffix in reader.suffixes]
+    alike = [reader for reader in READERS if reader.holds(file.data)]
+    for reader in (*(item for item in named if item in alike), *alike, *named):
+        return reader
+    known = ", ".join(suffix for reader in READERS for suffix in reader.suffixes)
+    raise InputError(f"{file.path}: unknown kind of file '{suffix}'; floors are read from {known}")
+
+
+def _option(name: str) -> str:
+    """How the command line calls an option."""
+    return {"layers": "layer"}.get(name, name.replace("_", "-"))
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(sorted(f"--{_option(name)}" for name in names)) or "no such options"
 
 
 def _bytes_of(path: Path) -> bytes:
@@ -48,3 +106,6 @@ def _bytes_of(path: Path) -> bytes:
     if not data.strip():
         raise InputError(f"{path}: is empty ({len(data)} bytes); export the floor again")
     return data
+
+
+__all__ = ["READERS", "FloorFile", "FloorOptions", "Reader", "options_of", "read_floor", "survey_floor"]

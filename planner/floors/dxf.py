@@ -5,6 +5,7 @@ The bytes become a drawing, the drawing shapes on layers, these strokes in metre
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,25 +14,67 @@ import numpy as np
 from ezdxf.document import Drawing
 
 from mission.floor import Finding, FloorPlan
+from mission.floor_source import FloorSource
+from mission.geometry import bounds
 from planner.floors.drawing import metres_per_unit, open_drawing
 from planner.floors.drawn_shapes import Shape, shapes_of
 from planner.floors.parts import in_order, parts_of
+from planner.floors.reader import FloorFile, FloorOptions
 from planner.floors.strokes import sketch, strokes_of
+from planner.floors.survey import FloorChoice, LayerUse, Survey
 
 
-def read_dxf(
-    data: bytes, *, source: Path, digest: str, d_dis: float, layers: Mapping[str, str] | None = None
-) -> FloorPlan:
-    """The floor that the bytes of a DXF hold.
+def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
+    """The floor that a DXF holds.
 
     Raises
     ------
     InputError
         When the bytes are no complete DXF, or no closed outline lies on layer FLOOR.
     """
-    drawing, odd_file = open_drawing(data, source=source)
-    read = floor_in(drawing, source=source, digest=digest, d_dis=d_dis, layers=layers)
-    return replace(read, findings=in_order((*odd_file, *read.findings)))
+    drawing, odd_file = open_drawing(file.data, source=file.path)
+    floor = floor_in(
+        drawing, source=file.path, digest=file.digest, d_dis=options.d_dis, layers=options.layers
+    )
+    return replace(floor, findings=in_order((*odd_file, *floor.findings)))
+
+
+def survey(file: FloorFile, options: FloorOptions) -> Survey:
+    """What a layered DXF holds: one floor, and what each of its layers stands for."""
+    drawing, _ = open_drawing(file.data, source=file.path)
+    floor = read(file, options)
+    return Survey(
+        file=file.path.name,
+        kind=f"DXF drawing, {drawing.dxfversion}",
+        digest=file.digest,
+        floors=(_choice(floor),),
+        layers=_layers(drawing, source=file.path, told=options.layers),
+        findings=floor.findings,
+    )
+
+
+def _choice(floor: FloorPlan) -> FloorChoice:
+    kinds = (*(item.kind for item in floor.elements), *(f"{item.kind}s" for item in floor.openings))
+    return FloorChoice(
+        name=floor.name,
+        option="",
+        area_m2=floor.area,
+        bounds=bounds([part.exterior for part in floor.outline]),
+        elements={"rooms": len(floor.rooms), **Counter(kinds)},
+        chosen=True,
+    )
+
+
+def _layers(drawing: Drawing, *, source: Path, told: Mapping[str, str]) -> tuple[LayerUse, ...]:
+    """What each layer that holds anything was taken for."""
+    shapes, _ = shapes_of(drawing, source=source, layers=told)
+    counts = Counter((shape.layer, shape.role) for shape in shapes)
+    return tuple(
+        LayerUse(layer, role, "as told" if layer.upper() in told else "its name", taken=count)
+        if role != "other"
+        else LayerUse(layer, role, "no known name", ignored=count)
+        for (layer, role), count in sorted(counts.items())
+    )
 
 
 def floor_in(
@@ -45,7 +88,7 @@ def floor_in(
     parts = parts_of(strokes, words, source=source, layers=present, skipped=_skipped(odd_strokes))
     return FloorPlan(
         name=source.stem,
-        digest=digest,
+        source=FloorSource(source.name, digest),
         outline=parts.outline,
         rooms=parts.rooms,
         openings=parts.openings,
@@ -56,7 +99,7 @@ def floor_in(
 
 
 def metres_in(drawing: Drawing, *, source: Path) -> float:
-    """Length of one drawing unit in metres, as `read_dxf` takes it: what is drawn over a floor needs it."""
+    """Length of one drawing unit in metres, as `read` takes it: what is drawn over a floor needs it."""
     shapes, _ = shapes_of(drawing, source=source)
     return _scale(drawing, shapes)[0]
 

@@ -21,6 +21,7 @@ from mission.document import (
     sealed,
 )
 from mission.floor import Element, FloorPlan, Opening, Room
+from mission.floor_source import FloorSource
 from mission.geometry import Polygon, frozen
 from mission.kinds import KINDS
 from mission.planning import (
@@ -80,7 +81,7 @@ def room_floor() -> FloorPlan:
     columns = [Polygon.of(box(x, 1.8, x + 0.4, 2.2)) for x in (2.4, 5.2)]
     return FloorPlan(
         name="room",
-        digest="0" * 64,
+        source=FloorSource("test.dxf", "0" * 64),
         outline=(Polygon.of(box(-0.2, -0.2, 8.2, 4.2)),),
         rooms=(Room("R1", "Hall <1> & co", (Polygon.of(inner),)),),
         openings=(

@@ -29,7 +29,7 @@ from tests.planner.worlds import FLOORS, SHARED, changed, moved, planned, shifte
 def floor(name: str) -> FloorPlan:
     if not (SHARED / name).exists():
         pytest.skip(f"{SHARED / name} is not there")
-    return read_floor(Path(SHARED / name), d_dis=0.05)
+    return read_floor(Path(SHARED / name))
 
 
 @lru_cache
@@ -129,7 +129,7 @@ SAMPLE = Path(__file__).parents[2] / "recordings" / "samples" / "office.dxf"
 
 
 def test_a_floor_with_one_room_not_drawn_is_planned_all_the_same() -> None:
-    office = read_floor(SAMPLE, d_dis=0.05)
+    office = read_floor(SAMPLE)
     mission, nouns = planned(office)
     for name in ("105 Corridor", "104 Open office"):
         less = replace(office, rooms=tuple(room for room in office.rooms if room.name != name))

@@ -12,6 +12,7 @@ import numpy as np
 
 from mission.document import Mission
 from mission.floor import Element, FloorPlan, Opening, Room
+from mission.floor_source import FloorSource
 from mission.geometry import FloatArray, Polygon, frozen
 from mission.kinds import KINDS
 from mission.settings import PARAMETERS, Settings
@@ -86,7 +87,7 @@ def floor_of(
 ) -> FloorPlan:
     return FloorPlan(
         name=name,
-        digest="0" * 64,
+        source=FloorSource("test.dxf", "0" * 64),
         outline=tuple(outline),
         rooms=tuple(rooms),
         openings=tuple(openings),

@@ -20,6 +20,7 @@ from mission.document import (
 )
 from mission.events import Pose
 from mission.floor import Element, Finding, FloorPlan, Opening, Room
+from mission.floor_source import FloorSource
 from mission.geometry import Polygon, frozen
 from mission.planning import (
     Candidates,
@@ -63,7 +64,7 @@ def floor_at(x: float = 0.0, y: float = 0.0) -> FloorPlan:
     )
     return FloorPlan(
         name="small room",
-        digest=FLOOR_DIGEST,
+        source=FloorSource("small.dxf", FLOOR_DIGEST),
         outline=(Polygon.of(box(x, y, 7.4, 4.4).exterior, [box(x + 5.2, y + 3.2, 0.6, 0.6).exterior]),),
         rooms=(Room("r1", "Room 1", (box(x + 0.2, y + 0.2, 6.0, 4.0),)),),
         openings=(Opening("d1", "door", frozen([(x + 6.3, y + 1.7), (x + 6.3, y + 2.7)])),),
@@ -189,7 +190,10 @@ def mission_of(route: Route) -> Mission:
             return_=None,
             policy=Policy(link_loss="continue", link_loss_after_s=30.0, battery_min=0.15),
             origin=Origin(
-                floor="small.dxf", floor_digest=FLOOR_DIGEST, parameters={"seed": 1}, stopgo="0.1.0"
+                floor="small.dxf",
+                floor_digest=FLOOR_DIGEST,
+                parameters={"seed": 1},
+                stopgo="0.1.0",
             ),
         )
     )

@@ -22,6 +22,7 @@ from mission.document import (
 )
 from mission.errors import InputError
 from mission.files.imports.track import Track, Visit
+from mission.floor_source import FloorSource
 from mission.problems import problems_of
 from mission.settings import Settings
 from mission.specs import origin_of, policy_of, robot_of, rounded, scan_of, scanner_of, site_origin_of
@@ -44,7 +45,7 @@ def mission_of(track: Track, settings: Settings, *, name: str, file: str, digest
     start = _start(track, settings, legs[0], file)
     mission = sealed(
         Mission(
-            id=mission_id(digest, settings, __version__),
+            id=mission_id(FloorSource(file, digest), settings, __version__),
             revision=1,
             name=name,
             digest="",

@@ -41,7 +41,7 @@ pytestmark = pytest.mark.skipif(not LAYERED.is_dir(), reason=f"the real inputs a
 @cache
 def planned(name: str) -> tuple[Mission, bytes]:
     """The mission of a floor and its coverage.json, planned once."""
-    floor = read_floor(LAYERED / f"{name}.dxf", d_dis=0.05)
+    floor = read_floor(LAYERED / f"{name}.dxf")
     settings = Settings(origin=(47.3769, 8.5417, 408.0, 30.0))
     made = plan(floor, settings)
     return made.mission, coverage_json(made.route, made.mission)

@@ -221,7 +221,7 @@ def test_counts_stay_near_the_paper_s(name: str, paper: tuple[int, int], ours: t
     """Table 3, generated and left; ours are recorded so that a change is noticed."""
     from planner.floors import read_floor
 
-    floor = read_floor(SHARED / "paper" / f"synthetic_{name}.dxf", d_dis=0.05)
+    floor = read_floor(SHARED / "paper" / f"synthetic_{name}.dxf")
     closed = {"doors": "closed", "robot_radius": 0.34} if "rooms" in name else {"edge": 0.0}
     told = [DROP_REASONS[k] for k in placed(floor, **closed).reason]
     left = told.count("kept")

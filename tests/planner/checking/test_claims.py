@@ -74,7 +74,7 @@ def test_what_a_plan_of_a_real_floor_claims_is_so(name: str) -> None:
 
     if not (SHARED / name).exists():
         pytest.skip(f"{SHARED / name} is not there")
-    mission, nouns = planned(read_floor(SHARED / name, d_dis=0.05), Settings())
+    mission, nouns = planned(read_floor(SHARED / name), Settings())
     found, problems = counted(mission, nouns)
     assert problems == []
     assert found.share == nouns[Selection].coverage

@@ -8,7 +8,7 @@ import pytest
 from floor_drawings import Draw, Read, new_drawing, rectangle
 
 from mission.floor import FloorPlan
-from planner.floors import read_floor
+from planner.floors import FloorOptions, read_floor
 
 
 @pytest.fixture
@@ -24,6 +24,6 @@ def read(tmp_path: Path) -> Read:
         draw(drawing.modelspace())
         path = tmp_path / "floor.dxf"
         drawing.saveas(path)
-        return read_floor(path, d_dis=d_dis)
+        return read_floor(path, FloorOptions(d_dis=d_dis))
 
     return read_drawn

@@ -31,7 +31,7 @@ COUNTS = {
 @pytest.mark.parametrize("name", COUNTS)
 def test_a_layered_floor_has_what_its_file_holds(name: str) -> None:
     rooms, doors, passages, floor, inside, walls, elements = COUNTS[name]
-    plan = read_floor(DATA / f"{name}.dxf", d_dis=0.05)
+    plan = read_floor(DATA / f"{name}.dxf")
     kinds = [opening.kind for opening in plan.openings]
     assert (len(plan.rooms), kinds.count("door"), kinds.count("passage")) == (rooms, doors, passages)
     assert plan.area == pytest.approx(floor, abs=0.05)
@@ -44,7 +44,7 @@ def test_a_layered_floor_has_what_its_file_holds(name: str) -> None:
 
 @real
 def test_the_office_has_its_names_holes_and_global_ids() -> None:
-    plan = read_floor(DATA / "layered" / "office-l1.dxf", d_dis=0.05)
+    plan = read_floor(DATA / "layered" / "office-l1.dxf")
     with_holes = {room.name for room in plan.rooms for part in room.polygons if part.holes}
     assert with_holes == {"113 OPEN OFFICE", "115 TELE/COMM RM", "118 MECH RM", "140 OPEN OFFICE"}
     assert all(room.name and room.global_id for room in plan.rooms)
@@ -56,7 +56,7 @@ def test_the_office_has_its_names_holes_and_global_ids() -> None:
 @pytest.mark.parametrize("path", WILD, ids=[path.stem for path in WILD])
 def test_a_drawing_from_the_wild_is_a_floor_or_one_line(path: Path) -> None:
     try:
-        plan = read_floor(path, d_dis=0.05)
+        plan = read_floor(path)
     except InputError as error:
         assert str(path) in str(error)
         assert "\n" not in str(error)

@@ -19,7 +19,7 @@ OFFICE = Path(recordings.samples.__file__).with_name("office.dxf")
 
 @pytest.fixture(scope="module")
 def office() -> FloorPlan:
-    return read_floor(OFFICE, d_dis=0.05)
+    return read_floor(OFFICE)
 
 
 def test_the_script_draws_the_file() -> None:

@@ -157,7 +157,7 @@ def test_pairs_are_looked_at_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> 
 def test_the_reduction_keeps_every_length_on_a_real_floor(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if not (SHARED / name).exists():
         pytest.skip(f"{SHARED / name} is not there")
-    space = navigable(read_floor(SHARED / name, d_dis=0.05), Settings())
+    space = navigable(read_floor(SHARED / name), Settings())
     area = to_shape(space.drive_area, np.zeros(2))
     points = np.array([part.representative_point().coords[0] for part in shapely.get_parts(area)])
     reduced = ways_between(space, points)

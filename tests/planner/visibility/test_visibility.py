@@ -47,7 +47,7 @@ from tests.planner.worlds import (
 def shared(name: str) -> FloorPlan:
     if not (SHARED / name).exists():
         pytest.skip(f"{SHARED / name} is not there")
-    return read_floor(Path(SHARED / name), d_dis=0.05)
+    return read_floor(Path(SHARED / name))
 
 
 def rows_of(seen: Visibility, rows: Iterable[int]) -> np.ndarray:

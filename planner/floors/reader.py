@@ -1,0 +1,108 @@
+"""What every reader of floors takes and gives: a file and options in, a floor plan or a survey out."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal, Protocol, cast
+
+from mission.floor import FloorPlan
+from mission.floor_source import FloorSource
+from planner.floors.survey import Survey
+
+
+@dataclass(frozen=True, eq=False)
+class FloorFile:
+    """A file that a floor is read from, with all its bytes."""
+
+    path: Path
+    data: bytes = field(repr=False)
+
+    @cached_property
+    def digest(self) -> str:
+        """sha256 of the bytes, hexadecimal."""
+        return hashlib.sha256(self.data).hexdigest()
+
+    def source(self, **chosen: Any) -> FloorSource:
+        """This file as the source of a floor, with what was chosen in it."""
+        return FloorSource(self.path.name, self.digest, **chosen)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FloorOptions:
+    """What a reader can be told. None and empty: not told, the reader decides and says so."""
+
+    d_dis: float = 0.05
+    """Curves are cut by Eq. 1 for units of this length in metres; every reader takes it."""
+    layers: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    """What layers of other names stand for: names in capitals, kinds as in LAYER_ROLES."""
+    drawing: int | None = None
+    """Number of the drawing, of several in one model space, from 1."""
+    region: tuple[float, float, float, float] | None = None
+    """The part of the model space to read, as x0, y0, x1, y1 in drawing units."""
+    units: str | None = None
+    """The drawing's unit of length, such as mm."""
+    storey: str | None = None
+    """Name of the model's storey."""
+    level: float | None = None
+    """Level of the floor in metres, where the model names no storey there."""
+    scan_height: float | None = None
+    """Height of the scanner above the floor in metres: what is cut there occludes and is a target."""
+    robot_height: float | None = None
+    """Height of the robot in metres: what is lower than this stands in its way."""
+    date: str | None = None
+    """The day whose construction status is read, as YYYY-MM-DD."""
+    since: str | None = None
+    """Only what was finished after this day, as YYYY-MM-DD, is to be scanned."""
+    schedule: Path | None = None
+    """CSV of GlobalIds with the start and finish of their tasks."""
+    schedule_columns: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    """Which column of the CSV is what: guid, task, start, finish."""
+    in_progress: Literal["obstacle", "target"] | None = None
+    """Whether what is being built on the day is to be scanned as well."""
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """Names of the options that were told, other than d_dis."""
+        return tuple(item.name for item in fields(self) if item.name != "d_dis" and self._told(item.name))
+
+    def _told(self, name: str) -> bool:
+        value = getattr(self, name)
+        return bool(value) if isinstance(value, Mapping) else value is not None
+
+
+class ReaderModule(Protocol):
+    """The module of a reader: two functions of one signature.
+
+    Both raise InputError, one line with the file, what is wrong with it, and the way out.
+    """
+
+    def survey(self, file: FloorFile, options: FloorOptions) -> Survey:
+        """What is in the file, before anybody plans."""
+
+    def read(self, file: FloorFile, options: FloorOptions) -> FloorPlan:
+        """The floor that the options choose in it."""
+
+
+@dataclass(frozen=True)
+class Reader:
+    """One kind of file that floors are read from."""
+
+    kind: str
+    """How a person calls it, such as `DXF drawing`."""
+    suffixes: tuple[str, ...]
+    holds: Callable[[bytes], bool]
+    """Whether bytes look like such a file, whatever its name is."""
+    module: str
+    """Dotted name of its module, a ReaderModule, which is loaded when it is used."""
+    takes: frozenset[str]
+    """Names of the FloorOptions that mean something to it, d_dis aside."""
+
+    def load(self) -> ReaderModule:
+        """Its module."""
+        return cast("ReaderModule", import_module(self.module))
