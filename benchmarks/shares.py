@@ -109,8 +109,8 @@ def _by_length(selection: Selection, figures: Figures) -> Figures:
     by_length = replace(space, settings=replace(space.settings, coverage_rule="length"))
     found = replace(selection.visibility.candidates, space=by_length)
     again = replace(selection, visibility=replace(selection.visibility, candidates=found))
-    whole, rooms, kinds = shares_of(again)
-    return replace(figures, whole=whole, rooms=rooms, kinds=kinds)
+    shares = shares_of(again)
+    return replace(figures, whole=shares.whole, rooms=shares.rooms, kinds=shares.kinds)
 
 
 def _told(shares: list[Share] | tuple[Share, ...]) -> str:

@@ -40,6 +40,27 @@ class Share:
         """Share of all that is visible."""
         return self.visible / self.total if self.total else 0.0
 
+    @property
+    def met(self) -> bool:
+        """Whether as much is seen as is asked for; rounding alone never decides."""
+        return self.required is None or self.seen >= (self.required - 1e-9) * self.visible
+
+
+@dataclass(frozen=True)
+class Shares:
+    """What of the targets is seen, by room and kind."""
+
+    whole: Share
+    rooms: tuple[Share, ...]
+    """Every room with targets, the one least seen first."""
+    kinds: tuple[Share, ...]
+    """Every kind of target, the one least seen first."""
+
+    @property
+    def short(self) -> tuple[Share, ...]:
+        """Those of which less is seen than is asked for."""
+        return tuple(share for share in (self.whole, *self.rooms, *self.kinds) if not share.met)
+
 
 @dataclass(frozen=True)
 class Figures:
@@ -80,7 +101,12 @@ LEG_OVER_IGNORED = "leg_over_ignored"
 
 def worst_first(shares: Sequence[Share]) -> tuple[Share, ...]:
     """By coverage, then by name; where nothing is visible at the end."""
-    return tuple(sorted(shares, key=lambda s: (s.coverage is None, s.coverage or 0.0, s.name)))
+    return tuple(sorted(shares, key=how_bad))
+
+
+def how_bad(share: Share) -> tuple[bool, float, str]:
+    """What `worst_first` sorts by."""
+    return share.coverage is None, share.coverage or 0.0, share.name
 
 
 def percent(share: float | None, *, digits: int = 1) -> str:

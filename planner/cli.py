@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mission.errors import InputError, StopgoError
+from mission.errors import InputError, OutcomeUnknown, StopgoError
 from planner.floor_commands import add_floor_commands
 
 if TYPE_CHECKING:
     from bridge.station.station import Station
     from mission.comparison import Comparison
     from mission.document import Mission
-    from mission.events import AnyEvent
+    from mission.events import AnyEvent, PoseReport
     from mission.floor import FloorPlan
     from mission.plan import PartPlan
     from mission.settings import Settings
@@ -253,8 +253,9 @@ def demo_command(
 
     from bridge.commands.spawn import robot_process
     from bridge.station.station import connect
+    from mission.comparing.compare import compare
     from mission.settings import read_settings
-    from recordings.compare import compare
+    from mission.sight import sight_of
 
     if not 0 < speed_up < 1e6:
         raise InputError(f"speed_up = {speed_up}: must be above 0 and below a million")
@@ -273,8 +274,11 @@ def demo_command(
             typer.echo(f"pushed mission {report.mission.id}, read back from the robot")
             station.command("start")
             tee, ended = _follow(station, report.mission, out / "field.rrd")
-    *earlier, last = tee.missions
-    return _say_demo(compare(last, tee.events, earlier=earlier), ended, out)
+    sight = sight_of(report.part.route, report.mission, report.figures)
+    heard = tee.heard.log()
+    if heard is None:
+        raise OutcomeUnknown("demo: the run ended and told nothing")
+    return _say_demo(compare(heard, tee.missions, [sight]), ended, out)
 
 
 def _follow(station: Station, mission: Mission, path: Path) -> tuple[EventTee, str]:
@@ -289,12 +293,14 @@ def _follow(station: Station, mission: Mission, path: Path) -> tuple[EventTee, s
 
 
 class EventTee:
-    """Hands a run to a recording and keeps its events, and the revisions of its mission."""
+    """Hands a run to a recording and keeps its log, and the revisions of its mission."""
 
     def __init__(self, recording: FieldRecording, mission: Mission) -> None:
-        self.events: list[AnyEvent] = []
+        from mission.heard_run import HeardRun
+
+        self.heard = HeardRun()
         self.missions = [mission]
-        self.state, self.pose = recording.state, recording.pose
+        self.state = recording.state
         self._recording = recording
 
     def mission(self, mission: Mission) -> None:
@@ -303,22 +309,22 @@ class EventTee:
             self.missions.append(mission)
         self._recording.mission(mission)
 
+    def pose(self, report: PoseReport) -> None:
+        """Record a pose and keep it."""
+        self.heard.pose(report)
+        self._recording.pose(report)
+
     def event(self, event: AnyEvent) -> None:
         """Record an event and keep it."""
-        self.events.append(event)
+        self.heard.event(event)
         self._recording.event(event)
 
 
 def _say_demo(comparison: Comparison, ended: str, out: Path) -> int:
-    from recordings.compare import comparison_table
+    from mission.comparing.judging import judge
+    from mission.comparing.telling import comparison_text
 
-    driven = "-" if comparison.driven_s is None else f"{comparison.driven_s:.0f} s"
-    away = comparison.greatest_deviation_m
-    typer.echo(f"\n{comparison_table(comparison)}\n")
-    typer.echo(
-        f"run {comparison.run_id} {ended}: {comparison.scanned} of {len(comparison.stops)} stops scanned, "
-        f"planned {comparison.planned_s:.0f} s, driven {driven}, "
-        f"greatest deviation {'-' if away is None else f'{1000 * away:.0f} mm'}"
-    )
+    typer.echo(f"\n{comparison_text(comparison)}\n")
+    typer.echo(f"run {comparison.run_id} {ended}")
     typer.echo(f"look at it: rerun {out / 'plan.rrd'} {out / 'field.rrd'}")
-    return 0 if ended == "FINISHED" and comparison.scanned == len(comparison.stops) else 1
+    return judge(comparison).exit_code if ended == "FINISHED" else 1

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from mission.figures import Figures, Share, worst_first
+from mission.figures import Figures, Shares
 from mission.floor import Finding, Rank
-from mission.geometry import BoolArray, FloatArray
-from mission.planning import Candidates, Route, Selection, weights_of
+from mission.ledger import ledger_of
+from mission.planning import Candidates, Route, Selection
 from mission.seen import seen_units
 from planner.appraisal.plausible import doubts_of, near_legs
 from planner.appraisal.unreached import unreached
@@ -26,12 +24,12 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
     left_out = unreached(candidates, parts)
     reached = _reached_m2(candidates, parts)
     findings = (*space.findings, *doubts_of(route, reached_m2=reached))
-    whole, rooms, kinds = shares_of(selection, why={item.room: item.why for item in left_out})
+    shares = shares_of(selection, why={item.room: item.why for item in left_out})
     return Figures(
         rule=settings.coverage_rule,
-        whole=whole,
-        rooms=rooms,
-        kinds=kinds,
+        whole=shares.whole,
+        rooms=shares.rooms,
+        kinds=shares.kinds,
         rooms_m2=sum(polygon.area for room in space.rooms for polygon in room.area),
         reached_m2=reached,
         unreached=left_out,
@@ -39,17 +37,9 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
     )
 
 
-def shares_of(
-    selection: Selection, *, why: Mapping[str, str] | None = None
-) -> tuple[Share, tuple[Share, ...], tuple[Share, ...]]:
+def shares_of(selection: Selection, *, why: Mapping[str, str] | None = None) -> Shares:
     """What the stops see of the whole, of every room and of every kind, the least seen first."""
-    space = selection.visibility.candidates.space
-    settings, ledger = space.settings, _Ledger(selection)
-    kinds = [
-        ledger.share(kind, ledger.of_kind(kind), required=settings.least_of_kind) for kind in ledger.kinds
-    ]
-    whole = ledger.share("all", ledger.everything, required=settings.coverage)
-    return whole, _rooms(ledger, selection, why or {}), worst_first(kinds)
+    return ledger_of(selection.visibility, why).shares(seen_units(selection))
 
 
 def ranked(findings: tuple[Finding, ...], near: set[int]) -> tuple[Finding, ...]:
@@ -62,48 +52,6 @@ def ranked(findings: tuple[Finding, ...], near: set[int]) -> tuple[Finding, ...]
         return (k not in near or findings[k].rank == Rank.NOTE, findings[k].rank)
 
     return tuple(findings[k] for k in sorted(range(len(findings)), key=key))
-
-
-def _rooms(ledger: _Ledger, selection: Selection, why: Mapping[str, str]) -> tuple[Share, ...]:
-    """Rooms with targets, then what faces none of them."""
-    space = selection.visibility.candidates.space
-    settings = space.settings
-    asked = settings.least_of_room
-    shares = [
-        ledger.share(room.name, space.unit_room == k, required=asked, why=why.get(room.name, ""))
-        for k, room in enumerate(space.rooms)
-    ]
-    outside = ledger.share("in no room", space.unit_room < 0)
-    return tuple(share for share in (*worst_first(shares), outside) if share.total)
-
-
-class _Ledger:
-    """Weights of units, in metres or units, to be summed over any of them."""
-
-    def __init__(self, selection: Selection) -> None:
-        space = selection.visibility.candidates.space
-        targets = space.targets
-        scale = 1.0 if space.settings.coverage_rule == "paper" else 1e-6
-        self._weight: FloatArray = np.asarray(weights_of(targets, space.settings) * scale, dtype=np.float64)
-        self._visible: BoolArray = selection.visibility.visible
-        self._seen: BoolArray = seen_units(selection)
-        kind = np.array([item.kind for item in space.floor.elements])
-        self._kind = kind[targets.element][targets.unit_segment]
-        self.everything = np.ones(targets.total, dtype=bool)
-
-    @property
-    def kinds(self) -> list[str]:
-        return sorted(set(self._kind.tolist()))
-
-    def of_kind(self, kind: str) -> BoolArray:
-        found: BoolArray = self._kind == kind
-        return found
-
-    def share(self, name: str, member: BoolArray, *, required: float | None = None, why: str = "") -> Share:
-        """The share of a mask of units (n,)."""
-        masks = (member, member & self._visible, member & self._seen)
-        total, visible, seen = (float(self._weight[mask].sum()) for mask in masks)
-        return Share(name, total, visible, seen, required=required, why=why)
 
 
 def _reached_m2(candidates: Candidates, parts: frozenset[int]) -> float:

@@ -1,0 +1,66 @@
+"""What the scanned stops of a run really saw, and what the others cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from mission.acquired import Acquired
+from mission.comparison import StopComparison
+from mission.document import Mission, Stop
+from mission.geometry import BoolArray, frozen
+from mission.sight import Sight
+
+SCANNED, UNSURE = "scanned", "unconfirmed"
+
+
+def acquired_by(
+    stops: Sequence[StopComparison], missions: Sequence[Mission], sights: Iterable[Sight]
+) -> Acquired | None:
+    """What the stops of a run saw; None where no plan of this mission tells what they see.
+
+    `missions` are the revisions that were followed. Their plans are of one floor and one set of
+    parameters, which the mission's id is a hash of, so that their targets are the same.
+    """
+    known = _of(missions[-1], sights)
+    if not known:
+        return None
+    last = known[-1]
+    places = {stop.id: stop for mission in missions for stop in mission.stops}
+    done = [item.stop for item in stops if item.outcome == SCANNED]
+    unsure = [item.stop for item in stops if item.outcome == UNSURE]
+    seen = _seen(done, places, known)
+    wanted = [item.stop for item in stops if item.outcome not in (SCANNED, UNSURE)]
+    return Acquired(
+        sight=last,
+        seen=seen,
+        perhaps=frozen(seen | _seen(unsure, places, known), np.bool_),
+        lost={stop: last.brings(stop, seen) for stop in wanted if stop in last.ids},
+        unknown=tuple(stop for stop in done if _knowing(stop, places, known) is None),
+    )
+
+
+def _of(mission: Mission, sights: Iterable[Sight]) -> list[Sight]:
+    """The plans of this mission, by revision; those of other targets than the newest are left out."""
+    mine = sorted(
+        (item for item in sights if item.mission_id == mission.id and item.revision <= mission.revision),
+        key=lambda item: item.revision,
+    )
+    return [item for item in mine if len(item.ledger.weight) == len(mine[-1].ledger.weight)]
+
+
+def _seen(stops: Iterable[str], places: dict[str, Stop], sights: Sequence[Sight]) -> BoolArray:
+    seen = np.zeros(len(sights[-1].ledger.weight), dtype=bool)
+    for stop in stops:
+        sight = _knowing(stop, places, sights)
+        if sight is not None:
+            seen |= sight.seen_units([stop])
+    return frozen(seen, np.bool_)
+
+
+def _knowing(stop: str, places: dict[str, Stop], sights: Sequence[Sight]) -> Sight | None:
+    """The newest plan that tells what is seen from where this stop is."""
+    place = places.get(stop)
+    having = [sight for sight in sights if place is not None and sight.knows(place)]
+    return having[-1] if having else None

@@ -1,0 +1,169 @@
+"""A run and its mission -> their comparison, stop by stop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mission.acquired import Acquired
+from mission.comparing.acquiring import acquired_by
+from mission.comparing.beside import beside
+from mission.comparing.spans import spans_of
+from mission.comparison import Comparison, StopComparison
+from mission.document import Mission, Stop
+from mission.events import (
+    Aborted,
+    AnyEvent,
+    Arrived,
+    Failed,
+    Finished,
+    Pose,
+    Scanned,
+    Settled,
+    Skipped,
+    Unconfirmed,
+)
+from mission.run_log import RunLog
+from mission.schedule import schedule
+from mission.sight import Sight
+
+VISITS = (Arrived, Settled, Scanned, Unconfirmed, Skipped, Failed)
+"""Events at a stop."""
+OUTCOMES = {Scanned: "scanned", Unconfirmed: "unconfirmed", Skipped: "skipped", Failed: "failed"}
+
+
+def compare(log: RunLog, missions: Sequence[Mission], sights: Iterable[Sight] = ()) -> Comparison:
+    """Compare a run with the schedule, stops, legs and sight of its mission.
+
+    Parameters
+    ----------
+    log
+        The run, in the mission's frame.
+    missions
+        The mission's revisions in ascending order; of those that the run followed, the last one counts, and
+        each stop is compared with the revision by which it was reached. Stops that a revision withdrew
+        come last, and then stops that only the run tells of.
+    sights
+        What stops see, of any revisions.
+    """
+    followed = _followed(log, missions)
+    plans = [_Planned(item) for item in followed]
+    visited = [event.stop for event in log.events if isinstance(event, VISITS)]
+    ids = dict.fromkeys([*plans[-1].stops, *(stop for plan in plans for stop in plan.stops), *visited])
+    stops = [_stop(stop, plans, log.events) for stop in ids]
+    acquired = acquired_by(stops, followed, sights)
+    return Comparison(
+        missions=followed,
+        log=log,
+        stops=tuple(replace(item, lost=_lost(item, acquired, log.ended)) for item in stops),
+        spans=spans_of(log),
+        beside=beside(log, followed),
+        planned_s=schedule(followed[-1]).total_s,
+        driven_s=_end_s(log),
+        acquired=acquired,
+    )
+
+
+def _followed(log: RunLog, missions: Sequence[Mission]) -> tuple[Mission, ...]:
+    """The revisions that the run followed; all where it tells of none of them."""
+    found = tuple(mission for mission in missions if mission.revision in log.revisions)
+    return found or tuple(missions)
+
+
+def _end_s(log: RunLog) -> float | None:
+    ends = [event.mission_time_s for event in log.events if isinstance(event, Finished | Aborted)]
+    return ends[-1] if ends else None
+
+
+def _lost(item: StopComparison, acquired: Acquired | None, ended: bool) -> float | None:
+    """What a stop's missing scan costs; nothing yet where the run still goes there."""
+    gone = item.outcome in ("skipped", "failed") or ended
+    return acquired.lost.get(item.stop) if gone and acquired is not None else None
+
+
+class _Planned:
+    """One revision's stops, when it plans to arrive there, and from which direction."""
+
+    def __init__(self, mission: Mission) -> None:
+        self.revision = mission.revision
+        self.stops = {stop.id: stop for stop in mission.stops}
+        arrivals = schedule(mission).arrival_s.tolist()
+        self.arrival_s = {stop.id: s for stop, s in zip(mission.stops, arrivals, strict=True)}
+
+
+def _stop(stop: str, plans: list[_Planned], events: Sequence[AnyEvent]) -> StopComparison:
+    mine = [event for event in events if isinstance(event, VISITS) and event.stop == stop]
+    arrivals = [event for event in mine if isinstance(event, Arrived)]
+    scans = [event for event in mine if isinstance(event, Scanned)]
+    plan = _reached_by(stop, plans, mine[-1].revision if mine else None)
+    told = StopComparison(
+        stop=stop,
+        planned_s=None if plan is None else plan.arrival_s[stop],
+        arrived_s=arrivals[0].mission_time_s if arrivals else None,
+        settle_s=_settling_s(mine),
+        tries=_tries(mine),
+        outcome=_outcome(mine) if mine or stop in plans[-1].stops else "withdrawn",
+        reason=_reason(mine),
+    )
+    where = (scans or arrivals)[-1].pose if scans or arrivals else None
+    return told if plan is None or where is None else _placed(told, where, plan.stops[stop])
+
+
+def _reached_by(stop: str, plans: list[_Planned], revision: int | None) -> _Planned | None:
+    """The plan by which a stop was reached, else the last one that has it."""
+    having = [plan for plan in plans if stop in plan.stops]
+    found = [plan for plan in having if plan.revision == revision] or having
+    return found[-1] if found else None
+
+
+def _placed(told: StopComparison, pose: Pose, stop: Stop) -> StopComparison:
+    """With the offset of a pose from the stop."""
+    x, y, ahead = pose.x - stop.x, pose.y - stop.y, arriving(stop)
+    return replace(
+        told,
+        deviation_m=math.hypot(x, y),
+        along_m=x * math.cos(ahead) + y * math.sin(ahead),
+        across_m=y * math.cos(ahead) - x * math.sin(ahead),
+        heading_rad=math.remainder(pose.heading - stop.heading, math.tau),
+        tolerance_m=stop.tolerance_m,
+    )
+
+
+def arriving(stop: Stop) -> float:
+    """The direction in which a stop is driven to; where nothing is driven, that of its heading."""
+    way = np.asarray(stop.approach, dtype=np.float64).reshape(-1, 2)
+    moves = np.diff(way, axis=0)
+    moves = moves[np.any(moves != 0, axis=1)]
+    return float(np.arctan2(moves[-1, 1], moves[-1, 0])) if len(moves) else stop.heading
+
+
+def _settling_s(events: Sequence[AnyEvent]) -> float | None:
+    """Seconds from the last arrival before the last standing still to that."""
+    settled = [k for k, event in enumerate(events) if isinstance(event, Settled)]
+    before = [event for event in events[: settled[-1]] if isinstance(event, Arrived)] if settled else []
+    return (events[settled[-1]].robot_ns - before[-1].robot_ns) / 1e9 if before else None
+
+
+def _tries(events: Sequence[AnyEvent]) -> int:
+    """How often it stood still; a robot that does not tell that had a try if it was through with the stop."""
+    settled = sum(isinstance(event, Settled) for event in events)
+    return max(settled, int(any(isinstance(event, Scanned | Unconfirmed) for event in events)))
+
+
+def _outcome(events: Sequence[AnyEvent]) -> str:
+    last = [OUTCOMES[type(event)] for event in events if type(event) in OUTCOMES]
+    if last:
+        return last[-1]
+    return "arrived" if any(isinstance(event, Arrived) for event in events) else "not reached"
+
+
+def _reason(events: Sequence[AnyEvent]) -> str:
+    """Why a stop was not scanned: a skip after a failure tells both."""
+    told = [event for event in events if type(event) in OUTCOMES]
+    if not told or isinstance(told[-1], Scanned):
+        return ""
+    reasons = [getattr(event, "reason", "") for event in told[-2:] if not isinstance(event, Scanned)]
+    return "; ".join(dict.fromkeys(reason for reason in reasons if reason))

@@ -1,0 +1,68 @@
+"""The states that a run went through, from what it told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from mission.comparison import Span
+from mission.events import (
+    Aborted,
+    AnyEvent,
+    Finished,
+    Held,
+    Homing,
+    Paused,
+    Resumed,
+    Skipped,
+    Started,
+    State,
+)
+from mission.run_log import RunLog
+
+OVER: tuple[State, ...] = ("FINISHED", "ABORTED")
+
+
+def spans_of(log: RunLog) -> tuple[Span, ...]:
+    """One after another without a gap, from the run's start to its end; none where nothing was told."""
+    changes = list(_changes(log))
+    if not changes:
+        return ()
+    ends = [begin for begin, _, _ in changes[1:]]
+    last = float(log.seconds([log.ended_ns or 0])[0])
+    return tuple(
+        Span(state, begin, end, why)
+        for (begin, state, why), end in zip(changes, [*ends, max(last, changes[-1][0])], strict=True)
+        if state not in OVER and end > begin
+    )
+
+
+def _changes(log: RunLog) -> Iterator[tuple[float, State, str]]:
+    """When the run came into which state, and why."""
+    state, homing = None, False
+    for event in log.events:
+        homing = homing or isinstance(event, Homing)
+        new = _after(event, state, homing)
+        if new is not None and new != state:
+            state = new
+            yield float(log.seconds([event.robot_ns])[0]), new, getattr(event, "reason", "")
+
+
+def _after(event: AnyEvent, state: State | None, homing: bool) -> State | None:
+    """The state that an event leads to; None where it changes none."""
+    goes_on = isinstance(event, Resumed) or (isinstance(event, Skipped) and state == "HELD")
+    if goes_on:
+        return "HOMING" if homing else "RUNNING"
+    if isinstance(event, Homing) and state == "PAUSED":
+        return None
+    return STATES.get(type(event))
+
+
+STATES: dict[type, State] = {
+    Started: "RUNNING",
+    Paused: "PAUSED",
+    Held: "HELD",
+    Homing: "HOMING",
+    Finished: "FINISHED",
+    Aborted: "ABORTED",
+}
+"""What the run is after an event that says so by itself."""
