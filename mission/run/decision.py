@@ -15,6 +15,7 @@ from mission.run.lease import Lease, claimed
 from mission.run.orders import DRIVING, FREE_VERBS, LONGEST_VALID_S, Order, Refused
 from mission.run.states import (
     Change,
+    Place,
     Run,
     Telling,
     changed,
@@ -115,10 +116,9 @@ def _verb(order: Order, situation: Situation) -> Change | Refused:
     needed = STATES[order.verb]
     if situation.mission is None:
         return Refused("no_mission", "the robot holds no mission; push one first")
-    if situation.run.state not in needed:
-        return Refused(
-            "wrong_state", f"{order.verb} needs {' or '.join(needed)}; the robot is {situation.run.state}"
-        )
+    place = situation.run.place
+    if place not in needed:
+        return Refused("wrong_state", f"{order.verb} needs {' or '.join(needed)}; the robot is {place}")
     if situation.not_ready and order.verb in DRIVING:
         return Refused("not_ready", situation.not_ready)
     return VERBS[order.verb](order, situation.mission, situation)
@@ -220,16 +220,16 @@ VERBS: dict[str, Deciding] = {
     "retry": _retry, "abort": _abort, "home": _home,
 }  # fmt: skip
 
-STATES: dict[str, tuple[str, ...]] = {
+STATES: dict[str, tuple[Place, ...]] = {
     "start": ("READY", "FINISHED", "ABORTED"),
     "pause": ("RUNNING", "HOMING"),
-    "resume": ("PAUSED",),
+    "resume": ("PAUSED", "PAUSED homing"),
     "skip": ("RUNNING", "PAUSED", "HELD"),
-    "retry": ("HELD",),
-    "abort": ("RUNNING", "PAUSED", "HELD", "HOMING"),
-    "home": ("RUNNING", "PAUSED", "HELD"),
+    "retry": ("HELD", "HELD homing"),
+    "abort": ("RUNNING", "PAUSED", "HELD", "HOMING", "PAUSED homing", "HELD homing"),
+    "home": ("RUNNING", "PAUSED", "HELD", "PAUSED homing", "HELD homing"),
 }
-"""The states in which each verb means something."""
+"""The states in which each verb means something; nothing turns a robot round that is on its way home."""
 
 
 def _xy(start: object) -> str:

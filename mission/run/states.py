@@ -37,6 +37,7 @@ from mission.events import (
 from mission.run.scans import ScanFailed, ScanResult, missing_in
 
 After = Literal["FINISHED", "ABORTED", "PAUSED"]
+Place = State | Literal["PAUSED homing", "HELD homing"]
 
 
 class Run(msgspec.Struct, frozen=True, kw_only=True):
@@ -62,7 +63,9 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     reason: str = ""
     """Why it is paused, held or homing."""
     homing: bool = False
-    """Whether what is paused or held is the way home."""
+    """Whether what is driven, paused or held is the way home."""
+    homing_reason: str = ""
+    """Why it goes home, whatever has paused or held it meanwhile."""
     then: After = "FINISHED"
     """What the run is once the robot is home."""
     next_revision: int | None = None
@@ -71,6 +74,13 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def over(self) -> bool:
         return self.state in ("IDLE", "READY", "FINISHED", "ABORTED")
+
+    @property
+    def place(self) -> Place:
+        """The state as orders see it: what is paused or held may be the way home."""
+        if self.homing and self.state == "PAUSED":
+            return "PAUSED homing"
+        return "HELD homing" if self.homing and self.state == "HELD" else self.state
 
 
 Telling = Callable[..., AnyEvent]
@@ -138,7 +148,7 @@ def paused(run: Run, reason: str, *, stands: bool = True) -> Change:
 def resumed(run: Run, by: str) -> Change:
     """The run goes on; one that was held has all its tries again."""
     going = changed(
-        run, state="HOMING" if run.homing else "RUNNING", reason=run.reason if run.homing else "",
+        run, state="HOMING" if run.homing else "RUNNING", reason=run.homing_reason,
         stop_state=run.stop_state if run.stop_state in ("SCANNING", "VERIFYING") else "WAITING",
     )  # fmt: skip
     if run.state == "HELD":
@@ -243,19 +253,19 @@ def heading_home(run: Run, mission: Mission, *, then: After, reason: str) -> Run
     last_leg = len(mission.stops) - (mission.return_ is None)
     return changed(
         run, state=state, homing=True, then=then, leg=min(run.leg, last_leg),
-        stop_state="WAITING", scan=None, reason=reason,
+        stop_state="WAITING", scan=None, reason=reason, homing_reason=reason,
     )  # fmt: skip
 
 
 def came_home_by(run: Run, mission: Mission) -> Change:
     """One leg of the way home is behind."""
     if run.leg == len(mission.stops) or run.leg == 0:
-        return ended(run, run.then)
+        return ended(changed(run, reason=run.homing_reason), run.then)
     return Change(changed(run, leg=run.leg - 1))
 
 
 def ended(run: Run, then: After) -> Change:
-    over = changed(run, state=then, stop_state="WAITING", scan=None, homing=False)
+    over = changed(run, state=then, stop_state="WAITING", scan=None, homing=False, homing_reason="")
     if then == "FINISHED":
         return Change(changed(over, reason=""), (Finished,))
     if then == "ABORTED":

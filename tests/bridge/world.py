@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -36,6 +37,7 @@ from mission.document import (
 )
 from mission.run.orders import Answer, Order, Verb
 from mission.run.revision import RevisionPolicy
+from mission.run.states import Run
 
 EXACT = Wear(noise_m=0.0, noise_rad=0.0, battery_per_s=0.0)
 WALKING = RobotSpec(radius=0.35, speed=0.5, turn_rate=math.radians(45), acceleration=0.5)
@@ -124,6 +126,11 @@ class Field:
             if not self.controller.step():
                 return done
         raise AssertionError(f"the robot still works after {most} steps: {self.controller.run}")
+
+    def work_until(self, reached: Callable[[Run], bool]) -> None:
+        """Let the robot work until its run is as wanted."""
+        while not reached(self.controller.run):
+            assert self.controller.step(), f"the robot has nothing to do: {self.controller.run}"
 
     def told(self, run_id: str | None = None) -> list[str]:
         """The journal as words: `Scanned s1`."""

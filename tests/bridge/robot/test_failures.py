@@ -165,6 +165,30 @@ def test_a_paused_way_home_is_gone_on_with() -> None:
     assert abs(field.base.pose().x) < 1e-6
 
 
+def test_a_skip_does_not_turn_a_robot_round_that_is_on_its_way_home() -> None:
+    field = started(corridor(), Fault("blocked", 2))
+    field.work_until(lambda run: run.done == ("s1",))
+    field.order("home")
+    field.work()
+    assert field.controller.run.place == "HELD homing"
+    assert field.order("skip").reason == "wrong_state"
+    field.order("retry")
+    field.work()
+    assert (field.controller.run.state, field.controller.run.done) == ("ABORTED", ("s1",))
+
+
+def test_a_way_home_that_was_paused_ends_for_the_reason_it_began() -> None:
+    field = started(corridor())
+    field.work_until(lambda run: run.done == ("s1",))
+    field.order("home")
+    field.order("pause")
+    assert field.controller.run.reason == "pause by test"
+    field.order("resume")
+    assert field.controller.run.reason == "sent home by test"
+    field.work()
+    assert getattr(field.journal.events()[-1], "reason", "") == "sent home by test"
+
+
 @pytest.mark.parametrize(
     ("policy", "state", "done"),
     [

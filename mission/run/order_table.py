@@ -1,0 +1,95 @@
+"""What every order does in every state of a run: worked out by `decide` itself, printed in the protocol."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+from mission.document import (
+    Frame,
+    Mission,
+    Origin,
+    Policy,
+    RobotSpec,
+    Scan,
+    ScannerSpec,
+    Sees,
+    Start,
+    Stop,
+)
+from mission.events import Pose
+from mission.run.decision import Decision, Situation, decide
+from mission.run.orders import FREE_VERBS, Order, Verb
+from mission.run.states import Place, Run
+
+VERBS: tuple[Verb, ...] = get_args(Verb)
+PLACES: tuple[Place, ...] = (
+    "IDLE", "READY", "RUNNING", "PAUSED", "HELD", "HOMING", "PAUSED homing", "HELD homing",
+    "FINISHED", "ABORTED",
+)  # fmt: skip
+
+
+def table_text() -> str:
+    """The table as Markdown: a line per state, a column per verb; a dash is a refusal with `wrong_state`."""
+    rows = [("", *(f"`{verb}`" for verb in VERBS)), ("---",) * (len(VERBS) + 1)]
+    rows += [(place, *(_cell(effect(verb, place)) for verb in VERBS)) for place in PLACES]
+    free = ("needs the lease", *("no" if verb in FREE_VERBS else "yes" for verb in VERBS))
+    return "\n".join(f"| {' | '.join(row)} |" for row in (*rows, free))
+
+
+def effect(verb: Verb, place: Place) -> str:
+    """The state that an order leads to, or the reason for which it is refused."""
+    decided = decide(_order(verb), _situation(place))
+    if isinstance(decided, Decision):
+        return decided.change.run.place
+    if decided.reason != "finished_before":
+        return decided.reason
+    again = decide(_order(verb, again=True), _situation(place))
+    return f"{again.change.run.place} with `again`" if isinstance(again, Decision) else again.reason
+
+
+def _cell(effect: str) -> str:
+    return {"wrong_state": "–", "no_mission": "`no_mission`"}.get(effect, effect)
+
+
+def _order(verb: Verb, *, again: bool = False) -> Order:
+    return Order(
+        cmd_id="c", verb=verb, commander="station", issued_ns=0, valid_for_s=5.0, again=again,
+    )  # fmt: skip
+
+
+def _situation(place: Place) -> Situation:
+    """A robot at the first of two stops of its mission, in a given state."""
+    mission = None if place == "IDLE" else _MISSION
+    return Situation(
+        run=_run(place), mission=mission, has_run=place in ("FINISHED", "ABORTED"),
+        pose=Pose(x=0.0, y=0.0, heading=0.0), now_ns=0, command_ns=0, new_run_id="run",
+        lease=None, battery=1.0, endurance_s=None,
+    )  # fmt: skip
+
+
+def _run(place: Place) -> Run:
+    state, _, homing = place.partition(" ")
+    under_way = state not in ("IDLE", "READY")
+    return Run(
+        state=state,  # type: ignore[arg-type]
+        mission_id=None if place == "IDLE" else _MISSION.id, revision=None if place == "IDLE" else 1,
+        run_id="run" if under_way else None, homing=bool(homing) or state == "HOMING", then="ABORTED",
+    )  # fmt: skip
+
+
+def _stop(name: str, x: float) -> Stop:
+    return Stop(
+        id=name, x=x, y=0.0, heading=0.0, doorway=False, tolerance_m=0.05, settle_s=0.0,
+        scan=Scan(profile="default", duration_s=1.0, timeout_s=2.0), on_failure="ask", retries=0,
+        approach=((0.0, 0.0), (x, 0.0)), sees=Sees(units=1, new_units=1),
+    )  # fmt: skip
+
+
+_MISSION = Mission(
+    id="example", revision=1, name="example", digest="", frame=Frame(name="site"), georeference=None,
+    robot=RobotSpec(radius=0.35, speed=0.5, turn_rate=1.0, acceleration=0.5),
+    scanner=ScannerSpec(profile="default", range=5.0), start=Start(x=0.0, y=0.0, heading=0.0, reason="given"),
+    stops=(_stop("s1", 1.0), _stop("s2", 2.0)), return_=None,
+    policy=Policy(link_loss="continue", link_loss_after_s=30.0, battery_min=0.15),
+    origin=Origin(floor="example", floor_digest="", parameters={}, stopgo=""),
+)  # fmt: skip
