@@ -37,7 +37,6 @@ def add_commands(app: typer.Typer) -> None:
 
     app.command(name="plan", epilog=EXAMPLE)(with_options(plan_command))
     add_floor_commands(app)
-    app.command(name="plan", epilog=EXAMPLE)(plan_command)
     app.command(name="demo", epilog="Example: stopgo demo -o recordings/demo")(demo_command)
 
 
