@@ -12,6 +12,7 @@ from bridge.commands.key_commands import key_commands
 from bridge.commands.mission_commands import clear, fetch_mission, push
 from bridge.commands.order_commands import add_orders
 from bridge.commands.robot_commands import robot
+from bridge.commands.simulate_commands import simulate_commands
 from bridge.commands.tunnel_commands import tunnel_commands
 from bridge.commands.watch_commands import watch_by
 from bridge.console import say
@@ -29,6 +30,7 @@ def add_commands(app: typer.Typer) -> None:
     app.command()(clear)
     add_orders(app)
     app.command()(watch_by(recording))
+    app.add_typer(simulate_commands(), name="simulate")
     app.add_typer(key_commands(), name="keys")
     app.add_typer(tunnel_commands(), name="tunnel")
 

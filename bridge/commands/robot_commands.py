@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,110 +26,85 @@ if TYPE_CHECKING:
     from mission.run.revision import RevisionPolicy
 
 
+ONLY_SIMULATED = ("--at", "--map", "--fault", "--speed-up", "--endurance")
+ONLY_DRIVEN = ("--arm", "--trigger", "--vehicle", "--signing-key")
+"""Options of `--controller sim`, and of `--controller mavlink:URL`; with the other one they are refused."""
+
+
 def robot(
     context: typer.Context,
     *,
-    name: Annotated[str | None, typer.Option("--name", help="Name of this robot.")] = None,
-    state: Annotated[
-        Path | None,
-        typer.Option("--state", metavar="DIR", help="Its journal, or a vehicle's items; one per robot."),
-    ] = None,
+    name: Annotated[str, typer.Option("--name", help="Name of this robot.")],
+    state: Annotated[Path, typer.Option("--state", metavar="DIR", help="Its journal; one per robot.")],
     listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where to listen.")] = DEFAULT_ENDPOINT,
     connect: Annotated[
         str | None, typer.Option(metavar="ENDPOINT", help="A router to connect to, instead of listening.")
     ] = None,
     site: SiteName = None,
-    speed_up: Annotated[
-        float, typer.Option("--speed-up", min=0.01, max=1000, help="How much faster simulated time runs.")
-    ] = 1.0,
-    at: Annotated[
-        str | None,
-        typer.Option("--at", metavar="X,Y,HEADING", help="Where it stands (m, degrees); else at the start."),
-    ] = None,
-    map_: Annotated[
-        str | None,
-        typer.Option("--map", metavar="X,Y,HEADING", help="Site to map: turn by HEADING, then shift."),
-    ] = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="Let something go wrong, as slip@2=0.2."),
-    ] = None,
-    endurance: Annotated[
-        float,
-        typer.Option(metavar="HOURS", min=0, help="How long a full battery lasts; 0: it does not run down."),
-    ] = 6.0,
+    keys: KeyFolder = None,
+    insecure: Insecure = False,
     revision: Annotated[
         str, typer.Option(metavar="next-stop|refuse", help="What becomes of a revision pushed during a run.")
     ] = "next-stop",
-    insecure: Insecure = False,
-    keys: KeyFolder = None,
-    mavlink_vehicle: Annotated[
-        str | None,
-        typer.Option(
-            "--mavlink-vehicle", metavar="URL", help="Be a MAVLink vehicle there, and nothing else."
-        ),
-    ] = None,
-    profile: Annotated[
-        str | None,
-        typer.Option(
-            metavar="strict|ardupilot|px4",
-            help="The autopilot whose habits the vehicle has; strict if not given.",
-        ),
-    ] = None,
-    origin: Annotated[
-        str | None,
-        typer.Option(metavar="LAT,LON,ALT[,HEADING]", help="The vehicle's global origin from the start."),
-    ] = None,
-    signing_key: SigningKey = None,
     controller: Annotated[
-        str, typer.Option(metavar="sim|mavlink:URL", help="What carries the scanner: an autopilot at URL.")
+        str,
+        typer.Option(
+            metavar="sim|mavlink:URL",
+            help="What carries the scanner: numbers, or the autopilot at URL.",
+        ),
     ] = "sim",
-    arm: Annotated[bool, typer.Option("--arm", help="Arm the autopilot when a run needs it.")] = False,
-    trigger: Annotated[
-        str, typer.Option(metavar="camera|script", help="What makes the autopilot's scanner scan.")
-    ] = "camera",
-    vehicle: Annotated[
-        int | None, typer.Option(metavar="ID", help="The autopilot's system id, if several are heard.")
+    at: Annotated[
+        str | None,
+        typer.Option("--at", metavar="X,Y,HEADING", help="sim: where it stands; else at the start."),
     ] = None,
+    map_: Annotated[
+        str | None,
+        typer.Option("--map", metavar="X,Y,HEADING", help="sim: site to map; turn by HEADING, then shift."),
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="sim: what is to go wrong, as slip@2=0.2."),
+    ] = None,
+    speed_up: Annotated[
+        float, typer.Option("--speed-up", min=0.01, max=1000, help="sim: how much faster its time runs.")
+    ] = 1.0,
+    endurance: Annotated[
+        float,
+        typer.Option(
+            metavar="HOURS", min=0, help="sim: how long a full battery lasts; 0: it does not run down."
+        ),
+    ] = 6.0,
+    vehicle: Annotated[
+        int | None, typer.Option(metavar="ID", help="mavlink: the system id, if several are heard.")
+    ] = None,
+    arm: Annotated[bool, typer.Option("--arm", help="mavlink: arm it when a run needs that.")] = False,
+    trigger: Annotated[
+        str, typer.Option(metavar="camera|script", help="mavlink: what makes the scanner scan.")
+    ] = "camera",
+    signing_key: SigningKey = None,
 ) -> None:
     """Be a robot, with a simulated base and scanner or those of an autopilot, until SIGTERM.
 
     Example: stopgo robot --name r1 --listen tcp/127.0.0.1:7447 --state r1.state --speed-up 20
 
     Example: stopgo robot --name r1 --state r1.state --controller mavlink:serial:/dev/ttyAMA0:921600
-
-    Example: stopgo robot --mavlink-vehicle udpin:127.0.0.1:14550 --profile ardupilot --origin 47.4,8.5,400
     """
     from bridge.mavlink.driving.autopilot_body import AutopilotBody, autopilot_url
     from bridge.robot.bodies import OpenBody, SimulatedBody
     from bridge.robot.program import RobotOptions, run_robot
     from bridge.robot.simulator import Faults, read_fault
 
-    given, driven = given_in(context), ("--arm", "--trigger", "--vehicle")
-    if mavlink_vehicle is not None:
-        alone(
-            given, "--mavlink-vehicle", "--listen", "--connect", "--site", "--map", "--keys", "--revision",
-            "--endurance", "--controller", *driven,
-        )  # fmt: skip
-        return be_vehicle(
-            name, url=mavlink_vehicle, profile=profile or "strict", state=state, speed_up=speed_up,
-            signing_key=signing_key, insecure=insecure, origin=origin,
-            at=None if at is None else read_pose("--at", at), faults=tuple(fault or ()),
-        )  # fmt: skip
-    alone(given, "a robot on zenoh", "--profile", "--origin")
+    given, url = given_in(context), autopilot_url(controller)
     if connect is not None:
         alone(given, "--connect", "--listen")
-    if name is None or state is None:
-        raise InputError("robot: give it a --name and a folder for its --state")
     faults, to_map = Faults(tuple(read_fault(text) for text in fault or ())), read_map(map_)
-    url = autopilot_url(controller)
     if url is None:
-        alone(given, "a simulated robot", "--signing-key", *driven)
+        alone(given, "a simulated robot", *ONLY_DRIVEN)
         body: OpenBody = SimulatedBody(
             state, None if at is None else read_pose("--at", at), to_map, 3600 * endurance, faults
         )
     else:
-        alone(given, "an autopilot", "--at", "--map", "--fault", "--speed-up", "--endurance")
+        alone(given, "an autopilot", *ONLY_SIMULATED)
         body = AutopilotBody(url, arm, read_trigger(trigger), signing_key, vehicle, insecure)
     options = RobotOptions(
         name=name, listen=listen, connect=connect, state=state, body=body, site=site, speed_up=speed_up,
@@ -137,14 +112,6 @@ def robot(
     )  # fmt: skip
     where = f"listens on {listen}" if connect is None else f"connects to {connect}"
     run_robot(options, ready=lambda: say(f"ready {name} {where}"))
-
-
-def be_vehicle(name: str | None, **options: Any) -> None:
-    """Be a MAVLink vehicle until SIGTERM."""
-    from bridge.mavlink.simulated.vehicle_process import VehicleOptions, run_vehicle
-
-    called = f"{name or 'vehicle'} ({options['profile']})"
-    run_vehicle(VehicleOptions(**options), ready=lambda url: say(f"ready {called} at {url}"))
 
 
 def read_revisions(text: str) -> RevisionPolicy:

@@ -24,7 +24,7 @@ from mission.document import SiteOrigin
 from mission.errors import InputError
 from mission.events import Pose
 
-OPTION = "--mavlink-vehicle"
+OPTION = "--mavlink"
 VEHICLE = Who(1, 1)
 STEP_S = 0.02
 """How often the time is looked at while nothing comes in."""

@@ -33,7 +33,7 @@ class Vehicle:
         self.mission = folder / "mission.json"
         write(tour(), self.mission)
         self.process = subprocess.Popen(
-            [*STOPGO, "robot", "--mavlink-vehicle", f"udpin:127.0.0.1:{port}", "--profile", "ardupilot",
+            [*STOPGO, "simulate", "vehicle", "--mavlink", f"udpin:127.0.0.1:{port}", "--profile", "ardupilot",
              "--origin", "51.5,7.5,100", "--at", "0,0,0", "--speed-up", "10"],
             stderr=subprocess.PIPE, text=True,
         )  # fmt: skip

@@ -28,7 +28,7 @@ def vehicle(tmp_path: Path, profile: str) -> Iterator[tuple[Url, Operator]]:
     """A vehicle in a process of its own, on hold at the mission's start."""
     port = free_udp_port()
     process = start(
-        "robot", "--mavlink-vehicle", f"udpin:127.0.0.1:{port}", "--profile", profile, "--at", "0,0,0",
+        "simulate", "vehicle", "--mavlink", f"udpin:127.0.0.1:{port}", "--profile", profile, "--at", "0,0,0",
         "--origin", "47.4,8.5,400,30", "--speed-up", "10", "--state", str(tmp_path / "vehicle"),
         called="the vehicle",
     )  # fmt: skip

@@ -83,8 +83,8 @@ def count_of(station: Wire) -> int:
 
 @contextmanager
 def process(*options: str) -> Iterator[subprocess.Popen[str]]:
-    """`stopgo robot`, ready."""
-    command = [sys.executable, "-m", "mission", "robot", *options]
+    """`stopgo simulate vehicle`, ready."""
+    command = [sys.executable, "-m", "mission", "simulate", "vehicle", *options]
     running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     assert running.stderr is not None
     try:
@@ -100,7 +100,7 @@ def process(*options: str) -> Iterator[subprocess.Popen[str]]:
 @pytest.mark.parametrize("profile", list(PROFILES))
 def test_a_vehicle_that_is_killed_and_started_again_keeps_its_items(tmp_path: Path, profile: str) -> None:
     port = free_udp_port()
-    options = ("--mavlink-vehicle", str(here(port)), "--profile", profile, "--state", str(tmp_path / "v"))
+    options = ("--mavlink", str(here(port)), "--profile", profile, "--state", str(tmp_path / "v"))
     ardupilot = profile == "ardupilot"
     with wire(there(port)) as station:
         with process(*options) as running:
@@ -117,7 +117,7 @@ def test_a_vehicle_that_cannot_keep_its_state_ends_and_says_so(tmp_path: Path) -
     port, state = free_udp_port(), tmp_path / "v"
     with (
         wire(there(port)) as station,
-        process("--mavlink-vehicle", str(here(port)), "--state", str(state)) as running,
+        process("--mavlink", str(here(port)), "--state", str(state)) as running,
     ):
         state.rmdir()
         state.touch()
@@ -131,44 +131,17 @@ def test_a_vehicle_that_cannot_keep_its_state_ends_and_says_so(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--mavlink-vehicle", "udp:1"], "not a MAVLink URL"),
-        (["--mavlink-vehicle", "udpin:0.0.0.0:14550"], "--insecure"),
-        (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--profile", "copter"], "--profile copter"),
-        (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--origin", "1,2"], "LAT,LON,ALT"),
-        (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--origin", "90,2,3"], "LAT,LON,ALT"),
-        (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--fault", "slip@1"], "KIND@N"),
-        (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--fault", "nack@-1"], "0 or more"),
-        (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--fault", "loss@200"], "0 to 100"),
-        (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--keys", "k"], "--keys has no meaning"),
-        (["--mavlink-vehicle", "udpin:127.0.0.1:14550", "--signing-key", "none"], "cannot be read"),
-        (["--mavlink-vehicle", "udpin:203.0.113.9:14550", "--insecure"], "cannot listen there"),
-        (["--profile", "px4", "--name", "r1", "--state", "s"], "--profile has no meaning"),
-        (["--state", "s"], "--name"),
-        # Given is given, whatever the value: the default too.
-        *(
-            (["--mavlink-vehicle", "udpin:127.0.0.1:14550", *option], f"{option[0]} has no meaning")
-            for option in (
-                ["--endurance", "5"],
-                ["--endurance", "6"],
-                ["--listen", "tcp/127.0.0.1:7447"],
-                ["--controller", "sim"],
-                ["--trigger", "camera"],
-            )
-        ),
-        (["--name", "r1", "--state", "s", "--trigger", "camera"], "--trigger has no meaning"),
-        (
-            [
-                "--name",
-                "r1",
-                "--state",
-                "s",
-                "--connect",
-                "tcp/127.0.0.1:1",
-                "--listen",
-                "tcp/127.0.0.1:7447",
-            ],
-            "--listen has no meaning with --connect",
-        ),
+        (["--mavlink", "udp:1"], "not a MAVLink URL"),
+        (["--mavlink", "udpin:0.0.0.0:14550"], "--insecure"),
+        (["--mavlink", "udpin:127.0.0.1:14550", "--profile", "copter"], "--profile copter"),
+        (["--mavlink", "udpin:127.0.0.1:14550", "--origin", "1,2"], "LAT,LON,ALT"),
+        (["--mavlink", "udpin:127.0.0.1:14550", "--origin", "90,2,3"], "LAT,LON,ALT"),
+        (["--mavlink", "udpin:127.0.0.1:14550", "--fault", "slip@1"], "KIND@N"),
+        (["--mavlink", "udpin:127.0.0.1:14550", "--fault", "nack@-1"], "0 or more"),
+        (["--mavlink", "udpin:127.0.0.1:14550", "--fault", "loss@200"], "0 to 100"),
+        (["--mavlink", "udpin:127.0.0.1:14550", "--keys", "k"], "--keys"),
+        (["--mavlink", "udpin:127.0.0.1:14550", "--signing-key", "none"], "cannot be read"),
+        (["--mavlink", "udpin:203.0.113.9:14550", "--insecure"], "cannot listen there"),
     ],
 )
 def test_options_that_cannot_be_are_refused_in_one_line(
@@ -176,7 +149,7 @@ def test_options_that_cannot_be_are_refused_in_one_line(
 ) -> None:
     from mission.__main__ import main
 
-    code = main(["robot", *options])
+    code = main(["simulate", "vehicle", *options])
     out = capsys.readouterr()
     assert (code, out.out) == (2, "")
     assert said in out.err
