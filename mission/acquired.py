@@ -10,7 +10,7 @@ from mission.figures import Share, Shares, how_bad
 from mission.geometry import BoolArray
 from mission.sight import Sight
 
-Answer = Literal["yes", "no", "unknown"]
+Certainty = Literal["yes", "no", "unknown"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Acquired:
         return _paired(ledger.kinds_seen(self.sight.all_seen), ledger.kinds_seen(self.seen))
 
     @cached_property
-    def answer(self) -> Answer:
+    def answer(self) -> Certainty:
         """Whether all is seen that the plan was asked for: of the whole, of every room and every kind."""
         if not self.shares.short:
             return "yes"

@@ -11,7 +11,7 @@ from mission.planning import Selection, Targets
 
 
 @dataclass(frozen=True, eq=False)
-class Runs:
+class SeenStretches:
     """Stretches of boundary; run k lies on `segment[k]`, from fraction `t0[k]` to `t1[k]` of a to b."""
 
     segment: IntArray
@@ -24,7 +24,7 @@ def seen_units(selection: Selection) -> BoolArray:
     return selection.visibility.seen_from(selection.chosen)
 
 
-def runs_of(targets: Targets, units: BoolArray) -> Runs:
+def runs_of(targets: Targets, units: BoolArray) -> SeenStretches:
     """The units of a mask (n,) joined into runs as long as each segment allows, in segment order."""
     segment, total = targets.unit_segment, targets.total
     joined = units[1:] & units[:-1] & (segment[1:] == segment[:-1])
@@ -32,4 +32,6 @@ def runs_of(targets: Targets, units: BoolArray) -> Runs:
     last = np.flatnonzero(units & ~np.concatenate([joined, [False]])[:total])
     on = segment[first]
     begin, count = targets.first_unit[on], targets.units[on]
-    return Runs(frozen(on, np.int64), frozen((first - begin) / count), frozen((last + 1 - begin) / count))
+    return SeenStretches(
+        frozen(on, np.int64), frozen((first - begin) / count), frozen((last + 1 - begin) / count)
+    )

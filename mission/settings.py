@@ -29,7 +29,7 @@ _plan, _robot, _scanner, _policy = (
 )
 _share = partial(_plan, least=0, most=1, why="0.7 is 70 %", undecided=f"{LEAST_SHARE:g}; none by units")
 
-Place = tuple[float, float]
+Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 
 
@@ -104,10 +104,10 @@ class Settings:
             example="2.5,3.0,90",
         ),
     ] = None
-    end: Annotated[Place | None, _plan("Where the robot's way ends", "m", form="X,Y", example="2.5,3.0")] = (
+    end: Annotated[Pair | None, _plan("Where the robot's way ends", "m", form="X,Y", example="2.5,3.0")] = (
         None
     )
-    use: Annotated[tuple[Place, ...], _plan("A stop that must be", "m", form="X,Y", example="2.5,3.0")] = ()
+    use: Annotated[tuple[Pair, ...], _plan("A stop that must be", "m", form="X,Y", example="2.5,3.0")] = ()
     avoid: Annotated[
         tuple[Triple, ...], _plan("Circle without stops", "m", form="X,Y,RADIUS", example="2.5,3.0,1")
     ] = ()

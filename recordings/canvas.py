@@ -20,17 +20,17 @@ FAR = 1000.0
 """Rerun stores float32; beyond this distance a millimetre is lost, and a local origin is used."""
 GRID = 100.0
 
-Origin = tuple[float, float]
+LocalOrigin = tuple[float, float]
 
 
-def local_origin(x: float, y: float) -> Origin:
+def local_origin(x: float, y: float) -> LocalOrigin:
     """The drawing's own origin, or for far coordinates a round point near (x, y)."""
     if max(abs(x), abs(y)) <= FAR:
         return (0.0, 0.0)
     return (round(x / GRID) * GRID, round(y / GRID) * GRID)
 
 
-def mission_origin(mission: Mission) -> Origin:
+def mission_origin(mission: Mission) -> LocalOrigin:
     """The local origin of every recording of this mission, so that they overlay."""
     return local_origin(mission.start.x, mission.start.y)
 
@@ -45,7 +45,7 @@ class Canvas:
     """What drawing functions draw on; positions are given in the drawing's metres."""
 
     stream: rr.RecordingStream
-    origin: Origin
+    origin: LocalOrigin
     drawn: rr.BinaryStream
 
     def taken(self) -> bytes:
@@ -107,7 +107,7 @@ class Sheet:
 
     recording_id: str
     name: str
-    origin: Origin
+    origin: LocalOrigin
     extent: Bounds
     """What 2D views show, in the drawing's metres."""
     of_run: bool = False

@@ -106,7 +106,7 @@ def shape(robot: str) -> str:
 
 
 @dataclass(frozen=True)
-class Run:
+class RunEntities:
     """The entities of one run."""
 
     run_id: str
@@ -145,7 +145,7 @@ class Run:
 class Revision:
     """What a revision changed while a run was under way."""
 
-    run: Run
+    run: RunEntities
     number: int
 
     def flat(self, name: str) -> str:
@@ -167,7 +167,7 @@ ARRIVED = "arrived"
 SCANNED = "scanned"
 SKIPPED = "skipped"
 FAILED = "failed"
-"""Names within a run, for `Run.flat` and `Run.solid`."""
+"""Names within a run, for `RunEntities.flat` and `RunEntities.solid`."""
 WITHDRAWN = "withdrawn"
 WITHDRAWN_ROUTE = "withdrawn_route"
 NEW_STOPS = "stops"
@@ -178,4 +178,4 @@ NEW_ROUTE = "route"
 def run_of_events(entity: str) -> str | None:
     """The run whose events the entity holds, if it does."""
     parts = entity.split("/")
-    return parts[2] if len(parts) == 4 and entity == Run(parts[2]).events else None
+    return parts[2] if len(parts) == 4 and entity == RunEntities(parts[2]).events else None

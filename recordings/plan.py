@@ -14,7 +14,7 @@ from mission.floor import FloorPlan
 from mission.geometry import bounds
 from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
 from recordings import entities
-from recordings.canvas import Canvas, Origin, Sheet, local_origin, mission_origin, open_canvas
+from recordings.canvas import Canvas, LocalOrigin, Sheet, local_origin, mission_origin, open_canvas
 from recordings.layout import Bounds
 from recordings.read import check
 from recordings.report import Nouns, parameter_values, parameters, plan_report, plan_results
@@ -78,7 +78,7 @@ def _drawn(recording_id: str, nouns: Nouns) -> bytes:
         return canvas.taken()
 
 
-def _origin(nouns: Nouns) -> Origin:
+def _origin(nouns: Nouns) -> LocalOrigin:
     if Mission in nouns:
         return mission_origin(nouns[Mission])
     if FloorPlan in nouns and nouns[FloorPlan].outline:

@@ -11,7 +11,7 @@ from mission.figures import Figures, percent
 from mission.floor import FloorPlan
 from mission.planning import Candidates, NavigableSpace, Route, Schedule, Selection, Visibility
 from mission.table import printable
-from recordings.canvas import Origin
+from recordings.canvas import LocalOrigin
 
 Nouns = dict[type, Any]
 
@@ -41,7 +41,7 @@ def parameter_values(values: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def plan_report(nouns: Nouns, origin: Origin) -> str:
+def plan_report(nouns: Nouns, origin: LocalOrigin) -> str:
     """The plan in markdown."""
     results = plan_results(nouns)
     title = nouns[Mission].name if Mission in nouns else results.get("floor", "plan")
@@ -202,7 +202,7 @@ _GUIDE = (
 )
 
 
-def _origin_note(origin: Origin) -> list[str]:
+def _origin_note(origin: LocalOrigin) -> list[str]:
     if origin == (0.0, 0.0):
         return []
     return [f"- positions shown are relative to x = {origin[0]:.0f} m, y = {origin[1]:.0f} m of the drawing"]

@@ -141,6 +141,51 @@ def test_no_siblings_import_each_other_in_a_circle(parent: str) -> None:
     assert not circles(siblings(parent))
 
 
+SAME_NAME = {
+    "cli": "the commands of a folder",
+    "qgc_plan": "a format's writer and its reader",
+    "qgc_waypoints": "a format's writer and its reader",
+    "stops_csv": "a format's writer and its reader",
+    "floor": "a noun, and how a recording draws it",
+    "plan": "a noun, and how a recording draws it",
+    "revision": "a noun, and how a recording draws it",
+    "drawing": "a drawing that is read, and one that is made",
+    "strokes": "lines that are read, and lines that are drawn",
+    "report": "what is told of a plan, of a recording and of a run",
+    "sight": "what stops see, and how it is computed",
+}
+"""Why modules of one name may stand beside each other."""
+
+
+def _public_types(name: str) -> Iterator[str]:
+    """Classes of a module, and types to which it gives a name."""
+    for node in ast.parse(MODULES[name].read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            yield node.targets[0].id
+
+
+def _is_type(name: str) -> bool:
+    return len(name) > 1 and name[0].isupper() and not name.isupper()
+
+
+def test_a_class_name_stands_for_one_thing() -> None:
+    homes: dict[str, set[str]] = {}
+    for name in MODULES:
+        for item in filter(_is_type, _public_types(name)):
+            homes.setdefault(item, set()).add(name)
+    assert not {item: found for item, found in homes.items() if len(found) > 1}
+
+
+def test_a_modules_name_stands_once() -> None:
+    homes: dict[str, list[str]] = {}
+    for name in MODULES:
+        if name not in PACKAGES:
+            homes.setdefault(name.rpartition(".")[2], []).append(name)
+    assert not {item: found for item, found in homes.items() if len(found) > 1 and item not in SAME_NAME}
+
+
 def test_the_dialect_of_mavlink_is_known_to_its_edges_alone() -> None:
     users = {name for name, path in MODULES.items() if "dialect" in path.read_text(encoding="utf-8")}
     edges = {"frames", "messages", "wire", "tunnel", "vehicle_telemetry", "replies"}

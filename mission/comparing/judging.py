@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from mission.acquired import Acquired, Answer
+from mission.acquired import Acquired, Certainty
 from mission.comparison import Comparison, StopComparison
 from mission.events import Aborted
 from mission.figures import percent
 
-EXIT_CODES: dict[Answer, int] = {"yes": 0, "no": 1, "unknown": 3}
-HEADLINES: dict[Answer, str] = {"yes": "Acquired", "no": "Not acquired", "unknown": "Not known"}
+EXIT_CODES: dict[Certainty, int] = {"yes": 0, "no": 1, "unknown": 3}
+HEADLINES: dict[Certainty, str] = {"yes": "Acquired", "no": "Not acquired", "unknown": "Not known"}
 MOST_NAMED = 6
 """Stops that are named in a sentence; of more, how many."""
 
@@ -20,7 +20,7 @@ MOST_NAMED = 6
 class Judgement:
     """An answer, and why in sentences."""
 
-    answer: Answer
+    answer: Certainty
     sentences: tuple[str, ...]
 
     @property
@@ -44,7 +44,7 @@ def judge(comparison: Comparison) -> Judgement:
     return Judgement(_answer(comparison), tuple(_sentences(comparison)))
 
 
-def _answer(comparison: Comparison) -> Answer:
+def _answer(comparison: Comparison) -> Certainty:
     acquired = comparison.acquired
     if _outside(comparison):
         return "no"

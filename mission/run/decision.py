@@ -15,7 +15,7 @@ from mission.run.lease import Lease, claimed
 from mission.run.orders import DRIVING, FREE_VERBS, LONGEST_VALID_S, Order, Refused
 from mission.run.states import (
     Change,
-    Place,
+    DetailedState,
     Run,
     Telling,
     changed,
@@ -220,7 +220,7 @@ VERBS: dict[str, Deciding] = {
     "retry": _retry, "abort": _abort, "home": _home,
 }  # fmt: skip
 
-STATES: dict[str, tuple[Place, ...]] = {
+STATES: dict[str, tuple[DetailedState, ...]] = {
     "start": ("READY", "FINISHED", "ABORTED"),
     "pause": ("RUNNING", "HOMING"),
     "resume": ("PAUSED", "PAUSED homing"),

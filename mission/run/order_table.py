@@ -19,10 +19,10 @@ from mission.document import (
 from mission.events import Pose
 from mission.run.decision import Decision, Situation, decide
 from mission.run.orders import FREE_VERBS, Order, Verb
-from mission.run.states import Place, Run
+from mission.run.states import DetailedState, Run
 
 VERBS: tuple[Verb, ...] = get_args(Verb)
-PLACES: tuple[Place, ...] = (
+PLACES: tuple[DetailedState, ...] = (
     "IDLE", "READY", "RUNNING", "PAUSED", "HELD", "HOMING", "PAUSED homing", "HELD homing",
     "FINISHED", "ABORTED",
 )  # fmt: skip
@@ -36,7 +36,7 @@ def table_text() -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in (*rows, free))
 
 
-def effect(verb: Verb, place: Place) -> str:
+def effect(verb: Verb, place: DetailedState) -> str:
     """The state that an order leads to, or the reason for which it is refused."""
     decided = decide(_order(verb), _situation(place))
     if isinstance(decided, Decision):
@@ -57,7 +57,7 @@ def _order(verb: Verb, *, again: bool = False) -> Order:
     )  # fmt: skip
 
 
-def _situation(place: Place) -> Situation:
+def _situation(place: DetailedState) -> Situation:
     """A robot at the first of two stops of its mission, in a given state."""
     mission = None if place == "IDLE" else _MISSION
     return Situation(
@@ -67,7 +67,7 @@ def _situation(place: Place) -> Situation:
     )  # fmt: skip
 
 
-def _run(place: Place) -> Run:
+def _run(place: DetailedState) -> Run:
     state, _, homing = place.partition(" ")
     under_way = state not in ("IDLE", "READY")
     return Run(

@@ -37,7 +37,7 @@ from mission.events import (
 from mission.run.scans import ScanFailed, ScanResult, missing_in
 
 After = Literal["FINISHED", "ABORTED", "PAUSED"]
-Place = State | Literal["PAUSED homing", "HELD homing"]
+DetailedState = State | Literal["PAUSED homing", "HELD homing"]
 
 
 class Run(msgspec.Struct, frozen=True, kw_only=True):
@@ -76,7 +76,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
         return self.state in ("IDLE", "READY", "FINISHED", "ABORTED")
 
     @property
-    def place(self) -> Place:
+    def place(self) -> DetailedState:
         """The state as orders see it: what is paused or held may be the way home."""
         if self.homing and self.state == "PAUSED":
             return "PAUSED homing"

@@ -35,7 +35,7 @@ ROUNDS = 4
 def triangulation(space: NavigableSpace) -> tuple[FloatArray, IntArray, IntArray]:
     """Candidates of every room: position, room, and the reason for those of bad triangles."""
     place = Place(space)
-    drawn = Drawn.of(place)
+    drawn = DrawnBoundary.of(place)
     per_room = [room_candidates(place, drawn, room) for room in range(len(space.rooms))]
     xy = np.concatenate([np.empty((0, 2)), *(points for points, _ in per_room)]) + place.origin
     reason = np.concatenate([np.empty(0, np.int64), *(early for _, early in per_room)])
@@ -44,7 +44,7 @@ def triangulation(space: NavigableSpace) -> tuple[FloatArray, IntArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class DrawnBoundary:
     """What seeds are made of, beside the rooms' contours; local frame."""
 
     edges: FloatArray
@@ -53,7 +53,7 @@ class Drawn:
     """Centres of columns or round elements (n, 2)."""
 
     @classmethod
-    def of(cls, place: Place) -> Drawn:
+    def of(cls, place: Place) -> DrawnBoundary:
         """Columns' centres where the floor has no rooms; else the elements' outlines."""
         floor = place.space.floor
         if not floor.rooms:
@@ -73,7 +73,7 @@ def is_round(solid: shapely.Polygon) -> bool:
     return len(corners) >= 8 and float(np.ptp(radius)) < 0.01 * float(radius.max())
 
 
-def room_candidates(place: Place, drawn: Drawn, room: int) -> tuple[FloatArray, IntArray]:
+def room_candidates(place: Place, drawn: DrawnBoundary, room: int) -> tuple[FloatArray, IntArray]:
     """Candidates (n, 2) of one room in the local frame, with TOO_SMALL, SLIVER or KEPT for each.
 
     While less than dens_min candidates per m² are left, they become seeds too, as long as that gains.
@@ -101,7 +101,7 @@ def _left(place: Place, room: int, points: FloatArray, early: IntArray) -> int:
     return int(np.count_nonzero(reason == KEPT))
 
 
-def seeds_of(shape: BaseGeometry, drawn: Drawn, *, d_max: float) -> FloatArray:
+def seeds_of(shape: BaseGeometry, drawn: DrawnBoundary, *, d_max: float) -> FloatArray:
     """Seeds (n, 2) of a room: segments longer than `d_max` metres are split evenly."""
     around = roughly_widened(shape, AT_ROOM, join_style="mitre")
     near = drawn.edges[shapely.intersects(drawn.edges, around)]

@@ -20,7 +20,7 @@ from planner.floors.strokes import Stroke, Word
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
+class FloorParts:
     """What a floor plan is made of."""
 
     outline: tuple[Polygon, ...]
@@ -38,7 +38,7 @@ def parts_of(
     source: Path,
     layers: Iterable[str],
     skipped: str = "",
-) -> Parts:
+) -> FloorParts:
     """The parts that strokes and words on the known layers draw.
 
     Raises
@@ -57,7 +57,7 @@ def parts_of(
     ignored = (*left_out, *(IgnoredLine(line.layer, line.points) for line in on["other"].open))
     odd_layers = [*_unknown_layers(on["other"], words), *_dropped(on)]
     findings = (*odd_outline, *odd_rooms, *odd_openings, *odd_elements, *odd_layers)
-    return Parts(canonical_region(outline), rooms, openings, elements, ignored, findings)
+    return FloorParts(canonical_region(outline), rooms, openings, elements, ignored, findings)
 
 
 def _drawn_by_role(strokes: Iterable[Stroke]) -> defaultdict[str, Drawn]:

@@ -21,7 +21,7 @@ from planner.selection.exact_cover import exact
 from planner.selection.greedy import greedy, in_greedy_order
 from planner.selection.improve import improved
 
-Method = Callable[[Cover, Settings], tuple[IntArray, int]]
+Selector = Callable[[Cover, Settings], tuple[IntArray, int]]
 
 
 def _greedy(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
@@ -42,7 +42,7 @@ def _exact(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
     return rows, max(bound, proved)
 
 
-METHODS: dict[str, Method] = {"default": _default, "greedy": _greedy, "exact": _exact}
+METHODS: dict[str, Selector] = {"default": _default, "greedy": _greedy, "exact": _exact}
 NAMES = {
     "default": "greedy, drop-and-repair",
     "greedy": "greedy",
@@ -100,4 +100,4 @@ def _coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
     return np.array(steps)
 
 
-__all__ = ["METHODS", "Method", "select"]
+__all__ = ["METHODS", "Selector", "select"]

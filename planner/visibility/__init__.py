@@ -13,8 +13,8 @@ from planner.visibility.bresenham import bresenham
 from planner.visibility.exact_sight import exact
 from planner.visibility.headings import with_headings
 
-Method = Callable[[Candidates], Visibility]
-METHODS: dict[str, Method] = {"exact": exact, "bresenham": bresenham}
+VisibilityMethod = Callable[[Candidates], Visibility]
+METHODS: dict[str, VisibilityMethod] = {"exact": exact, "bresenham": bresenham}
 
 
 def visibility(candidates: Candidates) -> Visibility:
@@ -34,4 +34,4 @@ def visibility(candidates: Candidates) -> Visibility:
     return with_headings(found) if settings.fov < 360 else found
 
 
-__all__ = ["METHODS", "Method", "visibility"]
+__all__ = ["METHODS", "VisibilityMethod", "visibility"]

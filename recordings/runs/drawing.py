@@ -54,7 +54,7 @@ class RunDrawing:
     def __init__(self, canvas: Canvas, run_id: str, mission: Mission) -> None:
         self.canvas = canvas
         self.run_id = run_id
-        self.names = entities.Run(run_id)
+        self.names = entities.RunEntities(run_id)
         self.mission = mission
         self.revisions = [mission]
         self.stops = {stop.id: stop for stop in mission.stops}

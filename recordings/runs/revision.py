@@ -18,7 +18,7 @@ STEP = 0.02
 
 
 @dataclass(frozen=True)
-class Change:
+class RevisionChange:
     """What one revision has and another has not; a stop that has moved is withdrawn and new."""
 
     withdrawn: tuple[Stop, ...]
@@ -27,11 +27,11 @@ class Change:
     added_legs: tuple[tuple[Leg, Colour], ...]
 
 
-def change_between(before: Mission, after: Mission) -> Change:
+def change_between(before: Mission, after: Mission) -> RevisionChange:
     """From one revision of a mission to another."""
     (old_legs, _), (new_legs, colours) = legs_of(before), legs_of(after)
     old, new = ({_place(stop) for stop in mission.stops} for mission in (before, after))
-    return Change(
+    return RevisionChange(
         withdrawn=tuple(stop for stop in before.stops if _place(stop) not in new),
         added=tuple(stop for stop in after.stops if _place(stop) not in old),
         withdrawn_legs=tuple(leg for leg in old_legs if leg not in new_legs),
@@ -45,7 +45,7 @@ def _place(stop: Stop) -> tuple[object, ...]:
     return (stop.id, stop.x, stop.y, stop.heading, stop.doorway)
 
 
-def draw_change(canvas: Canvas, change: Change, names: entities.Revision, draw: Draw) -> None:
+def draw_change(canvas: Canvas, change: RevisionChange, names: entities.Revision, draw: Draw) -> None:
     """Grey over what is withdrawn, and what is new in the colours of stops and routes.
 
     `draw` draws an archetype at an entity, at the time of the change.

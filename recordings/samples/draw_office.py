@@ -19,7 +19,7 @@ from ezdxf.document import Drawing
 from ezdxf.enums import TextEntityAlignment
 from ezdxf.layouts import Modelspace
 
-Span = tuple[float, float]
+Interval = tuple[float, float]
 Box = tuple[float, float, float, float]
 """Least x, least y, greatest x, greatest y, in metres."""
 
@@ -56,7 +56,7 @@ ROOMS: dict[str, Box] = {
     "110 Workshop": (16.92, 7.46, 25.7, 12.7),
 }
 
-WALLS_ALONG_X: dict[str, tuple[Span, Span, tuple[Span, ...], tuple[Span, ...]]] = {
+WALLS_ALONG_X: dict[str, tuple[Interval, Interval, tuple[Interval, ...], tuple[Interval, ...]]] = {
     "south": (
         (0.0, 26.0),
         (0.0, 0.3),
@@ -80,7 +80,7 @@ WALLS_ALONG_X: dict[str, tuple[Span, Span, tuple[Span, ...], tuple[Span, ...]]] 
 }
 """Walls along x: from and to in x, from and to in y, the doors in them, the windows in them."""
 
-WALLS_ALONG_Y: dict[str, tuple[Span, Span, tuple[Span, ...], tuple[Span, ...]]] = {
+WALLS_ALONG_Y: dict[str, tuple[Interval, Interval, tuple[Interval, ...], tuple[Interval, ...]]] = {
     "west": ((0.3, 12.7), (0.0, 0.3), ((5.95, 7.05),), ((1.6, 3.6), (9.4, 11.4))),
     "east": ((0.3, 12.7), (25.7, 26.0), (), ((1.2, 3.2), (4.2, 6.2))),
     "101-102": ((0.3, 5.54), (7.0, 7.12), (), ()),
@@ -171,11 +171,11 @@ def _room(model: Modelspace, name: str, box: Box) -> None:
 def _wall(
     model: Modelspace,
     name: str,
-    along: Span,
-    across: Span,
+    along: Interval,
+    across: Interval,
     *,
-    doors: Sequence[Span],
-    windows: Sequence[Span],
+    doors: Sequence[Interval],
+    windows: Sequence[Interval],
     turned: bool,
 ) -> None:
     """One wall, cut by its doors and windows; all its pieces carry the wall's GlobalId."""
@@ -194,7 +194,7 @@ def _wall(
         _rectangle(model, box, layer="WINDOWS", global_id=_global_id(f"window {name} {number}"))
 
 
-def _pieces(along: Span, gaps: Sequence[Span]) -> Iterator[Span]:
+def _pieces(along: Interval, gaps: Sequence[Interval]) -> Iterator[Interval]:
     start = along[0]
     for gap in sorted(gaps):
         yield (start, gap[0])
@@ -202,7 +202,7 @@ def _pieces(along: Span, gaps: Sequence[Span]) -> Iterator[Span]:
     yield (start, along[1])
 
 
-def _box(along: Span, across: Span, *, turned: bool) -> Box:
+def _box(along: Interval, across: Interval, *, turned: bool) -> Box:
     if turned:
         return (across[0], along[0], across[1], along[1])
     return (along[0], across[0], along[1], across[1])

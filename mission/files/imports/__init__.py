@@ -9,7 +9,7 @@ from mission.document import Mission
 from mission.errors import InputError
 from mission.files.imports import qgc_plan, qgc_waypoints, stops_csv
 from mission.files.imports.assembling import mission_of
-from mission.files.imports.track import ImportOptions, MissionReader, Track
+from mission.files.imports.track import ImportedRoute, ImportOptions, MissionReader
 from mission.settings import Settings
 from mission.specs import site_origin_of
 
@@ -26,7 +26,7 @@ LARGEST = 64_000_000
 
 def read_mission(
     path: Path, settings: Settings, *, kind: str | None = None, autopilot: str | None = None
-) -> tuple[Mission, Track]:
+) -> tuple[Mission, ImportedRoute]:
     """The mission in a file of a format of `READERS`, and what was read.
 
     Raises

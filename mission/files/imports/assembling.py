@@ -21,14 +21,14 @@ from mission.document import (
     sealed,
 )
 from mission.errors import InputError
-from mission.files.imports.track import Track, Visit
+from mission.files.imports.track import ImportedRoute, Visit
 from mission.floor_source import FloorSource
 from mission.problems import problems_of
 from mission.settings import Settings
 from mission.specs import origin_of, policy_of, robot_of, rounded, scan_of, scanner_of, site_origin_of
 
 
-def mission_of(track: Track, settings: Settings, *, name: str, file: str, digest: str) -> Mission:
+def mission_of(track: ImportedRoute, settings: Settings, *, name: str, file: str, digest: str) -> Mission:
     """The mission of a track; legs are straight between the places that the file names.
 
     Parameters
@@ -65,7 +65,7 @@ def mission_of(track: Track, settings: Settings, *, name: str, file: str, digest
     return mission
 
 
-def _legs(track: Track, settings: Settings) -> Iterator[list[Point]]:
+def _legs(track: ImportedRoute, settings: Settings) -> Iterator[list[Point]]:
     """The approach of each visit; the first begins at the start, where one is known."""
     start = settings.start[:2] if settings.start is not None else track.start
     before = [] if start is None else [start]
@@ -81,7 +81,7 @@ def _distinct(leg: Sequence[Point]) -> list[Point]:
     return [point for number, point in enumerate(points) if number == 0 or point != points[number - 1]]
 
 
-def _start(track: Track, settings: Settings, leg: Sequence[Point], file: str) -> Start:
+def _start(track: ImportedRoute, settings: Settings, leg: Sequence[Point], file: str) -> Start:
     x, y = leg[0]
     if settings.start is not None:
         heading = math.remainder(math.radians(settings.start[2]), math.tau)
@@ -130,7 +130,7 @@ def _scan(visit: Visit, settings: Settings) -> Scan:
     return scan if visit.timeout_s is None else msgspec.structs.replace(scan, timeout_s=visit.timeout_s)
 
 
-def _robot(track: Track, settings: Settings) -> RobotSpec:
+def _robot(track: ImportedRoute, settings: Settings) -> RobotSpec:
     robot = robot_of(settings)
     return robot if track.speed is None else msgspec.structs.replace(robot, speed=track.speed)
 

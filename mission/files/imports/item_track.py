@@ -14,7 +14,7 @@ from itertools import takewhile
 from mission.document import SiteOrigin
 from mission.errors import InputError
 from mission.files.imports import track
-from mission.files.imports.track import ImportOptions, Track
+from mission.files.imports.track import ImportedRoute, ImportOptions
 from mission.geodesy import STEPS_PER_DEGREE
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import NAMES, Command, Item, Placed
@@ -48,7 +48,7 @@ class Listed:
         return f"item {self.number} ({NAMES.get(self.command, 'command')} {self.command})"
 
 
-def track_of(items: Sequence[Listed], *, origin: SiteOrigin, autopilot: str, source: str) -> Track:
+def track_of(items: Sequence[Listed], *, origin: SiteOrigin, autopilot: str, source: str) -> ImportedRoute:
     """The track of a list of items.
 
     Raises
@@ -74,7 +74,7 @@ def track_of(items: Sequence[Listed], *, origin: SiteOrigin, autopilot: str, sou
             )
     names = _names(tour, items)
     visits = [_visit(visit, name, items, autopilot) for visit, name in zip(tour.visits, names, strict=True)]
-    return Track(tuple(visits), back=tour.back, origin=origin, speed=tour.speed)
+    return ImportedRoute(tuple(visits), back=tour.back, origin=origin, speed=tour.speed)
 
 
 def autopilot_for(given: str | None, firmware: int | None = None) -> str:

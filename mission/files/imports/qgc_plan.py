@@ -10,7 +10,7 @@ from typing import Any
 from mission.document import SiteOrigin
 from mission.errors import InputError
 from mission.files.imports.item_track import Listed, assumptions, autopilot_for, track_of
-from mission.files.imports.track import ImportOptions, Track
+from mission.files.imports.track import ImportedRoute, ImportOptions
 
 NAN = float("nan")
 LARGEST_CODE = 65_535
@@ -19,7 +19,7 @@ LARGEST = 1e15
 """No number in a plan is larger."""
 
 
-def read(data: bytes, source: str, given: ImportOptions) -> Track:
+def read(data: bytes, source: str, given: ImportOptions) -> ImportedRoute:
     """The track of a plan.
 
     Raises
@@ -125,7 +125,7 @@ def _named(item: Listed, ours: object) -> Listed:
     return Listed(item.number, item.command, item.frame, item.params, name if isinstance(name, str) else None)
 
 
-def _noted(track: Track, plan: dict[str, Any], assumed: tuple[str, ...]) -> Track:
+def _noted(track: ImportedRoute, plan: dict[str, Any], assumed: tuple[str, ...]) -> ImportedRoute:
     left = [
         name for name, key in (("geofence", "geoFence"), ("rally points", "rallyPoints")) if _holds(plan, key)
     ]

@@ -9,13 +9,13 @@ from mission.document import SiteOrigin
 from mission.errors import InputError
 from mission.files.imports.item_track import Listed, assumptions, autopilot_for, track_of
 from mission.files.imports.qgc_plan import LARGEST_CODE
-from mission.files.imports.track import ImportOptions, Track
+from mission.files.imports.track import ImportedRoute, ImportOptions
 
 HEAD = "QGC WPL 110"
 COLUMNS = 12
 
 
-def read(data: bytes, source: str, given: ImportOptions) -> Track:
+def read(data: bytes, source: str, given: ImportOptions) -> ImportedRoute:
     """The track of a table; degrees by ArduPilot's rule unless another autopilot is given.
 
     Raises

@@ -17,7 +17,7 @@ from typing import Any, get_args
 
 from mission.document import OnFailure, Point
 from mission.errors import InputError
-from mission.files.imports.track import ImportOptions, Track, Visit
+from mission.files.imports.track import ImportedRoute, ImportOptions, Visit
 from mission.geodesy import Geodetic, from_geodetic, heading_of
 from mission.problems import JOIN
 
@@ -65,7 +65,7 @@ class _Row:
         return value
 
 
-def read(data: bytes, source: str, given: ImportOptions) -> Track:
+def read(data: bytes, source: str, given: ImportOptions) -> ImportedRoute:
     """The track of a table of stops, in metres of the site or in degrees.
 
     Raises
@@ -77,7 +77,7 @@ def read(data: bytes, source: str, given: ImportOptions) -> Track:
     place = _placing(rows[0].cells, source, given)
     visits = [_visit(row, place(row), given) for row in _in_order(rows)]
     start, legs = _legs(_in_order(rows), visits)
-    return Track(legs, start=start, origin=given.origin)
+    return ImportedRoute(legs, start=start, origin=given.origin)
 
 
 def _rows(data: bytes, source: str) -> list[_Row]:

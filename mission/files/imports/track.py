@@ -29,7 +29,7 @@ class Visit:
 
 
 @dataclass(frozen=True)
-class Track:
+class ImportedRoute:
     """Visits in the order of driving."""
 
     visits: tuple[Visit, ...]
@@ -52,5 +52,5 @@ class ImportOptions:
     """By whose rule degrees are metres, one of `mission.mavlink.autopilots.AUTOPILOTS`."""
 
 
-MissionReader = Callable[[bytes, str, ImportOptions], Track]
+MissionReader = Callable[[bytes, str, ImportOptions], ImportedRoute]
 """`(data, source, given)`; `source` stands in error messages."""

@@ -10,14 +10,14 @@ import pytest
 from mission.document import SiteOrigin
 from mission.errors import InputError
 from mission.files.imports import qgc_plan, qgc_waypoints
-from mission.files.imports.track import ImportOptions, Track
+from mission.files.imports.track import ImportedRoute, ImportOptions
 from tests.mission.imports.worlds import CAPTURE, SPEED, Row, command, delay, plan, waypoint, waypoints
 
 Write = Callable[..., bytes]
 BOTH = pytest.mark.parametrize(("write", "read"), [(plan, qgc_plan.read), (waypoints, qgc_waypoints.read)])
 
 
-def track(*rows: Row, firmware: int = 3, **root: object) -> Track:
+def track(*rows: Row, firmware: int = 3, **root: object) -> ImportedRoute:
     return qgc_plan.read(plan(*rows, firmware=firmware, **root), "site.plan", ImportOptions())
 
 

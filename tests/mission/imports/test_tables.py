@@ -11,13 +11,13 @@ from mission.errors import InputError
 from mission.files.exports import exported
 from mission.files.exports.format import Supplements
 from mission.files.imports.stops_csv import read
-from mission.files.imports.track import ImportOptions, Track
+from mission.files.imports.track import ImportedRoute, ImportOptions
 from tests.mission.exports.worlds import laboratory
 
 ZURICH = SiteOrigin(lat=47.3769, lon=8.5417, alt=408.0, heading_deg=0.0)
 
 
-def track(text: str, origin: SiteOrigin | None = None) -> Track:
+def track(text: str, origin: SiteOrigin | None = None) -> ImportedRoute:
     return read(text.encode(), "stops.csv", ImportOptions(origin))
 
 

@@ -18,7 +18,7 @@ from planner.candidates import candidates
 from planner.candidates.place import Place
 from planner.candidates.triangulation import (
     LEAST_ANGLE,
-    Drawn,
+    DrawnBoundary,
     delaunay,
     distinct,
     is_round,
@@ -69,7 +69,7 @@ def test_a_square_has_its_middle_and_four_triangles() -> None:
 
 
 def test_long_segments_are_split_evenly() -> None:
-    nothing = Drawn(shapely.linestrings(np.empty((0, 2, 2))), np.empty((0, 2)))
+    nothing = DrawnBoundary(shapely.linestrings(np.empty((0, 2, 2))), np.empty((0, 2)))
     seeds = distinct(seeds_of(shapely.box(0, 0, 5, 2), nothing, d_max=2.0))
     assert sorted(x for x, y in seeds if y == 0) == pytest.approx([0, 1.667, 3.333, 5])
     assert sorted(y for x, y in seeds if x == 0) == pytest.approx([0, 2])
@@ -92,14 +92,15 @@ def test_dropped_triangles_say_why() -> None:
 def test_without_rooms_seeds_are_contour_and_column_centres() -> None:
     floor = floor_of(box(0, 0, 8, 6), elements=[column("a", 3, 3), column("b", 5, 3)])
     place = Place(navigable(floor, Settings(edge=0)))
-    seeds = distinct(seeds_of(place.rooms[0], Drawn.of(place), d_max=100))
+    seeds = distinct(seeds_of(place.rooms[0], DrawnBoundary.of(place), d_max=100))
     assert np.round(seeds, 6).tolist() == [[0, 0], [0, 6], [3, 3], [5, 3], [8, 0], [8, 6]]
 
 
 def test_with_rooms_seeds_are_corners_and_centres_of_round_elements() -> None:
     floor = hall(8, 6, column("square", 2, 3), element("round", "columns", round_column(6, 3)))
     place = Place(navigable(floor, Settings()))
-    inside = [p for p in distinct(seeds_of(place.rooms[0], Drawn.of(place), d_max=100)) if 0.5 < p[0] < 7.5]
+    seeds = distinct(seeds_of(place.rooms[0], DrawnBoundary.of(place), d_max=100))
+    inside = [p for p in seeds if 0.5 < p[0] < 7.5]
     local = [(round(x - 0.2, 3), round(y - 0.2, 3)) for x, y in inside]
     assert local == [(1.8, 2.8), (1.8, 3.2), (2.2, 2.8), (2.2, 3.2), (6, 3)]
 
@@ -232,6 +233,6 @@ def test_counts_stay_near_the_paper_s(name: str, paper: tuple[int, int], ours: t
 def test_rooms_are_split_along_their_own_contour_only() -> None:
     """Walls between two rooms belong to both, and far walls to neither."""
     place = Place(navigable(two_rooms(1.0), Settings()))
-    seeds = seeds_of(place.rooms[0], Drawn.of(place), d_max=1.0)
+    seeds = seeds_of(place.rooms[0], DrawnBoundary.of(place), d_max=1.0)
     around = shapely.LineString(segments_of(place.rooms[0]).reshape(-1, 2))
     assert shapely.distance(shapely.points(seeds), around).max() < 2e-3
