@@ -125,10 +125,13 @@ class Parameter:
         """What the value must be, in words."""
         if self.choices:
             return self.right
+        why = f" ({self.why})" if self.why else ""
+        if self.least is not None and self.most is not None:
+            return f"must be between {self.least:g} and {self.most:g}{why}"
         bounds = {"above": self.above, "at least": self.least, "below": self.below, "at most": self.most}
         told = " and ".join(f"{word} {bound:g}" for word, bound in bounds.items() if bound is not None)
         usual = {"above 0": "must be greater than 0", "at least 0": "must not be negative"}
-        return usual.get(told, f"must be {told}") + (f" ({self.why})" if self.why else "")
+        return usual.get(told, f"must be {told}") + why
 
 
 def _numbers_in(value: object) -> list[float]:
