@@ -215,7 +215,7 @@ def export(
     Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
     """
     from mission.files.atomic import write_checked
-    from mission.files.exports import FORMATS, check_uses, exported, format_named
+    from mission.files.exports import check_uses, exported, form_of, format_named
     from mission.files.exports.placing import moved, placed
     from mission.files.mission_json import read
     from mission.problems import problems_of
@@ -232,9 +232,9 @@ def export(
     supplements = _supplements(document, floor, coverage, writing)
     data = exported(there, name, supplements)
     write_checked(out, data)
-    notes = (*moved(document, there), *FORMATS[name].notes(there, supplements))
+    notes = (*moved(document, there), *form_of(name).notes(there, supplements))
     report = {"mission": str(mission), "file": str(out), "format": name, "stops": len(there.stops)}
-    _say_export({**report, "bytes": len(data), "notes": notes}, FORMATS[name].title, as_json)
+    _say_export({**report, "bytes": len(data), "notes": notes}, form_of(name).title, as_json)
 
 
 def _keep(out: Path, read_from: dict[str, Path | None]) -> None:

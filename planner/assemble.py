@@ -33,6 +33,7 @@ from mission.specs import (
     scanner_of,
     site_origin_of,
 )
+from planner.routing import GRAPHS
 from planner.shapes import local_origin
 from planner.space.gaps import Walls, keeps_clear
 from planner.space.reach import walls_of
@@ -150,6 +151,8 @@ def check_legs(route: Route) -> None:
     """
     space = route.selection.visibility.candidates.space
     origin = local_origin(space.floor)
+    graph = space.settings.graph
+    whose = space.floor.name if graph in GRAPHS else f"graph = {graph}"
     exact = walls_of(space)
     walls = Walls(exact.segments, exact.clearance - CLEAR_SLACK)
     tree = shapely.STRtree(walls.shapes())
@@ -159,6 +162,4 @@ def check_legs(route: Route) -> None:
         shape = shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0])
         if not keeps_clear(shape, walls, tree):
             x, y = leg[-1]
-            raise StopgoError(
-                f"{space.floor.name}: the leg to ({x:.3f}, {y:.3f}) comes too near an obstacle or an edge"
-            )
+            raise StopgoError(f"{whose}: the leg to ({x:.3f}, {y:.3f}) comes too near an obstacle or an edge")

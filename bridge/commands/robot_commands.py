@@ -49,8 +49,8 @@ def robot(
     controller: Annotated[
         str,
         typer.Option(
-            metavar="sim|mavlink:URL",
-            help="What carries the scanner: numbers, or the autopilot at URL.",
+            metavar="sim|mavlink:URL|MODULE:FUNCTION",
+            help="What carries the scanner: numbers, an autopilot, or a base and scanner of your own.",
         ),
     ] = "sim",
     at: Annotated[
@@ -91,6 +91,7 @@ def robot(
     """
     from bridge.mavlink.driving.autopilot_body import AutopilotBody, autopilot_url
     from bridge.robot.bodies import OpenBody, SimulatedBody
+    from bridge.robot.plugin_body import PluginBody
     from bridge.robot.program import RobotOptions, run_robot
     from bridge.robot.simulator import Faults, read_fault
 
@@ -98,9 +99,13 @@ def robot(
     if connect is not None:
         alone(given, "--connect", "--listen")
     faults, to_map = Faults(tuple(read_fault(text) for text in fault or ())), read_map(map_)
-    if url is None:
+    if controller != "sim" and url is None:
+        others = tuple(option for option in ONLY_SIMULATED if option != "--map")
+        alone(given, "a controller of your own", *others, *ONLY_DRIVEN)
+        body: OpenBody = PluginBody(controller, state, to_map)
+    elif url is None:
         alone(given, "a simulated robot", *ONLY_DRIVEN)
-        body: OpenBody = SimulatedBody(
+        body = SimulatedBody(
             state, None if at is None else read_pose("--at", at), to_map, 3600 * endurance, faults
         )
     else:

@@ -7,7 +7,6 @@ of each one's room in `space.rooms`; or `(xy, room, reason)` where it drops some
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from mission.geometry import FloatArray, IntArray, frozen
 from mission.planning import (
     AT_EDGE,
     AVOIDED,
+    DROP_REASONS,
     IN_HOLE,
     KEPT,
     OTHER_PART,
@@ -25,6 +25,7 @@ from mission.planning import (
     Candidates,
     NavigableSpace,
 )
+from mission.plugins import variant
 from planner.candidates.fallback import best_point
 from planner.candidates.given import doorways, places_to_use
 from planner.candidates.grid import grid
@@ -58,23 +59,20 @@ def judged(space: NavigableSpace, xy: FloatArray, room: IntArray, *, part: int) 
 
 
 def _from_strategy(place: Place) -> Proposals:
-    xy, room, *early = strategy(place.space.settings.candidates)(place.space)
+    xy, room, early = _generated(place.space)
     reason = place.reasons(xy, room)
-    return Proposals.of(xy, room, np.where(early[0] == KEPT, reason, early[0]) if early else reason)
+    return Proposals.of(xy, room, reason if early is None else np.where(early == KEPT, reason, early))
 
 
-def strategy(name: str) -> Strategy:
-    """A strategy by its name, or `package.module:function` of the user's own."""
-    if name in STRATEGIES:
-        return STRATEGIES[name]
-    module, _, function = name.partition(":")
-    if not function:
-        raise InputError(f"candidates = {name}: unknown; known: {', '.join(STRATEGIES)}, or module:function")
-    try:
-        found: Strategy = getattr(import_module(module), function)
-    except (ImportError, AttributeError) as error:
-        raise InputError(f"candidates = {name}: {error}") from None
-    return found
+def _generated(space: NavigableSpace) -> tuple[FloatArray, IntArray, IntArray | None]:
+    """What the strategy of the settings gives, if these are positions in rooms."""
+    method = variant("candidates", space.settings.candidates, STRATEGIES)
+    given = method.several(method.called(space), "xy, room", most=3)
+    xy = method.array(given[0], "xy", (None, 2))
+    room = method.indices(given[1], "room", length=len(xy), below=len(space.rooms))
+    if len(given) == 2:
+        return xy, room, None
+    return xy, room, method.indices(given[2], "reason", length=len(xy), below=len(DROP_REASONS))
 
 
 def _for_empty_rooms(place: Place, found: Proposals) -> Proposals:
@@ -162,4 +160,4 @@ def _no_candidate(space: NavigableSpace, reason: IntArray) -> str:
     return f"{space.floor.name}: no candidate is left ({told}); change {' or '.join(options[:2])}"
 
 
-__all__ = ["STRATEGIES", "Strategy", "candidates", "judged", "strategy"]
+__all__ = ["STRATEGIES", "Strategy", "candidates", "judged"]

@@ -1,17 +1,20 @@
 """Reads a building floor from a file: one module per kind of file, one entry in `READERS` for each.
 
 A reader's module has two functions, `survey(file, options) -> Survey` and `read(file, options) -> FloorPlan`
-(planner.floors.reader.ReaderModule). It is found by the file's suffix and by what its bytes look like.
+(planner.floors.reader.ReaderModule). It is found by the file's suffix and by what its bytes look like, among
+ours first, then among those of installed packages.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from mission.errors import InputError
 from mission.floor import FloorPlan
+from mission.plugins import Variant
+from planner.floors.foreign import foreign_readers, sound
 from planner.floors.reader import FloorFile, FloorOptions, Reader
 from planner.floors.survey import Survey
 
@@ -40,7 +43,9 @@ def read_floor(path: Path, options: FloorOptions | None = None) -> FloorPlan:
         nothing to such a file.
     """
     file, reader, options = _opened(path, options)
-    return reader.load().read(file, options)
+    with reader.blamed():
+        floor = reader.what.load().read(file, options)
+    return floor if reader.ours else sound(reader, floor, file.digest)
 
 
 def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
@@ -52,7 +57,9 @@ def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
         As `read_floor` does.
     """
     file, reader, options = _opened(path, options)
-    return reader.load().survey(file, options)
+    with reader.blamed():
+        found = reader.what.load().survey(file, options)
+    return cast("Survey", reader.noun(found, Survey))
 
 
 def options_of(settings: Settings) -> FloorOptions:
@@ -60,28 +67,34 @@ def options_of(settings: Settings) -> FloorOptions:
     return FloorOptions(d_dis=settings.d_dis, layers=settings.layer_roles)
 
 
-def _opened(path: Path, options: FloorOptions | None) -> tuple[FloorFile, Reader, FloorOptions]:
+def _opened(path: Path, options: FloorOptions | None) -> tuple[FloorFile, Variant[Reader], FloorOptions]:
     """The file, its reader, and the options, all of which mean something to the reader."""
     options = options or FloorOptions()
     file = FloorFile(path, _bytes_of(path))
     reader = _reader_of(file)
-    vain = [name for name in options.given if name not in reader.takes]
+    takes = reader.what.takes
+    vain = [name for name in options.given if name not in takes]
     if vain:
         raise InputError(
-            f"{path}: --{_option(vain[0])} means nothing for a {reader.kind}; "
-            f"leave it out (known for it: {_listed(reader.takes)})"
+            f"{path}: --{_option(vain[0])} means nothing for a {reader.what.kind}; "
+            f"leave it out (known for it: {_listed(takes)})"
         )
     return file, reader, options
 
 
-def _reader_of(file: FloorFile) -> Reader:
+def _reader_of(file: FloorFile) -> Variant[Reader]:
     """By suffix, unless the bytes are plainly those of another kind."""
     suffix = file.path.suffix.lower()
     named = [reader for reader in READERS if suffix in reader.suffixes]
     alike = [reader for reader in READERS if reader.holds(file.data)]
     for reader in (*(item for item in named if item in alike), *alike, *named):
-        return reader
-    known = ", ".join(suffix for reader in READERS for suffix in reader.suffixes)
+        return Variant(reader.kind, reader.module, reader)
+    others = list(foreign_readers())
+    for other in others:
+        if suffix in other.what.suffixes:
+            return other
+    readers = (*READERS, *(other.what for other in others))
+    known = ", ".join(suffix for reader in readers for suffix in reader.suffixes)
     raise InputError(f"{file.path}: unknown kind of file '{suffix}'; floors are read from {known}")
 
 

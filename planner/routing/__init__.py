@@ -16,8 +16,10 @@ import numpy as np
 from mission.errors import AnswerIsNo, InputError
 from mission.geometry import FloatArray, IntArray, frozen, polyline_length
 from mission.planning import NavigableSpace, Route, Selection
+from mission.plugins import Variant, variant
 from planner.routing.colony import ant_colony
 from planner.routing.grid_graph import grid_ways
+from planner.routing.legs import Legs
 from planner.routing.proof import proved
 from planner.routing.roadmap import ways_between
 from planner.routing.tour import NANOMETRES, nanometres, shortest_tour
@@ -50,14 +52,13 @@ def route(selection: Selection) -> Route:
     """
     space = selection.visibility.candidates.space
     settings = space.settings
-    for key, known in (("router", ROUTERS), ("graph", GRAPHS)):
-        if getattr(settings, key) not in known:
-            raise InputError(f"{key} = {getattr(settings, key)}: unknown; known: {', '.join(known)}")
+    router = variant("router", settings.router, ROUTERS)
+    graph = variant("graph", settings.graph, GRAPHS)
     points, ends = _points_and_ends(selection)
-    ways = GRAPHS[settings.graph](space, points)
+    ways = Legs(graph, graph.noun(graph.called(space, points), Ways), points)
     if not np.isfinite(ways.lengths).all():
         raise AnswerIsNo(f"{space.floor.name}: the route's end is not connected with its stops")
-    sequence, bound, method = _ordered(ways.lengths, ends, settings.router, seed=settings.seed)
+    sequence, bound, method = _ordered(ways.lengths, ends, router, seed=settings.seed)
     method += "" if settings.graph == "exact" else f", over the ways of --graph {settings.graph}"
     return _assembled(selection, points, ways, sequence, ends, bound, method)
 
@@ -110,15 +111,20 @@ def _stop_at_door(selection: Selection) -> tuple[int | None, str]:
     return int(order[0]), f"the stop nearest the widest exterior door, {widest.opening.id}"
 
 
-def _ordered(lengths: FloatArray, ends: Ends, router: str, *, seed: int) -> tuple[list[int], float, str]:
+def _ordered(
+    lengths: FloatArray, ends: Ends, router: Variant[Router], *, seed: int
+) -> tuple[list[int], float, str]:
     """The points in the order of driving, what no such route is shorter than, and how that is known.
 
     The default router takes the proof's tour where that is shorter; others are reported as they are.
     """
     matrix = tour_matrix(lengths, ends)
-    proof = proved(nanometres(matrix), ROUTERS[router](matrix, seed=seed), improve=router == "default")
+    order = router.indices(router.called(matrix, seed=seed), "order", length=len(matrix), below=len(matrix))
+    if len(set(order.tolist())) < len(order):
+        raise router.wrong("order visits a point twice")
+    proof = proved(nanometres(matrix), order, improve=router.name == "default")
     bound = proof.bound / NANOMETRES - far_edge(lengths, ends)
-    method = METHODS[router] + (", proved optimal" if proof.closed else "")
+    method = METHODS.get(router.name, router.name) + (", proved optimal" if proof.closed else "")
     return _sequence(proof.order, ends, len(lengths)), max(0.0, bound), method
 
 
@@ -164,7 +170,7 @@ def _sequence(order: IntArray, ends: Ends, points: int) -> list[int]:
 def _assembled(
     selection: Selection,
     points: FloatArray,
-    ways: Ways,
+    ways: Legs,
     sequence: list[int],
     ends: Ends,
     bound: float,

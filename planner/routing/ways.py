@@ -33,6 +33,8 @@ class Ways:
         before = dijkstra(self.graph, False, start, return_predecessors=True, limit=limit)[1]
         nodes = [end]
         while nodes[-1] != start:
+            if before[nodes[-1]] < 0:
+                raise ValueError(f"no way leads from point {start} to point {end}")
             nodes.append(int(before[nodes[-1]]))
         line = self.xy[nodes[::-1]]
         if len(line) < 2 or np.all(line == line[0]):

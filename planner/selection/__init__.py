@@ -10,9 +10,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mission.errors import AnswerIsNo, InputError
+from mission.errors import AnswerIsNo
 from mission.geometry import FloatArray, IntArray, frozen
 from mission.planning import Selection, Visibility
+from mission.plugins import Variant, variant
 from mission.settings import Settings
 from planner.selection.bound import lower_bound
 from planner.selection.cover import Cover, cover_of
@@ -57,8 +58,7 @@ def select(visibility: Visibility) -> Selection:
     """
     candidates = visibility.candidates
     settings = candidates.space.settings
-    if settings.selector not in METHODS:
-        raise InputError(f"selector = {settings.selector}: unknown; known: {', '.join(METHODS)}")
+    method = variant("selector", settings.selector, METHODS)
     whole = cover_of(visibility, demands_of(visibility))
     fixed = np.union1d(candidates.must_rows, candidates.doorway_rows if settings.door_scan else [])
     fixed = fixed.astype(np.int64)
@@ -66,12 +66,27 @@ def select(visibility: Visibility) -> Selection:
     if not settings.door_candidates:
         offered = np.setdiff1d(offered, candidates.doorway_rows)
     problem = whole.after(fixed).offering(offered)
-    rows, bound = METHODS[settings.selector](problem, settings)
+    rows, bound = _solved(method, problem, settings)
     chosen = np.concatenate([fixed, in_greedy_order(problem, rows)]).astype(np.int64)
-    return _selection(visibility, whole, chosen, len(fixed) + bound)
+    return _selection(visibility, whole, chosen, len(fixed) + bound, method)
 
 
-def _selection(visibility: Visibility, whole: Cover, chosen: IntArray, bound: int) -> Selection:
+def _solved(method: Variant[Selector], problem: Cover, settings: Settings) -> tuple[IntArray, int]:
+    """The rows and the bound that a method gives, if they are some and meet every demand."""
+    given, told = method.several(method.called(problem, settings), "rows, bound")
+    rows = method.indices(given, "rows", length=None, below=problem.rows)
+    bound = int(method.indices([told], "bound", length=1, below=len(rows) + 1)[0])
+    if len(set(rows.tolist())) < len(rows):
+        raise method.wrong("gave a row twice")
+    missed = np.flatnonzero(problem.missing(problem.covered_by(rows)))
+    if len(missed) and not method.ours:
+        raise method.wrong(f"its {len(rows)} rows leave {len(missed)} of the coverages asked for unmet")
+    return rows, bound
+
+
+def _selection(
+    visibility: Visibility, whole: Cover, chosen: IntArray, bound: int, method: Variant[Selector]
+) -> Selection:
     settings = visibility.candidates.space.settings
     steps = _coverage_steps(whole, chosen)
     if whole.missing(whole.covered_by(chosen))[0] > 0:
@@ -80,14 +95,14 @@ def _selection(visibility: Visibility, whole: Cover, chosen: IntArray, bound: in
             f"{name}: coverage {reached:.3f} is reached, not {settings.coverage:g}; "
             "lower --coverage or offer more candidates"
         )
-    proved = ", proved fewest" if len(chosen) == bound else ""
+    proved = ", proved fewest" if method.ours else ", by its own word fewest"
     return Selection(
         visibility=visibility,
         chosen=frozen(chosen, np.int64),
         coverage_steps=frozen(steps),
         required=settings.coverage,
         bound=bound,
-        method=NAMES[settings.selector] + proved,
+        method=NAMES.get(method.name, method.name) + (proved if len(chosen) == bound else ""),
     )
 
 

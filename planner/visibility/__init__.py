@@ -7,8 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from mission.errors import AnswerIsNo, InputError
+import numpy as np
+
+from mission.errors import AnswerIsNo
 from mission.planning import Candidates, Visibility
+from mission.plugins import Variant, variant
 from planner.visibility.bresenham import bresenham
 from planner.visibility.exact_sight import exact
 from planner.visibility.headings import with_headings
@@ -23,15 +26,33 @@ def visibility(candidates: Candidates) -> Visibility:
     With a field of view below 360° the candidates of the result are positions with headings.
     """
     settings = candidates.space.settings
-    if settings.visibility not in METHODS:
-        raise InputError(f"visibility = {settings.visibility}: unknown; known: {', '.join(METHODS)}")
-    found = METHODS[settings.visibility](candidates)
+    method = variant("visibility", settings.visibility, METHODS)
+    found = _sound(method, method.called(candidates), candidates)
     if not len(found.first):
         raise AnswerIsNo(
             f"{candidates.space.floor.name}: no target is within {settings.range:g} m of a candidate "
             "and in its sight; raise --range or lower --grid"
         )
     return with_headings(found) if settings.fov < 360 else found
+
+
+def _sound(method: Variant[VisibilityMethod], given: object, candidates: Candidates) -> Visibility:
+    """What a method gives, if it is runs of units on segments, in order, for each kept candidate."""
+    found: Visibility = method.noun(given, Visibility)
+    if found.candidates is not candidates:
+        raise method.wrong("is of other candidates than those it was given")
+    targets = candidates.space.targets
+    runs = len(found.first)
+    pointer = method.indices(found.pointer, "pointer", length=len(candidates.kept) + 1, below=runs + 1)
+    segment = method.indices(found.segment, "segment", length=runs, below=len(targets.units))
+    first = method.indices(found.first, "first", length=runs, below=targets.total)
+    last = method.indices(found.last, "last", length=runs, below=targets.total)
+    if (np.diff(pointer) < 0).any() or pointer[0] != 0 or pointer[-1] != runs:
+        raise method.wrong("pointer does not go from 0 up to the number of runs")
+    of = targets.unit_segment
+    if (last < first).any() or (of[first] != segment).any() or (of[last] != segment).any():
+        raise method.wrong("a run's units do not lie on its segment")
+    return found
 
 
 __all__ = ["METHODS", "VisibilityMethod", "visibility"]

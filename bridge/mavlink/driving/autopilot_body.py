@@ -14,7 +14,6 @@ from bridge.mavlink.driving.onboard_autopilot import on_board
 from bridge.mavlink.line.wire import read_line
 from bridge.robot.bodies import Body
 from mission.document import Mission
-from mission.errors import InputError
 
 MAVLINK = "mavlink:"
 
@@ -48,17 +47,5 @@ class AutopilotBody:
 
 
 def autopilot_url(controller: str) -> str | None:
-    """The URL in `mavlink:URL`; `None` for `sim`.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
-    if controller == "sim":
-        return None
-    if not controller.startswith(MAVLINK):
-        raise InputError(
-            f"--controller {controller}: sim, or mavlink: and a URL, as mavlink:udpin:127.0.0.1:14550"
-        )
-    return controller.removeprefix(MAVLINK)
+    """The URL in `mavlink:URL`; `None` for any other controller."""
+    return controller.removeprefix(MAVLINK) if controller.startswith(MAVLINK) else None

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from mission.document import Mission
+from mission.document import Mission, Point
 from mission.errors import InputError, StopgoError
 from mission.files.exports import (
     geojson,
@@ -20,6 +20,7 @@ from mission.files.exports import (
     vda5050,
 )
 from mission.files.exports.format import Format, Supplements
+from mission.plugins import Variant, variant
 
 QUANTUM = 0.008
 """Metres by which 1e-7 degrees move a place at most."""
@@ -77,8 +78,7 @@ def format_named(name: str | None, path: Path) -> str:
         When there is no such format; it lists all.
     """
     if name is not None:
-        if name not in FORMATS:
-            raise InputError(f"--to {name}: no such format; known: {', '.join(FORMATS)}")
+        form_of(name)
         return name
     fitting = [key for key, form in FORMATS.items() if path.name.lower().endswith(form.suffix)]
     if not fitting:
@@ -87,12 +87,23 @@ def format_named(name: str | None, path: Path) -> str:
     return fitting[0]
 
 
+def form_of(name: str) -> Format:
+    """The format of this name: ours, an installed package's, or `package.module:FORMAT`."""
+    return _form(name).what
+
+
+def _form(name: str) -> Variant[Format]:
+    found = variant("format", name, FORMATS, said=f"--to {name}")
+    found.noun(found.what, Format)
+    return found
+
+
 def check_uses(name: str, given: Mapping[str, object]) -> None:
     """Refuse an option that a format has no use for, rather than leave it out in silence."""
     for option, value in given.items():
-        if value is not None and option not in FORMATS[name].uses:
+        if value is not None and option not in form_of(name).uses:
             fitting = ", ".join(form.suffix for form in FORMATS.values() if option in form.uses)
-            raise InputError(f"--{option}: {FORMATS[name].title} has no use for it; it is for {fitting}")
+            raise InputError(f"--{option}: {form_of(name).title} has no use for it; it is for {fitting}")
 
 
 def exported(mission: Mission, name: str, supplements: Supplements) -> bytes:
@@ -105,19 +116,23 @@ def exported(mission: Mission, name: str, supplements: Supplements) -> bytes:
     AnswerIsNo
         When the format cannot hold what the mission depends on.
     """
-    form = FORMATS[name]
+    found = _form(name)
+    form = found.what
     if form.georeferenced and mission.georeference is None:
         raise InputError(
             f"{mission.name}: has no georeference, and {form.title} holds latitudes and longitudes; "
             "give --origin LAT,LON,ALT,HEADING, or plan with it"
         )
-    data = form.write(mission, supplements)
-    _check(data, form, mission, supplements)
-    return data
+    with found.blamed():
+        data = found.noun(form.write(mission, supplements), bytes)
+        places = form.read_back(data, mission, supplements)
+    if not found.ours:
+        found.array(places, "read_back", (None, 2))
+    _check(places, form, mission)
+    return bytes(data)
 
 
-def _check(data: bytes, form: Format, mission: Mission, supplements: Supplements) -> None:
-    places = form.read_back(data, mission, supplements)
+def _check(places: list[Point], form: Format, mission: Mission) -> None:
     if len(places) != len(mission.stops):
         raise StopgoError(
             f"{form.title}: {len(mission.stops)} stops were written but {len(places)} read back; "
@@ -125,7 +140,7 @@ def _check(data: bytes, form: Format, mission: Mission, supplements: Supplements
         )
     for stop, place in zip(mission.stops, places, strict=True):
         off = math.dist((stop.x, stop.y), place)
-        if not off <= form.tolerance:
+        if not off <= min(form.tolerance, QUANTUM):
             raise StopgoError(
                 f"{form.title}: stop {stop.id} reads back {off:.6f} m off; nothing is kept, "
                 "please report this"
