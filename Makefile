@@ -4,6 +4,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
+# Every test that starts a process would compile the sources anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test lint types faults benchmarks clean
 
 $(STAMP): pyproject.toml constraints.txt
@@ -25,9 +28,9 @@ types: $(STAMP)
 test: lint types
 	$(BIN)/python -m pytest -n 4 --dist loadfile
 
-# The long forms: every fault at full size, and every table of figures.
+# The long forms (docs/contributing.md): every fault and every sweep at full size, and every table of figures.
 faults: $(STAMP)
-	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults
+	STOPGO_FAULTS=full $(BIN)/python -m pytest tests/faults tests/planner tests/mission
 
 benchmarks: $(STAMP)
 	for name in paper shares visibility tours growth bridge fleet mavlink; do $(BIN)/python -m benchmarks.$$name || exit 1; done

@@ -21,8 +21,14 @@ from planner.appraisal.unreached import unreached
 from planner.candidates import candidates
 from planner.floors import read_floor
 from planner.space.navigable import navigable
+from tests.faults.sizes import FULL, some
+from tests.planner.checking.test_claims import counted
 from tests.planner.checks import check_plan, check_rooms_are_joined
 from tests.planner.worlds import FLOORS, SHARED, changed, moved, planned, shifted, turned
+
+LARGEST = "layered/office-l1.dxf"
+AGAIN = FLOORS if FULL else [name for name in FLOORS if name != LARGEST and "case1" not in name]
+"""Floors that are planned more than once; the others take as long as all of these together."""
 
 
 @lru_cache
@@ -44,17 +50,25 @@ def test_a_real_floor_is_planned_well(name: str) -> None:
     assert nouns[Selection].coverage >= 0.9
 
 
+@pytest.mark.parametrize("name", [name for name in FLOORS if name != LARGEST])
+def test_what_a_plan_of_a_real_floor_claims_is_so(name: str) -> None:
+    mission, nouns = the_plan(name)
+    found, problems = counted(mission, nouns)
+    assert problems == []
+    assert found.share == nouns[Selection].coverage
+
+
 @pytest.mark.parametrize("name", [name for name in FLOORS if "structural" not in name])
 def test_rooms_joined_by_a_passable_opening_are_connected(name: str) -> None:
     assert check_rooms_are_joined(the_plan(name)[1][NavigableSpace]) > 0
 
 
-@pytest.mark.parametrize("name", [name for name in FLOORS if "case1" not in name])
+@pytest.mark.parametrize("name", AGAIN)
 def test_two_plans_of_a_floor_are_the_same_bytes(name: str) -> None:
     assert encode(planned(floor(name))[0]) == encode(the_plan(name)[0])
 
 
-@pytest.mark.parametrize("name", [name for name in FLOORS if "office" not in name and "case1" not in name])
+@pytest.mark.parametrize("name", AGAIN)
 def test_the_order_of_entities_does_not_change_a_plan(name: str) -> None:
     random = np.random.default_rng(1)
     original = floor(name)
@@ -79,25 +93,29 @@ def test_elements_drawn_twice_do_not_change_a_plan(name: str) -> None:
     assert encode(planned(other)[0]) == encode(the_plan(name)[0])
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [
-        Settings(d_sec=0.35, edge=0.0, grid=0.7),
-        Settings(robot_radius=0.25, range=10.0, coverage=1.0),
-        Settings(doors="closed", coverage=0.5, tour="closed"),
-        Settings(targets=("columns", "walls", "beams"), selector="greedy"),
-        Settings(d_sec=1.0, door_access=0.8, d_dis=0.2),
-        Settings(edge=0.0, d_dis=0.1),
-        Settings(candidates="triangulation"),
-        Settings(selector="exact", d_dis=0.2, node_limit=200),
-        Settings(router="aco", d_dis=0.1),
-        Settings(door_scan=True, d_dis=0.1),
-        Settings(door_candidates=True, coverage=1.0, d_dis=0.1),
-        Settings(fov=120.0, d_dis=0.1),
-    ],
-    ids=lambda settings: ", ".join(changed(settings)),
+REAL = ("layered/fzk-haus-eg.dxf", "paper/synthetic_case2_rooms.dxf")
+OTHERS = (
+    Settings(d_sec=0.35, edge=0.0, grid=0.7),
+    Settings(robot_radius=0.25, range=10.0, coverage=1.0),
+    Settings(doors="closed", coverage=0.5, tour="closed"),
+    Settings(targets=("columns", "walls", "beams"), selector="greedy"),
+    Settings(d_sec=1.0, door_access=0.8, d_dis=0.2),
+    Settings(edge=0.0, d_dis=0.1),
+    Settings(candidates="triangulation"),
+    Settings(selector="exact", d_dis=0.2, node_limit=200),
+    Settings(router="aco", d_dis=0.1),
+    Settings(door_scan=True, d_dis=0.1),
+    Settings(door_candidates=True, coverage=1.0, d_dis=0.1),
+    Settings(fov=120.0, d_dis=0.1),
 )
-@pytest.mark.parametrize("name", ["layered/fzk-haus-eg.dxf", "paper/synthetic_case2_rooms.dxf"])
+"""In the short form, each on one of the two floors."""
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    some([(REAL[(k + n) % 2], settings) for k, settings in enumerate(OTHERS) for n in range(2)], every=2),
+    ids=lambda case: case if isinstance(case, str) else ", ".join(changed(case)),
+)
 def test_other_settings_are_planned_well(name: str, settings: Settings) -> None:
     mission, nouns = planned(floor(name), settings)
     check_plan(mission, nouns, settings, brute=settings.fov == 360)

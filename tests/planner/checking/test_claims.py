@@ -25,9 +25,6 @@ from planner.sight.sight import sight
 from tests.journeys.test_base import without_extras
 from tests.planner.test_command import drawn
 from tests.planner.worlds import (
-    LAYERED,
-    PAPER,
-    SHARED,
     column,
     hall,
     moved,
@@ -65,18 +62,6 @@ def test_what_a_plan_claims_is_so(name: str, move: Any) -> None:
     assert problems == []
     assert [len(units) for units in found.by_stop] == [stop.sees.units for stop in mission.stops]
     assert np.array_equal(found.visible, nouns[Selection].visibility.visible)
-    assert found.share == nouns[Selection].coverage
-
-
-@pytest.mark.parametrize("name", [*PAPER, *LAYERED[:2]])
-def test_what_a_plan_of_a_real_floor_claims_is_so(name: str) -> None:
-    from planner.floors import read_floor
-
-    if not (SHARED / name).exists():
-        pytest.skip(f"{SHARED / name} is not there")
-    mission, nouns = planned(read_floor(SHARED / name), Settings())
-    found, problems = counted(mission, nouns)
-    assert problems == []
     assert found.share == nouns[Selection].coverage
 
 

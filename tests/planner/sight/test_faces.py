@@ -17,6 +17,7 @@ from planner.sight.mesh import mesh_of
 from planner.sight.sight import scene_of
 from planner.space.targets import occluders_of, without_cracks
 from planner.visibility.exact_sight import open_space
+from tests.faults.sizes import some
 from tests.planner.visibility.test_visibility import at, by_force, rows_of, shared
 from tests.planner.worlds import LAYERED, PAPER, box, floor_of, moved, turned, wall
 
@@ -78,8 +79,9 @@ def test_snapping_again_changes_nothing(seed: int) -> None:
         assert shapely.equals_exact(snapped(once), once)
 
 
-@pytest.mark.parametrize("degrees", [33.3, 70.2, 140.1])
-@pytest.mark.parametrize("name", [*PAPER, *LAYERED])
+@pytest.mark.parametrize(
+    ("name", "degrees"), some([(n, d) for n in (*PAPER, *LAYERED) for d in (33.3, 70.2, 140.1)], every=2)
+)
 def test_each_face_of_a_turned_floor_is_one_edge_of_open_space(name: str, degrees: float) -> None:
     floor = moved(shared(name), turned(degrees))
     seen = at(floor, floor.outline[0].exterior[:1])
