@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from mission.events import AnyEvent, PoseReport
 from mission.run_log import LogSource, RunLog, Track
 
@@ -37,10 +39,16 @@ class HeardRun:
         events = tuple(self._events[number] for number in sorted(self._events))
         if not events:
             return None
-        poses = Track.of(
-            [item.robot_ns for item in self._poses],
-            [(item.pose.x, item.pose.y) for item in self._poses],
-            [item.pose.heading for item in self._poses],
-        )
         last = events[-1]
-        return RunLog(last.robot, last.run_id, last.mission_id, last.revision, SOURCE, poses, events)
+        return RunLog(
+            last.robot, last.run_id, last.mission_id, last.revision, SOURCE, track_of(self._poses), events
+        )
+
+
+def track_of(reports: Sequence[PoseReport]) -> Track:
+    """Poses that were told one by one."""
+    return Track.of(
+        [item.robot_ns for item in reports],
+        [(item.pose.x, item.pose.y) for item in reports],
+        [item.pose.heading for item in reports],
+    )

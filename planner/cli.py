@@ -150,6 +150,7 @@ def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch) -> 
     from mission.files.mission_json import encode
     from mission.files.plan_svg import plan_svg
     from mission.schedule import schedule
+    from mission.sight import sight_of
     from planner.outputs import names
     from planner.report import PlanReport
 
@@ -165,7 +166,8 @@ def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch) -> 
         document,
     ):
         if recording is not None:
-            for noun in (*part.nouns(), mission, schedule(mission)):
+            sight = sight_of(part.route, mission, part.figures)
+            for noun in (*part.nouns(), mission, schedule(mission), sight):
                 recording.observe(noun)
             recording.write(recorded[0])
         watch.lap("recording")

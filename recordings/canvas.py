@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,8 @@ class Canvas:
     stream: rr.RecordingStream
     origin: LocalOrigin
     drawn: rr.BinaryStream
+    counts: Counter[str] = field(default_factory=Counter)
+    """Rows drawn so far, by entity."""
 
     def taken(self) -> bytes:
         """All that was drawn since it was last taken, as a recording in Rerun's format."""
@@ -62,6 +65,7 @@ class Canvas:
 
     def show(self, entity: str, *archetypes: Any) -> None:
         """Draw at every time of every timeline."""
+        self.counts[entity] = max(1, self.counts[entity])
         self.stream.log(entity, *archetypes, static=True)
 
     def at(
@@ -86,6 +90,7 @@ class Canvas:
             self.stream.set_time(entities.MISSION_TIME, duration=mission_s)
         if robot_ns is not None:
             self.stream.set_time(entities.ROBOT_TIME, timestamp=np.datetime64(robot_ns, "ns"))
+        self.counts[entity] += 1
         self.stream.log(entity, archetype)
 
     def say(self, text: str, *, level: str = "INFO", step: int = 0) -> None:
@@ -96,9 +101,11 @@ class Canvas:
         """A property of the recording; each value must be of one type wherever this name is used."""
         self.stream.send_property(name, rr.DynamicArchetype(name, components=values))
 
-    def columns(self, entity: str, index: rr.TimeColumn, *groups: Any) -> None:
-        """Draw many rows at once, one per time of `index`."""
-        self.stream.send_columns(entity, indexes=[index], columns=[c for group in groups for c in group])
+    def columns(self, entity: str, index: rr.TimeColumn | Sequence[rr.TimeColumn], *groups: Any) -> None:
+        """Draw many rows at once, one per time of `index`, which may be on several timelines."""
+        indexes = [index] if isinstance(index, rr.TimeColumn) else list(index)
+        self.counts[entity] += len(indexes[0].times)
+        self.stream.send_columns(entity, indexes=indexes, columns=[c for group in groups for c in group])
 
 
 @dataclass(frozen=True, kw_only=True)

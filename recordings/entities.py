@@ -74,10 +74,14 @@ LOG_PLAN = "/log/plan"
 LOG_FIELD = "/log/field"
 REPORT = "/report"
 
+MISSION = "/carried/mission"
+SIGHT = "/carried/sight"
+
 PROPERTIES = "/__properties"
 PROPERTY_PLAN = "plan"
 PROPERTY_PARAMETERS = "parameters"
 PROPERTY_RUN = "run"
+PROPERTY_END = "end"
 
 
 def under(entity: str) -> str:
@@ -138,7 +142,7 @@ class RunEntities:
     @property
     def events(self) -> str:
         """Events as values."""
-        return self.flat("events")
+        return self.flat(EVENTS)
 
 
 @dataclass(frozen=True)
@@ -157,6 +161,7 @@ class Revision:
         return self.run.solid(f"revision_{self.number}/{name}")
 
 
+EVENTS = "events"
 ROBOT = "robot"
 DRIVEN = "driven"
 STATE = "state"
@@ -173,6 +178,24 @@ WITHDRAWN_ROUTE = "withdrawn_route"
 NEW_STOPS = "stops"
 NEW_ROUTE = "route"
 """Names within a revision, for `Revision.flat` and `Revision.solid`."""
+
+
+def mission(revision: int) -> str:
+    """The document of a revision."""
+    return f"{MISSION}/revision_{revision}"
+
+
+def sight(revision: int) -> str:
+    """What the stops of a revision see."""
+    return f"{SIGHT}/revision_{revision}"
+
+
+def carries(entity: str) -> bool:
+    """Whether values of the entity are read back."""
+    parts = entity.split("/")
+    if entity.startswith((f"{MISSION}/", f"{SIGHT}/", f"{FLOOR}/")):
+        return True
+    return len(parts) == 4 and f"/{parts[1]}" == FIELD and parts[3] in (EVENTS, ROBOT)
 
 
 def run_of_events(entity: str) -> str | None:

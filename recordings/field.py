@@ -10,13 +10,19 @@ from typing import Any
 
 from mission.document import Mission
 from mission.errors import InputError
-from mission.events import AnyEvent, PoseReport, Report, StateReport
+from mission.events import Aborted, AnyEvent, Finished, PoseReport, Report, StateReport
 from mission.files.atomic import must_be_writable
+from mission.heard_run import track_of
 from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
+from recordings.carried.checking import carry_end
+from recordings.carried.mission import carry_mission
 from recordings.compact import compact
 from recordings.pieces import Pieces
 from recordings.runs.drawing import RunDrawing
 from recordings.stages.mission import draw_mission, mission_extent
+
+MOST_POSES = 1000
+"""Poses that wait to be drawn together; a state comes each second and lets them be drawn."""
 
 
 class FieldRecording:
@@ -37,6 +43,8 @@ class FieldRecording:
         self.path = path
         self._say = say
         self._waiting: list[Report] = []
+        self._poses: list[PoseReport] = []
+        self._told_end = False
         self._runs: dict[str, RunDrawing] = {}
         self._first: Mission | None = None
         self._newest: Mission | None = None
@@ -62,10 +70,12 @@ class FieldRecording:
             raise InputError(
                 f"{self.path}: is of mission {self._first.id}, not {mission.id}: use another file"
             )
-        self._newest = mission
         if self._first is None:
             self._first = mission
             self._begin(mission)
+        elif self._newest is not None and mission.revision != self._newest.revision:
+            carry_mission(self.canvas, mission)
+        self._newest = mission
         waiting, self._waiting = self._waiting, []
         for report in waiting:
             self._take(report)
@@ -82,6 +92,9 @@ class FieldRecording:
     def event(self, event: AnyEvent) -> None:
         """Take a line of the robot's journal; what was told before it is on disk then."""
         self._take(event)
+        self._told_end = isinstance(event, Finished | Aborted) and not self._waiting
+        if self._told_end:  # now and not when it is closed: the disk may be full then
+            carry_end(self.canvas)
         self._save()
 
     @property
@@ -95,6 +108,9 @@ class FieldRecording:
         if self._canvas is not None:
             for report in self._waiting:
                 self._draw(report)
+            self._draw_poses()
+            if not self._told_end:
+                carry_end(self._canvas)
             self._save()
         self._open.close()
         fault = None if self._pieces is None else self._closed(self._pieces)
@@ -131,6 +147,7 @@ class FieldRecording:
         )
         self._canvas = self._open.enter_context(open_canvas(sheet, port=self._port))
         draw_mission(self._canvas, mission)
+        carry_mission(self._canvas, mission)
         self._save()
 
     def _take(self, report: Report) -> None:
@@ -141,13 +158,29 @@ class FieldRecording:
             self._draw(report)
 
     def _draw(self, report: Report) -> None:
+        """Draw a report; poses wait for others, and are drawn before what is told after them."""
         assert self._newest is not None
         if report.run_id is None:
             return
         run = self._runs.get(report.run_id) or self._start(report.run_id)
+        if isinstance(report, PoseReport):
+            self._poses.append(report)
+            if len(self._poses) >= MOST_POSES:
+                self._draw_poses()
+            return
+        self._draw_poses()
         if run.mission.revision < min(_revision(report), self._newest.revision):
             run.follow(self._newest, report)
         _DRAW[type(report)](run, report)
+
+    def _draw_poses(self) -> None:
+        """Draw the poses that wait, run by run."""
+        poses, self._poses = self._poses, []
+        for run_id in dict.fromkeys(item.run_id for item in poses):
+            mine = [item for item in poses if item.run_id == run_id]
+            run = self._runs[str(run_id)]
+            run.tell_time(mine[-1])
+            run.poses(track_of(mine))
 
     def _start(self, run_id: str) -> RunDrawing:
         assert self._first is not None
@@ -161,13 +194,13 @@ def _revision(report: Report) -> int:
 
 
 class _Draw(dict[type, Callable[[RunDrawing, Any], None]]):
-    """How each report is drawn; every report that is neither state nor pose is an event."""
+    """How each report is drawn; every report that is no state is an event; poses are drawn together."""
 
     def __missing__(self, kind: type) -> Callable[[RunDrawing, Any], None]:
         return RunDrawing.event
 
 
-_DRAW = _Draw({StateReport: RunDrawing.state, PoseReport: RunDrawing.pose})
+_DRAW = _Draw({StateReport: RunDrawing.state})
 
 
 def _free_name(path: Path) -> Path:

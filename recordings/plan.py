@@ -13,8 +13,12 @@ from mission.document import Mission
 from mission.floor import FloorPlan
 from mission.geometry import bounds
 from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
+from mission.sight import Sight
 from recordings import entities
 from recordings.canvas import Canvas, LocalOrigin, Sheet, local_origin, mission_origin, open_canvas
+from recordings.carried.checking import carry_end
+from recordings.carried.mission import carry_mission
+from recordings.carried.sight import carry_sight
 from recordings.layout import Bounds
 from recordings.read import check
 from recordings.report import Nouns, parameter_values, parameters, plan_report, plan_results
@@ -41,7 +45,8 @@ DRAWINGS: dict[type, tuple[Drawing, ...]] = {
     Visibility: (draw_visibility,),
     Selection: (draw_selection, paint_coverage),
     Route: (tell_route,),
-    Mission: (draw_mission,),
+    Mission: (draw_mission, carry_mission),
+    Sight: (carry_sight,),
 }
 """How each noun is drawn; nouns of other types are left out."""
 
@@ -75,6 +80,7 @@ def _drawn(recording_id: str, nouns: Nouns) -> bytes:
                 draw(canvas, nouns[kind])
         _draw_planned_drive(canvas, nouns)
         _tell(canvas, nouns)
+        carry_end(canvas)
         return canvas.taken()
 
 

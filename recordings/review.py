@@ -1,132 +1,133 @@
-"""What a recording tells of a plan and of runs, as one noun: for `stopgo review`."""
+"""What recordings tell of plans and runs: read together, each run beside its plan; for `stopgo review`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mission.comparing.compare import compare
+from mission.comparing.judging import judge
+from mission.comparing.telling import comparison_json, comparison_text
+from mission.comparison import Comparison
+from mission.document import Mission
 from mission.errors import InputError
+from mission.sight import Sight
 from recordings import entities
-from recordings.read import Contents, check_apart, chunks, rows
+from recordings.carried.checking import problems_of
+from recordings.carried.reading import Recording, read_recording
+
+SUFFIX = ".rrd"
 
 
-@dataclass
-class RunReview:
-    """One run, from its events."""
+@dataclass(frozen=True, eq=False)
+class RecordingReview:
+    """One recording, and its runs compared with whatever plan of their mission was read."""
 
-    run_id: str
-    revisions: list[int] = field(default_factory=list)
-    """Those of the mission that the run followed, in this order; none in recordings that do not tell."""
-    scanned: list[str] = field(default_factory=list)
-    unconfirmed: list[str] = field(default_factory=list)
-    """Worked off by an autopilot that told nothing of a scan."""
-    skipped: list[str] = field(default_factory=list)
-    failed: list[str] = field(default_factory=list)
-    deviation_m: dict[str, float] = field(default_factory=dict)
-    """Distance from each stop when the robot arrived there."""
-    ended: str | None = None
-    """`Finished` or `Aborted`; None while it runs, or when the recording stops before."""
-    seconds: float = 0.0
-    """Mission time of the last event."""
-
-
-@dataclass(frozen=True)
-class Review:
-    """A recording in short."""
-
-    contents: Contents
-    plan: dict[str, Any] | None
-    """Results of the plan's stages, if a plan is in it."""
-    runs: tuple[RunReview, ...]
+    recording: Recording
+    comparisons: tuple[Comparison, ...]
+    problems: tuple[str, ...]
+    """What contradicts itself or is missing, a line each."""
 
     @property
-    def mission_id(self) -> str:
-        """Plan and field recordings carry the mission's id as their own."""
-        return self.contents.recording_id
+    def plan(self) -> dict[str, Any] | None:
+        """Results of the plan's stages, if a plan is in it."""
+        return self.recording.contents.properties.get(entities.PROPERTY_PLAN)
 
     def as_json(self) -> dict[str, Any]:
         """Everything, for `--json`."""
+        held = self.recording.contents
         return {
-            "recording_id": self.contents.recording_id,
-            "mission_id": self.mission_id,
-            "complete": self.contents.complete,
-            "timelines": list(self.contents.timelines),
-            "entities": len(self.contents.rows),
-            "rows": self.contents.total_rows,
+            "file": str(self.recording.path),
+            "recording_id": held.recording_id,
+            "mission_id": self.recording.mission_id,
+            "complete": held.complete,
+            "problems": list(self.problems),
+            "timelines": list(held.timelines),
+            "entities": len(held.rows),
+            "rows": held.total_rows,
             "plan": self.plan,
-            "runs": [vars(run) for run in self.runs],
+            "runs": [comparison_json(comparison) for comparison in self.comparisons],
         }
 
     def as_text(self) -> str:
         """The same for a person."""
-        held = self.contents
-        ended = "" if held.complete else "; not closed: its writer was stopped, or had no room on the disk"
+        held = self.recording.contents
         lines = [
-            f"recording {held.recording_id} (mission of the same id){ended}",
+            f"{self.recording.path}: recording {held.recording_id} (mission of the same id)",
             f"  timelines {', '.join(held.timelines)}; {len(held.rows)} entities, {held.total_rows} rows",
+            *(f"  problem: {problem}" for problem in self.problems),
         ]
         if self.plan is not None:
             lines += [f"  {name}: {value}" for name, value in self.plan.items()]
-        for run in self.runs:
-            lines += _run_lines(run)
-        return "\n".join(lines)
+        return "\n".join([*lines, *(f"\n{comparison_text(item)}" for item in self.comparisons)])
 
 
-def review(path: Path) -> Review:
-    """Read a recording to its end.
+@dataclass(frozen=True, eq=False)
+class Review:
+    """Several recordings; those that cannot be read hide none of the others."""
 
-    Raises
-    ------
-    InputError
-        When the file cannot be read, or was not written by stopgo.
-    """
-    contents = check_apart(path)
-    if contents.application != entities.APPLICATION:
-        raise InputError(f"{path}: is a recording of {contents.application}, not of {entities.APPLICATION}")
-    runs: dict[str, RunReview] = {}
-    for run_id, event in sorted(_events(path), key=lambda pair: pair[1]["number"]):
-        _take(runs.setdefault(run_id, RunReview(run_id)), event)
-    return Review(contents, contents.properties.get(entities.PROPERTY_PLAN), tuple(runs.values()))
+    recordings: tuple[RecordingReview, ...]
+    faults: tuple[str, ...]
+    """Why a file cannot be read, a line each."""
 
+    @property
+    def comparisons(self) -> tuple[Comparison, ...]:
+        return tuple(item for review in self.recordings for item in review.comparisons)
 
-def _events(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Run id and values of every event."""
-    for chunk in chunks(path):
-        run_id = entities.run_of_events(str(chunk.entity_path))
-        if run_id is not None:
-            for seconds, values in rows(chunk):
-                yield run_id, {**values, "seconds": seconds}
+    @property
+    def exit_code(self) -> int:
+        """2 where a file cannot be read, else that of the worst run."""
+        if self.faults:
+            return InputError.exit_code
+        codes = {judge(comparison).exit_code for comparison in self.comparisons}
+        return next((code for code in (1, 3) if code in codes), 0)
 
-
-def _take(run: RunReview, event: dict[str, Any]) -> None:
-    kind, stop = event["event"], event.get("stop", "")
-    outcomes = {
-        "Scanned": run.scanned, "Unconfirmed": run.unconfirmed, "Skipped": run.skipped, "Failed": run.failed,
-    }  # fmt: skip
-    if kind in outcomes:
-        outcomes[kind].append(stop)
-    elif kind == "Arrived":
-        run.deviation_m[stop] = event["deviation_m"]
-    elif kind in ("Finished", "Aborted"):
-        run.ended = kind
-    run.seconds = event["seconds"]
-    revision = event.get("revision")
-    if revision is not None and revision not in run.revisions:
-        run.revisions.append(revision)
+    @property
+    def check_code(self) -> int:
+        """1 where a recording contradicts itself or is incomplete, else the exit code."""
+        return 1 if any(item.problems for item in self.recordings) else self.exit_code
 
 
-def _run_lines(run: RunReview) -> list[str]:
-    unsure = f" {len(run.unconfirmed)} unconfirmed," if run.unconfirmed else ""
-    lines = [
-        f"  run {run.run_id}: {len(run.scanned)} scanned,{unsure} {len(run.skipped)} skipped,"
-        f" {len(run.failed)} failed; {run.ended or 'not ended'} after {run.seconds:.1f} s"
-    ]
-    if len(run.revisions) > 1:
-        lines.append(f"    revisions {', '.join(map(str, run.revisions))} of the mission, one after another")
-    if run.deviation_m:
-        worst = max(run.deviation_m, key=lambda stop: run.deviation_m[stop])
-        lines.append(f"    greatest deviation {run.deviation_m[worst] * 1000:.1f} mm, at {worst}")
-        lines += [f"    {stop}: {metres * 1000:.1f} mm" for stop, metres in run.deviation_m.items()]
-    return lines
+def review(paths: Iterable[Path]) -> Review:
+    """Read recordings, and folders of recordings, to their ends."""
+    read: list[Recording] = []
+    faults: list[str] = []
+    for path in files_in(paths):
+        try:
+            read.append(read_recording(path))
+        except InputError as error:
+            faults.append(str(error))
+    return Review(tuple(_review(item, read) for item in read), tuple(faults))
+
+
+def files_in(paths: Iterable[Path]) -> Iterator[Path]:
+    """The files as they were named, and every recording that lies in a folder, by name."""
+    for path in paths:
+        if not path.is_dir():
+            yield path
+            continue
+        found = sorted(item for item in path.iterdir() if item.suffix == SUFFIX and item.is_file())
+        if not found:
+            raise InputError(f"{path}: there is no {SUFFIX} file in this folder; name another")
+        yield from found
+
+
+def _review(recording: Recording, read: Sequence[Recording]) -> RecordingReview:
+    mine = [item for item in read if item.mission_id == recording.mission_id]
+    missions, sights = missions_of(mine), sights_of(mine)
+    comparisons = [compare(log, missions, sights) for log in recording.logs] if missions else []
+    return RecordingReview(recording, tuple(comparisons), problems_of(recording))
+
+
+def missions_of(recordings: Iterable[Recording]) -> tuple[Mission, ...]:
+    """Every revision once, in ascending order."""
+    found = {mission.digest: mission for item in recordings for mission in item.missions}
+    return tuple(sorted(found.values(), key=lambda mission: mission.revision))
+
+
+def sights_of(recordings: Iterable[Recording]) -> tuple[Sight, ...]:
+    """What the stops of every revision see, once."""
+    found = {sight.digest: sight for item in recordings for sight in item.sights}
+    return tuple(sorted(found.values(), key=lambda sight: sight.revision))

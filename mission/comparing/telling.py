@@ -56,7 +56,10 @@ def _totals(comparison: Comparison) -> list[str]:
     away, beside = comparison.greatest_deviation_m, comparison.beside.greatest_m
     driven = "not ended" if comparison.driven_s is None else duration(comparison.driven_s)
     stood = comparison.stood_s("PAUSED", "HELD")
+    revisions = [str(mission.revision) for mission in comparison.missions]
+    several = [f"revisions {', '.join(revisions)} of the mission, one after another"]
     return [
+        *(several if len(revisions) > 1 else []),
         f"run {printable(comparison.run_id or 'without a name')}: {comparison.scanned} of "
         f"{len(comparison.asked)} stops scanned; planned {duration(comparison.planned_s)}, driven {driven}"
         + (f", of which paused or held {duration(stood)}" if stood else ""),

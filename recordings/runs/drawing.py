@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
+from typing import Any
 
 import msgspec
 import numpy as np
 import rerun as rr
 
-from mission.document import Mission, Stop
+from mission.comparing.beside import WayFollower
+from mission.document import Mission
 from mission.events import (
+    Aborted,
     AnyEvent,
     Arrived,
     Failed,
-    Pose,
+    Held,
+    LinkLost,
     PoseReport,
     RevisionDropped,
     RevisionTaken,
@@ -22,23 +25,23 @@ from mission.events import (
     Scanned,
     Skipped,
     StateReport,
+    Unconfirmed,
 )
-from mission.geometry import FloatArray
+from mission.geometry import FloatArray, IntArray
+from mission.run_log import Track
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
-from recordings.pens import ORDER
+from recordings.pens import ORDER, Pen, style
 from recordings.robot import draw_robot, quaternions
-from recordings.runs.cross_track import cross_track
 from recordings.runs.report import StopRecord, run_report
 from recordings.runs.revision import change_between, draw_change
+from recordings.runs.trail import Thinner, Trail
 from recordings.stages.mission import ABOVE_FLOOR
 
-PIECE_M = 0.05
-"""The driven path grows by pieces of at least this length, each a row of its own."""
-SAME_M, SAME_RAD, SAME_S = 0.001, math.radians(0.1), 1.0
-"""A pose this near to the last one is left out, but for one each second."""
-SILENT_S = 10.0
-"""After a silence as long as this nobody knows the way the robot took, and none is drawn."""
+SOLID_S = 0.5
+"""How often the robot moves in 3D."""
+WARNINGS = (Skipped, Failed, Unconfirmed, Held, LinkLost, Aborted)
+"""Events that somebody should look at."""
 MARKS = {
     Arrived: (entities.ARRIVED, palette.ARRIVED, ORDER["arrival"]),
     Scanned: (entities.SCANNED, palette.SCANNED, ORDER["scan"]),
@@ -60,38 +63,37 @@ class RunDrawing:
         self.stops = {stop.id: stop for stop in mission.stops}
         self.records: dict[str, StopRecord] = {}
         self._began_ns: int | None = None
-        self._last: PoseReport | None = None
-        self._drawn: Pose | None = None
-        self._towards: Stop | None = None
+        self._place: FloatArray | None = None
+        self._thinner, self._trail, self._way = Thinner(), Trail(), WayFollower(mission)
         self._style()
         self._describe()
 
     def follow(self, mission: Mission, report: StateReport | PoseReport | AnyEvent) -> None:
         """Go on by another revision of the mission from `report` on, and draw what it changes."""
-        self._tell_time(report)
+        self.tell_time(report)
         change, names = change_between(self.mission, mission), self.names.revision(mission.revision)
         draw_change(self.canvas, change, names, partial(self._at, robot_ns=report.robot_ns))
         self.mission = mission
         self.revisions.append(mission)
         self.stops = {stop.id: stop for stop in mission.stops}
-        self._towards = None
         self._describe()
 
-    def pose(self, report: PoseReport) -> None:
-        """Move the robot, lengthen its path, and measure its distance from the leg it drives."""
-        self._tell_time(report)
-        if self._last is not None and _same(self._last, report):
+    def poses(self, told: Track) -> None:
+        """Move the robot, lengthen its path, and measure its distance from the legs it drives."""
+        poses = self._thinner.thin(told)
+        if not len(poses):
             return
-        if self._last is not None and report.robot_ns - self._last.robot_ns > SILENT_S * 1e9:
-            self._drawn = None
-        self._move(report.pose, report.robot_ns, first=self._last is None)
-        self._last = report
-        self._lengthen(report.pose, report.robot_ns)
-        self._measure(report.pose, report.robot_ns)
+        if self._place is None:
+            draw = partial(self._at, robot_ns=int(poses.ns[0]))
+            robots = (self.names.flat(entities.ROBOT), self.names.solid(entities.ROBOT))
+            draw_robot(draw, *robots, radius=self.mission.robot.radius, colour=palette.DRIVEN)
+        self._move(poses)
+        self._lengthen(poses)
+        self._measure(poses)
+        self._place = poses.xy[-1]
 
     def state(self, report: StateReport) -> None:
         """Put the robot's and the stop's state on their lanes, and the battery on its plot."""
-        self._towards = self.stops.get(report.stop or "")
         self._at(self.names.flat(entities.STATE), rr.StateChange(state=report.state), report.robot_ns)
         stop_state = "" if report.stop_state is None else report.stop_state
         self._at(self.names.flat(entities.STOP_STATE), rr.StateChange(state=stop_state), report.robot_ns)
@@ -101,10 +103,12 @@ class RunDrawing:
 
     def event(self, event: AnyEvent) -> None:
         """Write the event down whole, mark it on the plan, and bring the report up to date."""
-        self._tell_time(event)
+        self.tell_time(event)
+        self._way.tell(event, self.mission)
         told = {name: value for name, value in msgspec.to_builtins(event).items() if name in EVENT_FIELDS}
+        told["body"] = msgspec.json.encode(event).decode()
         self._at(self.names.events, rr.DynamicArchetype("Event", components=told), event.robot_ns)
-        level = "WARN" if isinstance(event, Skipped | Failed) else "INFO"
+        level = "WARN" if isinstance(event, WARNINGS) else "INFO"
         line = rr.TextLog(f"{type(event).__name__} {_about(event)}".rstrip(), level=level)
         self._at(self.names.log, line, event.robot_ns)
         if isinstance(event, Arrived):
@@ -120,6 +124,9 @@ class RunDrawing:
         )
         for lane in (entities.STATE, entities.STOP_STATE):
             canvas.show(names.flat(lane), states)
+        style(canvas, names.flat(entities.DRIVEN), Pen(palette.DRIVEN, "robot", on_screen(1.5)))
+        solid = rr.LineStrips3D.from_fields(colors=palette.DRIVEN, radii=0.03)
+        canvas.show(names.solid(entities.DRIVEN), solid)
         for metric, name in _PLOTTED.items():
             canvas.show(names.metric(metric), rr.SeriesLines(colors=palette.DRIVEN, names=name, widths=1.5))
         dots = rr.SeriesPoints(colors=palette.ARRIVED.colour, marker_sizes=4, names="deviation")
@@ -143,38 +150,41 @@ class RunDrawing:
         }
         self.canvas.describe(entities.PROPERTY_RUN, about)
 
-    def _move(self, pose: Pose, robot_ns: int, *, first: bool) -> None:
-        """Put the robot at its pose; with the first one its shape is drawn."""
-        robots = (self.names.flat(entities.ROBOT), self.names.solid(entities.ROBOT))
-        if first:
-            draw = partial(self._at, robot_ns=robot_ns)
-            draw_robot(draw, *robots, radius=self.mission.robot.radius, colour=palette.DRIVEN)
-        place = self.canvas.local(np.array([pose.x, pose.y]))
-        turn = rr.Quaternion(xyzw=quaternions(np.array(pose.heading)))
-        for robot in robots:
-            self._at(robot, rr.Transform3D(translation=[*place, 0.0], quaternion=turn), robot_ns)
-
-    def _lengthen(self, pose: Pose, robot_ns: int) -> None:
-        """Add the piece from the last drawn pose, once it is long enough to be seen."""
-        before, self._drawn = self._drawn or pose, self._drawn or pose
-        if math.dist((before.x, before.y), (pose.x, pose.y)) < PIECE_M:
-            return
-        piece = self.canvas.local(np.array([(before.x, before.y), (pose.x, pose.y)]))
-        flat = rr.LineStrips2D(
-            [piece], colors=palette.DRIVEN, radii=on_screen(1.5), draw_order=ORDER["robot"]
+    def _move(self, poses: Track) -> None:
+        """Put the robot at its poses; they are kept whole beside what Rerun draws, which is less exact."""
+        turn = quaternions(poses.heading)
+        places = strokes.level(self.canvas.local(poses.xy), 0.0)
+        told = {"x": poses.xy[:, 0], "y": poses.xy[:, 1], "heading": poses.heading}
+        moves = rr.Transform3D.columns(translation=places, quaternion=turn)
+        kept = rr.DynamicArchetype.columns(archetype="Pose", components=told)
+        self._columns(self.names.flat(entities.ROBOT), poses.ns, moves, kept)
+        seldom = self._seldom(poses.ns)
+        self._columns(
+            self.names.solid(entities.ROBOT),
+            poses.ns[seldom],
+            rr.Transform3D.columns(translation=places[seldom], quaternion=turn[seldom]),
         )
-        raised = strokes.level(piece, 2 * ABOVE_FLOOR)
-        solid = rr.LineStrips3D([raised], colors=palette.DRIVEN, radii=0.03)
-        self._at(self.names.flat(entities.DRIVEN), flat, robot_ns)
-        self._at(self.names.solid(entities.DRIVEN), solid, robot_ns)
-        self._drawn = pose
 
-    def _measure(self, pose: Pose, robot_ns: int) -> None:
-        legs = [self._towards] if self._towards is not None else list(self.mission.stops)
-        ways: list[FloatArray] = [np.array(stop.approach) for stop in legs if len(stop.approach) > 1]
-        if ways:
-            distance = cross_track(ways, x=pose.x, y=pose.y)
-            self._at(self.names.metric(entities.METRIC_CROSS_TRACK), rr.Scalars(distance * 1000), robot_ns)
+    def _seldom(self, ns: IntArray) -> IntArray:
+        """Indices of poses for 3D: the first, the last, and one each SOLID_S."""
+        beat = np.flatnonzero(np.diff(ns // round(SOLID_S * 1e9)) > 0) + 1
+        return np.unique(np.concatenate([[0], beat, [len(ns) - 1]]))
+
+    def _lengthen(self, poses: Track) -> None:
+        """Add what the robot has driven since it was last told of."""
+        ns, strips = self._trail.lengthened(poses)
+        if strips:
+            flat = self.canvas.strips(strips)
+            self._columns(self.names.flat(entities.DRIVEN), ns, rr.LineStrips2D.columns(strips=flat))
+            raised = [strokes.level(strip, 2 * ABOVE_FLOOR) for strip in flat]
+            self._columns(self.names.solid(entities.DRIVEN), ns, rr.LineStrips3D.columns(strips=raised))
+
+    def _measure(self, poses: Track) -> None:
+        beside = self._way.measure(poses.xy)[:, 0]
+        known = np.isfinite(beside)
+        if known.any():
+            values = rr.Scalars.columns(scalars=beside[known] * 1000)
+            self._columns(self.names.metric(entities.METRIC_CROSS_TRACK), poses.ns[known], values)
 
     def _mark(self, event: AnyEvent) -> None:
         stop = self.stops.get(getattr(event, "stop", ""))
@@ -211,7 +221,7 @@ class RunDrawing:
         document = rr.TextDocument(text, media_type="text/markdown")
         self._at(self.names.flat(entities.RUN_REPORT), document, event.robot_ns)
 
-    def _tell_time(self, report: StateReport | PoseReport | AnyEvent) -> None:
+    def tell_time(self, report: StateReport | PoseReport | AnyEvent) -> None:
         """Learn when the mission began, from a report that tells."""
         seconds = getattr(report, "mission_time_s", None)
         if seconds is not None:
@@ -221,6 +231,14 @@ class RunDrawing:
         """At the robot's time, and at mission time once it is known when the mission began."""
         mission_s = None if self._began_ns is None else (robot_ns - self._began_ns) / 1e9
         self.canvas.at(entity, archetype, mission_s=mission_s, robot_ns=robot_ns)
+
+    def _columns(self, entity: str, ns: IntArray, *groups: Any) -> None:
+        """The same for many rows, one at each time."""
+        indexes = [rr.TimeColumn(entities.ROBOT_TIME, timestamp=np.asarray(ns).astype("datetime64[ns]"))]
+        if self._began_ns is not None:
+            since = (np.asarray(ns) - self._began_ns).astype("timedelta64[ns]")
+            indexes.append(rr.TimeColumn(entities.MISSION_TIME, duration=since))
+        self.canvas.columns(entity, indexes, *groups)
 
 
 EVENT_FIELDS = (
@@ -237,12 +255,6 @@ _PLOTTED = {
 
 _LIMITED = {entities.METRIC_DEVIATION: (1,), entities.METRIC_CROSS_TRACK: (-1, 1)}
 """Metrics with a tolerance, and on which sides."""
-
-
-def _same(a: PoseReport, b: PoseReport) -> bool:
-    moved = math.dist((a.pose.x, a.pose.y), (b.pose.x, b.pose.y))
-    turned = abs(math.remainder(a.pose.heading - b.pose.heading, math.tau))
-    return moved < SAME_M and turned < SAME_RAD and b.robot_ns - a.robot_ns < SAME_S * 1e9
 
 
 def _about(event: AnyEvent) -> str:

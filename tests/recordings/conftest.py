@@ -10,6 +10,7 @@ from mission.document import Mission
 from mission.events import PoseReport, StateReport
 from recordings.field import FieldRecording
 from recordings.plan import PlanRecording
+from tests.mission.comparing.test_compare import planned
 from tests.recordings import run, world
 
 
@@ -32,6 +33,27 @@ def field(tmp_path_factory: pytest.TempPathFactory, mission: Mission) -> Path:
 def revised(tmp_path_factory: pytest.TempPathFactory, mission: Mission) -> Path:
     """A run that takes revision 2 after its first stop."""
     return write_revised(tmp_path_factory.mktemp("revised") / "field.rrd", mission)
+
+
+@pytest.fixture(scope="session")
+def sighted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A plan that carries what its stops see; 70 % is asked."""
+    path = tmp_path_factory.mktemp("sighted") / "plan.rrd"
+    recording = PlanRecording(world.MISSION_ID)
+    for noun in (*world.nouns_at(), planned()[1]):
+        recording.observe(noun)
+    recording.write(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def skipping(tmp_path_factory: pytest.TempPathFactory, mission: Mission) -> Path:
+    """A run that skips its second stop."""
+    path = tmp_path_factory.mktemp("skipping") / "field.rrd"
+    with FieldRecording(path, mission) as recording:
+        for report in run.reports_with_a_skip(mission, "S2"):
+            tell(recording, report)
+    return path
 
 
 def write_revised(path: Path, mission: Mission) -> Path:

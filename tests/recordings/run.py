@@ -18,6 +18,7 @@ from mission.events import (
     RevisionTaken,
     Scanned,
     Settled,
+    Skipped,
     Started,
     State,
     StateReport,
@@ -56,6 +57,16 @@ def reports(mission: Mission, *, run: str = RUN) -> Iterator[StateReport | PoseR
         teller.done.append(stop.id)
     yield teller.event(Finished, float(drive.seconds[-1]))
     yield teller.state(float(drive.seconds[-1]), "FINISHED")
+
+
+def reports_with_a_skip(mission: Mission, stop: str) -> Iterator[StateReport | PoseReport | AnyEvent]:
+    """The same run, but that somebody leaves out a stop: its leg is driven, and nothing is done there."""
+    for report in reports(mission):
+        if isinstance(report, Arrived) and report.stop == stop:
+            common = {name: getattr(report, name) for name in Event.__struct_fields__}
+            yield Skipped(stop=stop, reason="skip by ann", **common)
+        elif not (isinstance(report, Arrived | Settled | Scanned) and report.stop == stop):
+            yield report
 
 
 def reports_of_two(

@@ -10,8 +10,8 @@ import pytest
 import rerun as rr
 
 from mission.errors import InputError
+from recordings.carried.reading import read_recording
 from recordings.read import check
-from recordings.review import review
 
 BROKEN = {
     "empty": lambda data: b"",
@@ -39,7 +39,7 @@ def test_a_damaged_byte_never_ends_the_process(plan: Path, tmp_path: Path, place
     path = tmp_path / "flipped.rrd"
     path.write_bytes(data)
     try:
-        review(path)
+        read_recording(path)
     except InputError as refused:
         assert "\n" not in str(refused)
 
@@ -50,7 +50,7 @@ def test_a_reader_that_ends_by_a_signal_is_a_damaged_file(
     killed = subprocess.CompletedProcess([], returncode=-signal.SIGABRT)
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: killed)
     with pytest.raises(InputError, match="ended with signal 6"):
-        review(plan)
+        read_recording(plan)
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
@@ -64,4 +64,4 @@ def test_a_recording_of_something_else_is_not_reviewed(tmp_path: Path) -> None:
         stream.save(path)
         stream.log("/a", rr.Scalars(1.0), static=True)
     with pytest.raises(InputError, match="of other, not of stopgo"):
-        review(path)
+        read_recording(path)

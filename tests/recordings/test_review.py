@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import json
+import shutil
+import subprocess
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from mission.__main__ import main
+from mission.document import Mission, sealed
+from recordings.carried.checking import problems_of
+from recordings.carried.reading import read_recording
+from recordings.compact import VIEWER
 from tests.recordings import run, world
 
 
@@ -22,16 +30,78 @@ def test_a_plan_in_json(plan: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_run_in_json(field: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["review", str(field), "--json"]) == 0
     (told,) = json.loads(capsys.readouterr().out)["runs"]
-    assert (told["run_id"], told["scanned"], told["ended"]) == (run.RUN, ["S1", "S2"], "Finished")
-    assert told["deviation_m"] == {"S1": run.OFFSET, "S2": run.OFFSET}
-    assert told["seconds"] == pytest.approx(129.4)
+    assert (told["run_id"], told["scanned"], told["asked"]) == (run.RUN, 2, 2)
+    assert [stop["deviation_m"] for stop in told["stops"]] == pytest.approx([run.OFFSET] * 2)
+    assert told["driven_s"] == pytest.approx(129.4)
+    assert told["greatest_beside_route_m"] == pytest.approx(run.OFFSET)
+    assert (told["coverage"], told["answer"]) == (None, "yes")
 
 
 def test_both_for_a_person(plan: Path, field: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["review", str(plan), str(field)]) == 0
     text = capsys.readouterr().out
     assert "coverage: 0.7857" in text
-    assert "greatest deviation 30.0 mm, at S1" in text
+    assert "greatest deviation at a stop 30.0 mm, beside the route 30.0 mm" in text
+
+
+def test_a_skipped_stop_is_told_with_what_it_cost(
+    sighted: Path, skipping: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of 14 visible units, S2 alone sees 3; 70 % is asked, and 57 % was scanned."""
+    assert main(["review", str(skipping), str(sighted), "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)["recordings"][0]["runs"][0]
+    assert told["coverage"]["acquired"] == pytest.approx(8 / 14)
+    assert told["stops"][1]["lost"] == pytest.approx(3 / 14)
+    assert main(["review", str(sighted), str(skipping)]) == 1
+    text = capsys.readouterr().out
+    assert "Not acquired. 57.1 % of what is visible was scanned; 70.0 % was asked, 78.5 % planned." in text
+    assert "skip by ann" in text
+
+
+def test_without_its_plan_a_skipped_stop_is_a_no(skipping: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["review", str(skipping)]) == 1
+    assert "1 of 2 stops were scanned" in capsys.readouterr().out
+
+
+def test_a_folder_is_read_and_one_bad_file_hides_no_other(
+    field: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(field, tmp_path / "b.rrd")
+    (tmp_path / "a.rrd").write_bytes(b"junk" * 100)
+    (tmp_path / "notes.txt").write_text("mine")
+    assert main(["review", str(tmp_path)]) == 2
+    out, err = capsys.readouterr()
+    assert "b.rrd: recording" in out
+    assert err == f"stopgo: {tmp_path}/a.rrd: is not a Rerun recording\n"
+
+
+def test_an_empty_folder_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["review", str(tmp_path)]) == 2
+    assert "there is no .rrd file in this folder" in capsys.readouterr().err
+
+
+def test_whole_recordings_pass_the_check(plan: Path, field: Path) -> None:
+    assert main(["review", "--check", str(plan), str(field)]) == 0
+
+
+def test_a_recording_that_was_cut_and_mended_fails_the_check(
+    field: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Cut off in the middle and made whole again by Rerun's own tool, it calls itself complete."""
+    data = field.read_bytes()
+    cut, mended = tmp_path / "cut.rrd", tmp_path / "mended.rrd"
+    cut.write_bytes(data[: len(data) // 3])
+    subprocess.run([VIEWER, "rrd", "optimize", cut, "-o", mended], check=False, capture_output=True)
+    assert main(["review", "--check", str(mended)]) == 1
+    assert "problem: incomplete" in capsys.readouterr().out
+
+
+def test_a_recording_of_another_mission_than_it_says_fails_the_check(field: Path, mission: Mission) -> None:
+    read = read_recording(field)
+    other = sealed(msgspec.structs.replace(mission, name="other"))
+    assert problems_of(read) == ()
+    (problem,) = problems_of(replace(read, missions=(other,)))
+    assert "its run is of digest" in problem
 
 
 def test_junk_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -150,7 +150,8 @@ def test_what_waits_for_a_revision_that_never_comes_is_kept(tmp_path: Path, miss
 def test_review_tells_the_revisions(revised: Path, field: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["review", str(revised), "--json"]) == 0
     (told,) = json.loads(capsys.readouterr().out)["runs"]
-    assert (told["revisions"], told["scanned"]) == ([1, 2], ["S1", "S2", "S3"])
+    assert (told["revisions"], told["scanned"]) == ([1, 2], 3)
+    assert [stop["stop"] for stop in told["stops"]] == ["S1", "S2", "S3"]
     assert main(["review", str(revised), str(field)]) == 0
     assert capsys.readouterr().out.count("revisions 1, 2 of the mission") == 1
 

@@ -10,7 +10,6 @@ import pytest
 from mission.geometry import Polygon, ring_area
 from mission.schedule import schedule
 from recordings import strokes
-from recordings.runs.cross_track import cross_track
 from recordings.stages.drive import planned_drive
 from tests.recordings import world
 
@@ -57,12 +56,6 @@ def test_units_with_one_value_are_drawn_as_one_piece() -> None:
     assert len(lines) == 1 + 2 + 6
     assert list(values[:3]) == [1, 1, 2]
     assert np.allclose(lines[1], [(2.4, 2.0), (2.4, 2.2)])
-
-
-@pytest.mark.parametrize(("y", "distance"), [(0.3, 0.3), (-0.2, -0.2)])
-def test_left_of_the_route_is_positive(y: float, distance: float) -> None:
-    way = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])
-    assert cross_track([way], x=1.0, y=y) == pytest.approx(distance)
 
 
 def test_the_planned_drive_keeps_the_schedule() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -46,7 +47,7 @@ def planned() -> tuple[Mission, Sight]:
     *nouns, mission = world.nouns_at()
     route = next(noun for noun in nouns if isinstance(noun, Route))
     space = route.selection.visibility.candidates.space
-    settings = msgspec.structs.replace(space.settings, coverage=0.7, room_coverage=0.5, kind_coverage=0.5)
+    settings = replace(space.settings, coverage=0.7, room_coverage=0.5, kind_coverage=0.5)
     object.__setattr__(space, "settings", settings)
     return mission, sight_of(route, mission, figures(route))
 

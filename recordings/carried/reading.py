@@ -1,0 +1,59 @@
+"""A recording -> all that it carries: contents, missions, what stops see, runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from mission.document import Mission
+from mission.errors import InputError
+from mission.run_log import RunLog
+from mission.sight import Sight
+from recordings import entities
+from recordings.carried.mission import missions_in
+from recordings.carried.runs import logs_in
+from recordings.carried.sight import sights_in
+from recordings.carried.values import Values
+from recordings.read import Contents, check_apart, chunks
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recording that was read to its end."""
+
+    path: Path
+    contents: Contents
+    values: Values
+    missions: tuple[Mission, ...]
+    """Revisions of its mission, in ascending order; none in files of older versions."""
+    sights: tuple[Sight, ...]
+    logs: tuple[RunLog, ...]
+
+    @property
+    def mission_id(self) -> str:
+        """Plan and field recordings carry the mission's id as their own."""
+        return self.contents.recording_id
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a plan's or a run's recording.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, was not written by stopgo, or holds what contradicts itself.
+    """
+    contents = check_apart(path)
+    if contents.application != entities.APPLICATION:
+        raise InputError(f"{path}: is a recording of {contents.application}, not of {entities.APPLICATION}")
+    values = Values()
+    for chunk in chunks(path):
+        values.take(chunk)
+    return Recording(
+        path=path,
+        contents=contents,
+        values=values,
+        missions=missions_in(values, str(path)),
+        sights=sights_in(values, str(path)),
+        logs=logs_in(values, contents, path),
+    )

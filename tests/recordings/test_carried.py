@@ -1,0 +1,82 @@
+"""What recordings carry is read back as it was: the mission, what its stops see, and runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from mission.document import Mission
+from mission.errors import InputError
+from mission.events import PoseReport, StateReport
+from mission.sight import Sight
+from recordings.canvas import Sheet, open_canvas
+from recordings.carried.reading import Recording, read_recording
+from recordings.carried.sight import carry_sight, sights_in
+from recordings.carried.values import Values
+from tests.mission.comparing.test_compare import planned
+from tests.recordings import run, world
+
+
+@pytest.fixture(scope="module")
+def read(field: Path) -> Recording:
+    return read_recording(field)
+
+
+def carried(sight: Sight, path: Path) -> Values:
+    sheet = Sheet(recording_id="a" * 32, name="n", origin=(0.0, 0.0), extent=(0.0, 0.0, 1.0, 1.0))
+    with open_canvas(sheet) as canvas:
+        carry_sight(canvas, sight)
+        path.write_bytes(canvas.taken())
+    values = Values()
+    for chunk in RrdReader(path).stream():
+        values.take(chunk)
+    return values
+
+
+def test_a_run_is_read_back_event_by_event(read: Recording, mission: Mission) -> None:
+    (log,) = read.logs
+    told = [item for item in run.reports(mission) if not isinstance(item, PoseReport | StateReport)]
+    assert list(log.events) == told
+    assert (log.run_id, log.mission_id, log.revision, log.robot) == (run.RUN, mission.id, 1, "r1")
+    assert (log.source.format, len(log.source.digest), log.source.lost) == ("rrd", 64, 0)
+
+
+def test_its_poses_are_as_exact_as_they_were_told(read: Recording, mission: Mission) -> None:
+    poses = [item for item in run.reports(mission) if isinstance(item, PoseReport)]
+    (log,) = read.logs
+    by_time = {item.robot_ns: item.pose for item in poses}
+    for ns, (x, y) in zip(log.poses.ns.tolist(), log.poses.xy.tolist(), strict=True):
+        assert (x, y) == (by_time[ns].x, by_time[ns].y)
+    assert len(log.poses) > 10
+
+
+def test_the_mission_travels_in_plan_and_run(plan: Path, read: Recording, mission: Mission) -> None:
+    assert read.missions == (mission,)
+    assert read_recording(plan).missions == (mission,)
+
+
+def test_every_revision_travels(revised: Path, mission: Mission) -> None:
+    assert read_recording(revised).missions == (mission, world.revised(mission))
+
+
+def test_what_stops_see_comes_back_whole(tmp_path: Path) -> None:
+    _, sight = planned()
+    (back,) = sights_in(carried(sight, tmp_path / "sight.rrd"), "sight.rrd")
+    for name in ("mission_id", "revision", "digest", "stops"):
+        assert getattr(back, name) == getattr(sight, name)
+    for name in ("weight", "visible", "room", "element"):
+        assert np.array_equal(getattr(back.ledger, name), getattr(sight.ledger, name)), name
+    assert (back.ledger.rooms, back.ledger.elements) == (sight.ledger.rooms, sight.ledger.elements)
+    assert back.planned == sight.planned
+    assert back.shares(["S1"]) == sight.shares(["S1"])
+    assert np.array_equal(back.targets.unit_xy, sight.targets.unit_xy)
+
+
+def test_sight_that_does_not_fit_is_told(tmp_path: Path) -> None:
+    _, sight = planned()
+    object.__setattr__(sight, "last", sight.last + 1000)
+    with pytest.raises(InputError, match=r"sight\.rrd: what its stops see is damaged"):
+        sights_in(carried(sight, tmp_path / "sight.rrd"), "sight.rrd")
