@@ -1,0 +1,126 @@
+"""A robot's own log, whatever it is -> what it holds (`FieldLog`).
+
+A reader is a function `(path, reading) -> FieldLog`, and one line in `READERS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from mission.errors import InputError
+from recordings.logs.field_log import FieldLog, Reading
+from recordings.logs.files import head, must_be_readable
+
+Reader = Callable[[Path, Reading], FieldLog]
+
+
+@dataclass(frozen=True)
+class Format:
+    """One kind of log."""
+
+    name: str
+    suffixes: tuple[str, ...]
+    begins: tuple[bytes, ...]
+    """How such a file begins; () where its beginning does not tell."""
+    reader: Callable[[], Reader]
+    """Loads the reader: some need libraries that others do not."""
+
+
+def _ros() -> Reader:
+    from recordings.logs.ros import read_ros
+
+    return read_ros
+
+
+def _dataflash() -> Reader:
+    from recordings.logs.dataflash import read_dataflash
+
+    return read_dataflash
+
+
+def _telemetry() -> Reader:
+    from recordings.logs.telemetry_log import read_telemetry_log
+
+    return read_telemetry_log
+
+
+def _ulog() -> Reader:
+    from recordings.logs.ulog import read_ulog
+
+    return read_ulog
+
+
+def _table() -> Reader:
+    from recordings.logs.tables import read_table
+
+    return read_table
+
+
+def _journal() -> Reader:
+    from recordings.logs.own import read_journal
+
+    return read_journal
+
+
+SQLITE = b"SQLite format 3\0"
+ZSTD = b"\x28\xb5\x2f\xfd"
+READERS = (
+    Format("ROS 1 bag", (".bag",), (b"#ROSBAG V",), _ros),
+    Format("ROS 2 MCAP", (".mcap",), (b"\x89MCAP0\r\n",), _ros),
+    Format("ROS 2 SQLite", (".db3",), (SQLITE,), _ros),
+    Format("ROS 2, compressed", (".zstd",), (ZSTD,), _ros),
+    Format("stopgo journal", (".sqlite",), (SQLITE,), _journal),
+    Format("ArduPilot BIN", (".bin",), (b"\xa3\x95",), _dataflash),
+    Format("PX4 ULog", (".ulg",), (b"ULog\x01\x12\x35",), _ulog),
+    Format("MAVLink telemetry", (".tlog",), (), _telemetry),
+    Format("trajectory", (".tum", ".txt", ".csv", ".tsv"), (), _table),
+)
+"""Every kind of log that is read; a folder is a rosbag2's."""
+
+
+def read_log(path: Path, reading: Reading | None = None) -> FieldLog:
+    """Read a log to its end, by what it is; it is opened to be read and never changed.
+
+    Raises
+    ------
+    InputError
+        Naming the file and why it cannot be read.
+    """
+    must_be_readable(path)
+    how = reading or Reading()
+    try:
+        return _reader_for(path)(path, how)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def _reader_for(path: Path) -> Reader:
+    """By name and content; by content alone where the name says nothing."""
+    if path.is_dir():
+        return _of_folder(path)
+    begin = head(path, 16)
+    named = [form for form in READERS if path.name.lower().endswith(form.suffixes)]
+    fitting = [form for form in READERS if form.begins and begin.startswith(form.begins)]
+    chosen = [form for form in named if form in fitting or not form.begins] or fitting
+    if chosen:
+        return chosen[0].reader()
+    if named:
+        raise InputError(f"{path}: does not begin as a {named[0].name} does; was it copied whole?")
+    known = ", ".join(suffix for form in READERS for suffix in form.suffixes)
+    raise InputError(f"{path}: neither its name nor its content is that of a log; known are {known}")
+
+
+def _of_folder(path: Path) -> Reader:
+    """A robot's state directory, or a rosbag2."""
+    if not (path / JOURNAL).exists():
+        return _ros()
+    read = _journal()
+    return lambda folder, how: read(folder / JOURNAL, how)
+
+
+JOURNAL = "journal.sqlite"
+
+
+__all__ = ["READERS", "FieldLog", "Format", "Reader", "Reading", "read_log"]

@@ -1,0 +1,368 @@
+"""ArduPilot's own logs (.BIN, DataFlash): columns of each kind of message, straight from the bytes.
+
+The file describes itself: FMT messages say how long each kind is and what its columns are called.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from mmap import ACCESS_READ, mmap
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from mission.document import SiteOrigin
+from mission.errors import InputError
+from mission.geometry import FloatArray, IntArray
+from mission.mavlink.autopilots.ardupilot import ARDUPILOT
+from mission.mavlink.autopilots.kind import Mode
+from mission.mavlink.items import Command, Item
+from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, Upload, fixes_of, poses_of
+from recordings.logs.files import digest_of
+
+HEAD = b"\xa3\x95"
+FMT = 0x80
+FMT_LENGTH = 89
+TYPES = {
+    "a": ("i2", 32), "b": ("i1", 1), "B": ("u1", 1), "h": ("<i2", 1), "H": ("<u2", 1), "i": ("<i4", 1),
+    "I": ("<u4", 1), "f": ("<f4", 1), "d": ("<f8", 1), "n": ("S4", 1), "N": ("S16", 1), "Z": ("S64", 1),
+    "c": ("<i2", 1), "C": ("<u2", 1), "e": ("<i4", 1), "E": ("<u4", 1), "L": ("<i4", 1), "M": ("u1", 1),
+    "q": ("<i8", 1), "Q": ("<u8", 1), "g": ("<f2", 1),
+}  # fmt: skip
+"""Letters of a message's format: numpy's name, and how many."""
+HUNDREDTHS = frozenset("cCeE")
+WANTED = frozenset(
+    {"POS", "XKF1", "NKF1", "SIM", "ATT", "ORGN", "CMD", "MISE", "MODE", "MSG", "BAT", "GPS", "CAM", "TRIG"}
+)
+GPS_EPOCH_S = 315_964_800
+LEAP_S = 18
+"""Seconds by which GPS time is ahead of UTC since 2017."""
+TICK_EVERY = 200_000
+
+
+def read_dataflash(path: Path, reading: Reading) -> FieldLog:
+    """Read a .BIN to its end; bytes between messages that make no sense are passed over and counted.
+
+    Raises
+    ------
+    InputError
+        When no message in it can be read.
+    """
+    scan = _scanned(path, reading)
+    if not scan.counts:
+        raise InputError(f"{path}: no message in it can be read; is it an ArduPilot .BIN?")
+    tables = _Tables(path, scan)
+    poses = tuple(_poses(tables))
+    begin, end = tables.span()
+    return FieldLog(
+        path=str(path),
+        format="ArduPilot BIN",
+        digest=digest_of([path]),
+        messages=sum(scan.counts.values()),
+        clock="wall" if tables.offset_ns else "since boot",
+        begin_ns=begin,
+        end_ns=end,
+        channels=tuple(Channel(name, "", count) for name, count in sorted(scan.counts.items())),
+        poses=poses,
+        uploads=tuple(_uploads(tables)),
+        remarks=tuple(sorted(_remarks(tables), key=lambda remark: remark.ns)),
+        battery=tuple(_battery(tables)),
+        lost=scan.lost,
+        oddities=scan.oddities,
+    )
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """What FMT says of one kind of message."""
+
+    name: str
+    dtype: np.dtype[Any]
+    """Of the whole message, its head of three bytes included."""
+    hundredths: frozenset[str]
+
+
+@dataclass
+class _Scan:
+    """Where in a file the messages are that are wanted."""
+
+    kinds: dict[str, _Kind] = field(default_factory=dict)
+    places: dict[str, array[int]] = field(default_factory=dict)
+    counts: Counter[str] = field(default_factory=Counter)
+    lost_bytes: int = 0
+    size: int = 0
+
+    tail_bytes: int = 0
+    """Of a last message that was cut off, as when the vehicle is switched off."""
+
+    @property
+    def lost(self) -> str:
+        if not self.lost_bytes:
+            return ""
+        return f"{self.lost_bytes} of {self.size} bytes make no sense"
+
+    @property
+    def oddities(self) -> tuple[str, ...]:
+        if not self.tail_bytes:
+            return ()
+        return (f"the last message is cut off ({self.tail_bytes} bytes), as when a vehicle is switched off",)
+
+
+def _scanned(path: Path, reading: Reading) -> _Scan:
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data:
+        return _walk(data, reading)
+
+
+def _walk(data: mmap, reading: Reading) -> _Scan:
+    """One step per message; FMT messages are taken in on the way, as they come before what they describe."""
+    scan = _Scan(size=len(data))
+    lengths = [0] * 256
+    lengths[FMT] = FMT_LENGTH
+    names = [""] * 256
+    names[FMT] = "FMT"
+    seen = [0] * 256
+    wanted: list[array[int] | None] = [None] * 256
+    at, end, steps = 0, len(data), 0
+    while at + 3 <= end:
+        kind = data[at + 2]
+        length = lengths[kind] if data[at] == HEAD[0] and data[at + 1] == HEAD[1] else 0
+        if not length or at + length > end:
+            there = data.find(HEAD, at + 1)
+            if there < 0 and length:
+                scan.tail_bytes, at = end - at, end
+                break
+            there = end if there < 0 else there
+            scan.lost_bytes += there - at
+            at = there
+            continue
+        if kind == FMT:
+            _describe(data[at : at + length], scan, lengths, names, wanted)
+        seen[kind] += 1
+        places = wanted[kind]
+        if places is not None:
+            places.append(at)
+        at += length
+        steps += 1
+        if steps % TICK_EVERY == 0:
+            reading.tick(at / end)
+    scan.tail_bytes += end - at
+    scan.counts = Counter({names[kind]: count for kind, count in enumerate(seen) if count})
+    return scan
+
+
+def _describe(
+    message: bytes, scan: _Scan, lengths: list[int], names: list[str], wanted: list[array[int] | None]
+) -> None:
+    """Take in what a FMT message says of a kind; one that contradicts itself is not read."""
+    number, length = message[3], message[4]
+    name, form, columns = (_text(message[a:b]) for a, b in ((5, 9), (9, 25), (25, 89)))
+    kind = _kind(name, form, columns.split(","))
+    if number == FMT or kind is None or kind.dtype.itemsize != length:
+        return
+    lengths[number], names[number] = length, name
+    if name in WANTED:
+        scan.kinds[name] = kind
+        wanted[number] = scan.places.setdefault(name, array("q"))
+
+
+def _text(raw: bytes) -> str:
+    return raw.split(b"\0")[0].decode("ascii", "replace")
+
+
+def _kind(name: str, form: str, columns: list[str]) -> _Kind | None:
+    if len(columns) != len(form) or len(set(columns)) != len(columns) or set(form) - TYPES.keys():
+        return None
+    fields: list[Any] = [("head", "S3")]
+    for column, letter in zip(columns, form, strict=True):
+        kind, count = TYPES[letter]
+        fields.append((column, kind) if count == 1 else (column, kind, (count,)))
+    scaled = frozenset(column for column, letter in zip(columns, form, strict=True) if letter in HUNDREDTHS)
+    return _Kind(name, np.dtype(fields), scaled)
+
+
+class _Tables:
+    """Columns of the wanted kinds, read when they are asked for."""
+
+    def __init__(self, path: Path, scan: _Scan) -> None:
+        self._data = np.memmap(path, np.uint8, "r")
+        self._scan = scan
+        self._known: dict[str, np.ndarray | None] = {}
+        self.offset_ns = self._since_1970()
+
+    def rows(self, name: str) -> np.ndarray | None:
+        """The messages of a kind as a structured array (n,); None if there is none."""
+        if name not in self._known:
+            places = np.array(self._scan.places.get(name, ()), np.int64)
+            self._known[name] = self._cut(name, places) if len(places) else None
+        return self._known[name]
+
+    def _cut(self, name: str, places: IntArray) -> np.ndarray:
+        kind = self._scan.kinds[name].dtype
+        raw = self._data[places[:, None] + np.arange(kind.itemsize)]
+        return np.ascontiguousarray(raw).view(kind)[:, 0]
+
+    def numbers(self, name: str, column: str) -> FloatArray:
+        """A column in its own unit (n,)."""
+        rows = self.rows(name)
+        assert rows is not None
+        scale = 0.01 if column in self._scan.kinds[name].hundredths else 1.0
+        return np.asarray(rows[column], float) * scale
+
+    def has(self, name: str, *columns: str) -> bool:
+        rows = self.rows(name)
+        return rows is not None and not {"TimeUS", *columns} - set(rows.dtype.names or ())
+
+    def ns(self, name: str) -> IntArray:
+        """When each message of a kind was written (n,)."""
+        rows = self.rows(name)
+        assert rows is not None
+        return rows["TimeUS"].astype(np.int64) * 1000 + self.offset_ns
+
+    def span(self) -> tuple[int, int]:
+        times = [self.ns(name) for name in self._scan.places if self.has(name)]
+        full = [ns for ns in times if len(ns)]
+        return (min(int(ns[0]) for ns in full), max(int(ns[-1]) for ns in full)) if full else (0, 0)
+
+    def _since_1970(self) -> int:
+        """What to add to times since boot, where a GPS receiver told the date; else 0."""
+        self.offset_ns = 0
+        if not self.has("GPS", "GMS", "GWk"):
+            return 0
+        week, ms = self.numbers("GPS", "GWk"), self.numbers("GPS", "GMS")
+        dated = np.flatnonzero(week > 0)
+        if not len(dated):
+            return 0
+        first = dated[0]
+        seconds = GPS_EPOCH_S + week[first] * 604_800 + ms[first] / 1000 - LEAP_S
+        return round(seconds * 1e9) - int(self.ns("GPS")[first])
+
+
+def _poses(tables: _Tables) -> Iterator[Poses]:
+    """What the vehicle took for its position, in metres and in degrees; and a simulator's truth."""
+    found = [
+        *(_filtered(tables, name) for name in ("XKF1", "NKF1")),
+        _placed(tables, "POS", truth=False),
+        _placed(tables, "SIM", truth=True),
+    ]
+    yield from (track for track in found if track is not None)
+
+
+def _filtered(tables: _Tables, name: str) -> Poses | None:
+    """The first core of the filter, in metres from its origin."""
+    if not tables.has(name, "PN", "PE", "Yaw"):
+        return None
+    rows = tables.rows(name)
+    assert rows is not None
+    mine = rows["C"] == rows["C"].min() if "C" in (rows.dtype.names or ()) else np.ones(len(rows), bool)
+    xy = np.stack([tables.numbers(name, "PE"), tables.numbers(name, "PN")], axis=-1)[mine]
+    heading = np.radians(90.0 - tables.numbers(name, "Yaw")[mine])
+    return poses_of(
+        name, "local", tables.ns(name)[mine], xy, heading, rank=1, origin=_origin(tables), rule="ardupilot"
+    )
+
+
+def _origin(tables: _Tables) -> SiteOrigin | None:
+    """Where the filter counts from."""
+    if not tables.has("ORGN", "Lat", "Lng"):
+        return None
+    return _site(*(float(tables.numbers("ORGN", column)[-1]) for column in ("Lat", "Lng")))
+
+
+def _site(lat: float, lon: float, alt: float = 0.0) -> SiteOrigin | None:
+    """A place in steps of 1e-7 degrees; 0, 0 is none."""
+    return (
+        SiteOrigin(lat=lat / 1e7, lon=lon / 1e7, alt=alt, heading_deg=0.0) if (lat, lon) != (0, 0) else None
+    )
+
+
+def _placed(tables: _Tables, name: str, *, truth: bool) -> Poses | None:
+    if not tables.has(name, "Lat", "Lng"):
+        return None
+    ns = tables.ns(name)
+    degrees = np.stack([tables.numbers(name, "Lat"), tables.numbers(name, "Lng")], axis=-1) / 1e7
+    own = tables.has(name, "Yaw")
+    bearing = tables.numbers(name, "Yaw") if own else _bearing_at(tables, ns)
+    return fixes_of(name, "ardupilot", ns, degrees, bearing, rank=2, truth=truth)
+
+
+def _bearing_at(tables: _Tables, ns: IntArray) -> FloatArray:
+    """Degrees clockwise from north at given times, as the attitude tells."""
+    if not tables.has("ATT", "Yaw"):
+        return np.full(len(ns), np.nan)
+    turn = np.unwrap(tables.numbers("ATT", "Yaw"), period=360.0)
+    return np.interp(ns, tables.ns("ATT"), turn)
+
+
+def _uploads(tables: _Tables) -> Iterator[Upload]:
+    """Missions as they were written down, each from its item 0 (home) on."""
+    if not tables.has("CMD", "CTot", "CNum", "CId"):
+        return
+    rows, ns = tables.rows("CMD"), tables.ns("CMD")
+    assert rows is not None
+    number = rows["CNum"].astype(int)
+    starts = [0, *(np.flatnonzero(np.diff(number) <= 0) + 1).tolist(), len(rows)]
+    for begin, end in pairwise(starts):
+        part = rows[begin:end]
+        items = tuple(_item(row) for row in part if row["CNum"] > 0)
+        if items:
+            home = _home(part[0]) if part[0]["CNum"] == 0 else None
+            whole = len(part) == int(part[0]["CTot"])
+            yield Upload(int(ns[begin]), items, "ardupilot", complete=whole, home=home)
+
+
+def _item(row: Any) -> Item:
+    params = (float(row["Prm1"]), float(row["Prm2"]), float(row["Prm3"]), float(row["Prm4"]))
+    frame = int(row["Frame"]) if "Frame" in row.dtype.names else 3
+    command = int(row["CId"])
+    place = (int(row["Lat"]), int(row["Lng"]))
+    return Item(command, frame, params, x=place[0], y=place[1], z=float(row["Alt"]))
+
+
+def _home(row: Any) -> SiteOrigin | None:
+    return _site(float(row["Lat"]), float(row["Lng"]), float(row["Alt"]))
+
+
+Kind = Literal["mode", "command", "trigger", "reached", "text"]
+TRIGGERS = (Command.DO_SEND_SCRIPT_MESSAGE, Command.IMAGE_START_CAPTURE, Command.DO_DIGICAM_CONTROL)
+
+
+def _remarks(tables: _Tables) -> Iterator[Remark]:
+    if tables.has("MODE", "ModeNum"):
+        for ns, mode in zip(
+            tables.ns("MODE").tolist(), tables.numbers("MODE", "ModeNum").tolist(), strict=True
+        ):
+            yield Remark(ns, "mode", ARDUPILOT.modes.name(Mode(int(mode))))
+    if tables.has("MSG", "Message"):
+        rows = tables.rows("MSG")
+        assert rows is not None
+        for ns, text in zip(tables.ns("MSG").tolist(), rows["Message"].tolist(), strict=True):
+            yield Remark(ns, "text", text.decode("utf-8", "replace"))
+    for name in ("CAM", "TRIG"):
+        for ns in tables.ns(name).tolist() if tables.has(name) else ():
+            yield Remark(ns, "trigger", "camera")
+    if tables.has("MISE", "CNum", "CId"):
+        yield from _executed(tables)
+
+
+def _executed(tables: _Tables) -> Iterator[Remark]:
+    """Items as the vehicle began them."""
+    rows = tables.rows("MISE")
+    assert rows is not None
+    for ns, row in zip(tables.ns("MISE").tolist(), rows, strict=True):
+        item = _item(row)
+        kind: Kind = "trigger" if item.command in TRIGGERS else "command"
+        yield Remark(ns, kind, item.name, int(row["CNum"]))
+
+
+def _battery(tables: _Tables) -> Iterator[tuple[int, float]]:
+    if tables.has("BAT", "RemPct"):
+        for ns, share in zip(
+            tables.ns("BAT").tolist(), tables.numbers("BAT", "RemPct").tolist(), strict=True
+        ):
+            if 0 <= share <= 100:
+                yield ns, share / 100

@@ -1,0 +1,54 @@
+"""A log's files: whether they can be read, how they begin, their digest. They are never changed."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from mission.errors import InputError
+
+PIECE = 1 << 20
+
+
+def must_be_readable(path: Path) -> None:
+    """Refuse what is not there or holds nothing.
+
+    Raises
+    ------
+    InputError
+        Naming the path and what is wrong with it.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: no such log")
+    if path.is_dir():
+        return
+    if not path.is_file():
+        raise InputError(f"{path}: is no file but a device or the like; give a log")
+    if head(path, 1) == b"":
+        raise InputError(f"{path}: is empty")
+
+
+def head(path: Path, count: int) -> bytes:
+    """The first bytes of a file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return file.read(count)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def digest_of(paths: Sequence[Path]) -> str:
+    """sha256 of the files' bytes, one after another, hexadecimal."""
+    digest = hashlib.sha256()
+    for path in paths:
+        with path.open("rb") as file:
+            while piece := file.read(PIECE):
+                digest.update(piece)
+    return digest.hexdigest()

@@ -1,0 +1,117 @@
+"""stopgo's own logs, which are in the mission's frame already: a robot's journal."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import msgspec
+
+from mission.document import Mission
+from mission.errors import InputError
+from mission.events import AnyEvent
+from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, poses_of
+from recordings.logs.files import digest_of
+
+SITE = "site"
+"""What the mission's own frame is called in a log."""
+BESIDE = ("-wal", "-shm")
+
+
+def read_journal(path: Path, reading: Reading) -> FieldLog:
+    """Read a robot's journal, what it had not yet put in its place included; the file stays as it is.
+
+    Raises
+    ------
+    InputError
+        When it is no journal of stopgo, or nothing happened.
+    """
+    with _copied(path) as connection:
+        try:
+            events = tuple(_decoded(connection.execute("SELECT body FROM events ORDER BY number")))
+            missions = tuple(_missions(connection.execute("SELECT document FROM missions ORDER BY revision")))
+        except sqlite3.DatabaseError as error:
+            raise InputError(f"{path}: is no journal of stopgo, or damaged ({error})") from None
+    if not events:
+        raise InputError(f"{path}: a journal in which nothing has happened yet")
+    return own_log(path, "stopgo journal", events, missions, poses_of_events(events))
+
+
+@contextmanager
+def _copied(path: Path) -> Iterator[sqlite3.Connection]:
+    """An open copy: SQLite writes to what it opens when the last writer was killed."""
+    with TemporaryDirectory(prefix="stopgo-") as folder:
+        copy = Path(folder) / "journal.sqlite"
+        shutil.copyfile(path, copy)
+        for suffix in BESIDE:
+            beside = path.with_name(path.name + suffix)
+            if beside.exists():
+                shutil.copyfile(beside, f"{copy}{suffix}")
+        connection = sqlite3.connect(copy)
+        try:
+            yield connection
+        finally:
+            connection.close()
+
+
+def _decoded(rows: Iterable[tuple[bytes]]) -> Iterator[AnyEvent]:
+    decoder = msgspec.json.Decoder(AnyEvent)
+    for (body,) in rows:
+        try:
+            yield decoder.decode(body)
+        except (msgspec.DecodeError, msgspec.ValidationError):
+            continue
+
+
+def _missions(rows: Iterable[tuple[bytes]]) -> Iterator[Mission]:
+    for (document,) in rows:
+        try:
+            yield msgspec.json.decode(document, type=Mission)
+        except (msgspec.DecodeError, msgspec.ValidationError):
+            continue
+
+
+def poses_of_events(events: Iterable[AnyEvent]) -> Poses | None:
+    """Where the robot was when it told so with an event."""
+    told = [(event.robot_ns, pose) for event in events if (pose := getattr(event, "pose", None)) is not None]
+    if not told:
+        return None
+    xy = [(pose.x, pose.y) for _, pose in told]
+    return poses_of("events", SITE, [ns for ns, _ in told], xy, [pose.heading for _, pose in told], rank=1)
+
+
+def own_log(
+    path: Path, form: str, events: tuple[AnyEvent, ...], missions: tuple[Mission, ...], *tracks: Poses | None
+) -> FieldLog:
+    """What there is of a log of stopgo's, as of any other."""
+    counts: dict[str, int] = {}
+    for event in events:
+        counts[type(event).__name__] = counts.get(type(event).__name__, 0) + 1
+    poses = tuple(track for track in tracks if track is not None)
+    times = [event.robot_ns for event in events] + [
+        int(edge) for track in poses for edge in track.ns[[0, -1]]
+    ]
+    return FieldLog(
+        path=str(path),
+        format=form,
+        digest=digest_of([path]),
+        messages=len(events) + sum(len(track.ns) for track in poses if track.source != "events"),
+        clock="wall",
+        begin_ns=min(times, default=0),
+        end_ns=max(times, default=0),
+        channels=tuple(Channel(name, "", count) for name, count in sorted(counts.items())),
+        poses=poses,
+        remarks=tuple(_remarks(events)),
+        events=events,
+        missions=missions,
+    )
+
+
+def _remarks(events: Iterable[AnyEvent]) -> Iterator[Remark]:
+    for event in events:
+        stop = getattr(event, "stop", "")
+        yield Remark(event.robot_ns, "text", f"{type(event).__name__} {stop}".strip())

@@ -1,0 +1,282 @@
+"""ROS logs: ROS 1 .bag, and of ROS 2 a folder, a raw .mcap or .db3, whole or damaged."""
+
+from __future__ import annotations
+
+import struct
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from mission.errors import InputError
+from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Sweep, fixes_of, poses_of
+from recordings.logs.files import digest_of
+from recordings.logs.ros_bag import (
+    Bag,
+    Damaged,
+    Topic,
+    UnknownType,
+    files_of,
+    salvaged_bag,
+    whole_bag,
+)
+from recordings.logs.ros_poses import TYPES, WITH_CHILD, PoseColumns, heading_of
+from recordings.logs.ros_sweeps import SWEEPS
+from recordings.logs.transforms import TransformTree
+
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+FIX, BATTERY = "sensor_msgs/msg/NavSatFix", "sensor_msgs/msg/BatteryState"
+SIMULATED_BELOW_NS = 10**18
+"""Times before September 2001 are no wall clock's but a simulation's, or count from a start."""
+NOT_THE_ROBOT = ("goal", "target", "setpoint", "initialpose", "plan", "desired", "reference")
+"""Topics with such a word in their name tell where the robot is to be."""
+TICK_EVERY = 20_000
+
+
+def read_ros(path: Path, reading: Reading) -> FieldLog:
+    """Read a bag to its end, or as much of it as can be had.
+
+    Raises
+    ------
+    InputError
+        When it is no bag, or nothing of it can be read.
+    """
+    try:
+        with whole_bag(path) as bag:
+            return _gathered(path, bag, reading)
+    except Damaged as damage:
+        with salvaged_bag(path, str(damage)) as bag:
+            found = _gathered(path, bag, reading)
+    if not found.messages:
+        raise InputError(f"{path}: nothing in it can be read ({found.lost}); was it copied whole?")
+    return found
+
+
+def _gathered(path: Path, bag: Bag, reading: Reading) -> FieldLog:
+    sorter = _Sorter(bag, reading)
+    wanted = [topic for topic in bag.topics if topic.count is None or sorter.wants(topic)]
+    total = sum(topic.count or 0 for topic in wanted)
+    for number, message in enumerate(bag.messages(wanted)):
+        sorter.take(*message)
+        if number % TICK_EVERY == 0:
+            reading.tick(number / total if total else 0.0)
+    counts = {t: sorter.counts[t] if t.count is None else t.count for t in bag.topics}
+    begin, end = sorter.span()
+    return FieldLog(
+        path=str(path),
+        format=_format(path, bag),
+        digest=digest_of(files_of(path)),
+        messages=sum(counts.values()),
+        clock="simulated" if 0 < end < SIMULATED_BELOW_NS else "wall",
+        begin_ns=begin,
+        end_ns=end,
+        channels=_channels(counts),
+        poses=(*sorter.poses(), *sorter.places()),
+        battery=tuple(sorter.battery),
+        mounts=sorter.mounts(),
+        sweeps=lambda: _sweeps(path, reading),
+        lost=bag.lost(),
+        oddities=sorter.oddities(),
+    )
+
+
+def _format(path: Path, bag: Bag) -> str:
+    if not bag.ros2:
+        return "ROS 1 bag"
+    kinds = sorted({file.name.removesuffix(".zstd").rpartition(".")[2] for file in files_of(path)})
+    return f"ROS 2 bag ({', '.join(kinds)})"
+
+
+def _channels(counts: dict[Topic, int]) -> tuple[Channel, ...]:
+    """One for each topic, however many connections it has."""
+    merged: Counter[tuple[str, str]] = Counter()
+    for topic, count in counts.items():
+        merged[topic.name, topic.msgtype] += count
+    return tuple(Channel(name, kind, count) for (name, kind), count in sorted(merged.items()))
+
+
+@dataclass
+class _Sorter:
+    """Takes messages one after another, each to what it tells of."""
+
+    bag: Bag
+    reading: Reading
+    columns: dict[str, PoseColumns] = field(default_factory=dict)
+    tree: TransformTree = field(default_factory=TransformTree)
+    fixes: dict[str, list[tuple[int, float, float]]] = field(default_factory=dict)
+    battery: list[tuple[int, float]] = field(default_factory=list)
+    counts: Counter[Topic] = field(default_factory=Counter)
+    faults: Counter[str] = field(default_factory=Counter)
+    logged: list[int] = field(default_factory=list)
+    """The first and the last time."""
+
+    def wants(self, topic: Topic) -> bool:
+        return topic.msgtype in (*TYPES, *TRANSFORMS, FIX, BATTERY)
+
+    def take(self, topic: Topic, ns: int, raw: bytes) -> None:
+        self.counts[topic] += 1
+        self.logged = [min(self.logged[0], ns), max(self.logged[1], ns)] if self.logged else [ns, ns]
+        taking = self._taking(topic)
+        if taking is None:
+            return
+        try:
+            taking(topic, ns, raw)
+        except UnknownType as error:
+            self.faults[f"{topic.name}: {error}"] += 1
+        except (struct.error, IndexError, AttributeError):
+            self.faults[f"{topic.name}: bytes that are no {topic.msgtype}"] += 1
+
+    def _taking(self, topic: Topic) -> Callable[[Topic, int, bytes], None] | None:
+        if topic.msgtype in TYPES:
+            return self._pose
+        if topic.msgtype in TRANSFORMS:
+            return self._transforms
+        return {FIX: self._fix, BATTERY: self._charge}.get(topic.msgtype)
+
+    def _pose(self, topic: Topic, ns: int, raw: bytes) -> None:
+        if topic.name not in self.columns:
+            decode = lambda data: self.bag.decode(topic, data)  # noqa: E731
+            self.columns[topic.name] = PoseColumns(topic.name, topic.msgtype, self.bag.ros2, decode)
+        self.columns[topic.name].take(ns, raw)
+
+    def _transforms(self, topic: Topic, ns: int, raw: bytes) -> None:
+        for item in self.bag.decode(topic, raw).transforms:
+            move, turn = item.transform.translation, item.transform.rotation
+            heading = heading_of((turn.x, turn.y, turn.z, turn.w))
+            stamp = self._time(item.header.stamp.sec * 10**9 + item.header.stamp.nanosec, ns)
+            static = topic.name.endswith("tf_static")
+            self.tree.add(
+                item.header.frame_id, item.child_frame_id, stamp, (move.x, move.y, heading), static=static
+            )
+
+    def _fix(self, topic: Topic, ns: int, raw: bytes) -> None:
+        told = self.bag.decode(topic, raw)
+        stamp = self._time(told.header.stamp.sec * 10**9 + told.header.stamp.nanosec, ns)
+        if told.status.status >= 0:
+            self.fixes.setdefault(topic.name, []).append((stamp, told.latitude, told.longitude))
+
+    def _charge(self, topic: Topic, ns: int, raw: bytes) -> None:
+        share = float(self.bag.decode(topic, raw).percentage)
+        if 0 <= share <= 1:
+            self.battery.append((ns, share))
+
+    def _time(self, stamp_ns: int, logged_ns: int) -> int:
+        """The time that counts; a stamp of 0 was never set."""
+        return logged_ns if self.reading.stamps == "log" or stamp_ns == 0 else stamp_ns
+
+    def span(self) -> tuple[int, int]:
+        """When the log begins and ends, by the times that count for its poses if it has any."""
+        tracks = [*self.poses(), *self.places()]
+        if tracks:
+            return min(int(t.ns[0]) for t in tracks), max(int(t.ns[-1]) for t in tracks)
+        return (self.logged[0], self.logged[1]) if self.logged else (0, 0)
+
+    def poses(self) -> tuple[Poses, ...]:
+        """From every topic and frame that tells any, and from transforms."""
+        if self._poses is None:
+            found = [track for column in self.columns.values() for track in self._of(column)]
+            chained = self._of_transforms()
+            self._poses = tuple(([chained] if chained is not None else []) + found)
+        return self._poses
+
+    _poses: tuple[Poses, ...] | None = None
+
+    def _of(self, column: PoseColumns) -> Iterator[Poses]:
+        for frame in column.frames:
+            stamps, logged, xy, heading = column.of_frame(frame)
+            ns = logged if self.reading.stamps == "log" else np.where(stamps == 0, logged, stamps)
+            track = poses_of(
+                column.topic, frame, ns, xy, heading,
+                robot=_namespace(column.topic), rank=_rank(column.topic, column.msgtype, frame),
+            )  # fmt: skip
+            if track is not None:
+                yield track
+
+    def _of_transforms(self) -> Poses | None:
+        way = self.tree.robot_chain(self.reading.frame)
+        if not way:
+            return None
+        ns, xy, heading = self.tree.poses(way)
+        names = " > ".join([way[0][0], *(child for _, child in way)])
+        rank = 0 if self.reading.frame is not None or way[0][0] == "map" else 5
+        return poses_of(f"tf {names}", way[0][0], ns, xy, heading, rank=rank)
+
+    def places(self) -> tuple[Poses, ...]:
+        tracks = []
+        for topic, rows in self.fixes.items():
+            table = np.array(rows)
+            nowhere = np.full(len(rows), np.nan)
+            ns = [row[0] for row in rows]
+            tracks.append(
+                fixes_of(topic, "wgs84", ns, table[:, 1:], nowhere, robot=_namespace(topic), rank=6)
+            )
+        return tuple(track for track in tracks if track is not None)
+
+    def mounts(self) -> tuple[tuple[str, float, float, float], ...]:
+        way = self.tree.robot_chain(self.reading.frame)
+        return self.tree.mounts(way[-1][1]) if way else self.tree.mounts("base_link")
+
+    def oddities(self) -> tuple[str, ...]:
+        lines = [f"{fault} ({count} messages, left out)" for fault, count in self.faults.items()]
+        apart = self._clocks_apart()
+        return (*lines, apart) if apart else tuple(lines)
+
+    def _clocks_apart(self) -> str:
+        """Whether the messages' stamps are of another clock than the log's times."""
+        for column in self.columns.values():
+            stamps, logged = np.array(column.stamp_ns, np.int64), np.array(column.logged_ns, np.int64)
+            away = np.abs(stamps - logged)[stamps != 0] / 1e9
+            if len(away) and float(np.median(away)) > APART_S:
+                counts = "stamps count" if self.reading.stamps == "header" else "log times count"
+                return (
+                    f"{column.topic}: stamps lie {np.median(away):.0f} s from the log's own times"
+                    f" (simulated time, or clocks that were not set); the {counts}"
+                )
+        return ""
+
+
+APART_S = 60.0
+
+
+def _namespace(topic: str) -> str:
+    """The robot's part of a topic: `r1` of `/r1/odom`."""
+    return "/".join(topic.strip("/").split("/")[:-1])
+
+
+def _rank(topic: str, msgtype: str, frame: str) -> int:
+    """Which of several sources is believed first: what a map was matched with, then odometry."""
+    if any(word in topic.lower() for word in NOT_THE_ROBOT):
+        return 9
+    if msgtype.endswith("PoseWithCovarianceStamped"):
+        return 1
+    if frame == "map":
+        return 2
+    return 3 if msgtype == WITH_CHILD else 4
+
+
+def _sweeps(path: Path, reading: Reading) -> Iterator[Sweep]:
+    """The scans of the log, in order; of a damaged log those that can be had."""
+    try:
+        with whole_bag(path) as bag:
+            for _ in bag.messages(bag.topics):  # damage shows only when it is read
+                pass
+    except Damaged as damage:
+        with salvaged_bag(path, str(damage)) as bag:
+            yield from _sweeps_of(bag, reading)
+        return
+    with whole_bag(path) as bag:
+        yield from _sweeps_of(bag, reading)
+
+
+def _sweeps_of(bag: Bag, reading: Reading) -> Iterator[Sweep]:
+    for topic, ns, raw in bag.messages([topic for topic in bag.topics if topic.msgtype in SWEEPS]):
+        try:
+            message = bag.decode(topic, raw)
+        except UnknownType:
+            continue  # was counted when the log was read
+        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        when = ns if reading.stamps == "log" or stamp == 0 else stamp
+        frame = message.header.frame_id.lstrip("/")
+        yield Sweep(when, topic.name, frame, SWEEPS[topic.msgtype](message))

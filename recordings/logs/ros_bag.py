@@ -1,0 +1,217 @@
+"""Opens ROS bags of either kind: by rosbags where they are whole, record by record where they are not."""
+
+from __future__ import annotations
+
+import lzma
+import sqlite3
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from mission.errors import InputError
+from recordings.logs.salvage import Salvaged, salvage
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One connection of a bag."""
+
+    number: int
+    name: str
+    msgtype: str
+    count: int | None
+    """None where only reading to the end tells."""
+
+
+Message = tuple[Topic, int, bytes]
+"""Its topic, when it was logged (ns), and its bytes."""
+
+
+@dataclass(frozen=True)
+class Bag:
+    """An open bag."""
+
+    ros2: bool
+    topics: tuple[Topic, ...]
+    messages: Callable[[Sequence[Topic]], Iterator[Message]]
+    """Of these topics, in the order in which they were logged."""
+    decode: Callable[[Topic, bytes], Any]
+    """A message as an object with its fields; UnknownType where nobody knows how."""
+    lost: Callable[[], str] = lambda: ""
+    """Once all messages were read: what of the bag could not be."""
+
+
+class UnknownType(Exception):
+    """A message of a type that is not described anywhere."""
+
+
+class Damaged(Exception):
+    """A bag that rosbags cannot read to its end."""
+
+
+def files_of(path: Path) -> list[Path]:
+    """The files that a bag is made of."""
+    if not path.is_dir():
+        return [path]
+    found = [p for p in sorted(path.iterdir(), key=lambda p: _natural(p.name)) if _is_part(p)]
+    if not found:
+        raise InputError(f"{path}: holds no .mcap, .db3 or .bag; give a log, or the folder of a rosbag2")
+    return found
+
+
+def _is_part(path: Path) -> bool:
+    return path.name.removesuffix(".zstd").rpartition(".")[2] in ("mcap", "db3", "bag")
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """So that bag_2 comes before bag_10."""
+    import re
+
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
+
+
+@contextmanager
+def whole_bag(path: Path) -> Iterator[Bag]:
+    """A bag as rosbags reads it.
+
+    Raises
+    ------
+    Damaged
+        With the reason, when it is opened or while its messages are read.
+    """
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    with ExitStack() as stack:
+        with _damage_told():
+            described = path.is_dir() and (path / METADATA).exists()
+            paths = [path] if described else stack.enter_context(_unpacked(files_of(path)))
+            reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+            stack.enter_context(reader)
+        yield _bag(reader)
+
+
+METADATA = "metadata.yaml"
+
+
+@contextmanager
+def _unpacked(files: Sequence[Path]) -> Iterator[list[Path]]:
+    """The files, those that are packed as a whole (`.zstd`) unpacked in a folder that goes away again."""
+    with TemporaryDirectory(prefix="stopgo-") as folder:
+        yield [_plain(file, Path(folder)) if file.suffix == ".zstd" else file for file in files]
+
+
+def _plain(file: Path, folder: Path) -> Path:
+    """As much of a packed file as can be unpacked."""
+    from backports import zstd
+
+    target = folder / file.stem
+    unpack = zstd.ZstdDecompressor()
+    with file.open("rb") as packed, target.open("wb") as plain:
+        while piece := packed.read(1 << 20):
+            try:
+                plain.write(unpack.decompress(piece))
+            except (zstd.ZstdError, EOFError):
+                break
+    return target
+
+
+@contextmanager
+def _damage_told() -> Iterator[None]:
+    from rosbags.highlevel import AnyReaderError
+    from rosbags.rosbag1 import ReaderError as Error1
+    from rosbags.rosbag2 import ReaderError as Error2
+    from rosbags.typesys import TypesysError
+
+    try:
+        yield
+    except (AnyReaderError, Error1, Error2, TypesysError, *LOW_LEVEL) as error:
+        raise Damaged(_reason(error)) from error
+
+
+LOW_LEVEL = (
+    AssertionError, OSError, sqlite3.DatabaseError, struct.error, EOFError, RuntimeError, ValueError,
+    IndexError, KeyError, lzma.LZMAError, MemoryError, OverflowError,
+)  # fmt: skip
+"""What readers of damaged files have been seen to raise besides errors of their own."""
+
+
+def _reason(error: BaseException) -> str:
+    return " ".join(str(error).split())[:120] or type(error).__name__
+
+
+def _bag(reader: Any) -> Bag:
+    topics = {_key(c): Topic(k, c.topic, c.msgtype, c.msgcount) for k, c in enumerate(reader.connections)}
+
+    def messages(wanted: Sequence[Topic]) -> Iterator[Message]:
+        chosen = [c for c in reader.connections if topics[_key(c)] in wanted]
+        with _damage_told():  # whoever takes the messages raises nothing in here
+            for connection, ns, raw in reader.messages(connections=chosen) if chosen else ():
+                yield topics[_key(connection)], ns, raw
+
+    def decode(topic: Topic, raw: bytes) -> Any:
+        return decoded(reader.typestore, topic.msgtype, raw, ros2=reader.is2)
+
+    return Bag(reader.is2, tuple(topics.values()), messages, decode)
+
+
+def _key(connection: Any) -> tuple[int, str, int]:
+    return connection.id, connection.topic, id(connection.owner)
+
+
+def decoded(store: Any, msgtype: str, raw: bytes, *, ros2: bool) -> Any:
+    """A message's bytes as an object.
+
+    Raises
+    ------
+    UnknownType
+        If the type is not described, or the bytes are not of it.
+    """
+    from rosbags.serde import SerdeError
+
+    try:
+        return store.deserialize_cdr(raw, msgtype) if ros2 else store.deserialize_ros1(raw, msgtype)
+    except (KeyError, SerdeError, struct.error, ValueError, IndexError, UnicodeDecodeError) as error:
+        raise UnknownType(f"{msgtype}: {_reason(error)}") from None
+
+
+@contextmanager
+def salvaged_bag(path: Path, why: str) -> Iterator[Bag]:
+    """As much of a damaged bag as can be had."""
+    with _unpacked(files_of(path)) as files, salvage(files, why) as found:
+        yield _salvaged(found)
+
+
+def _salvaged(found: Salvaged) -> Bag:
+    store = _store_of(found)
+    topics = {c.number: Topic(c.number, c.topic, c.msgtype, None) for c in found.connections}
+
+    def messages(wanted: Sequence[Topic]) -> Iterator[Message]:
+        numbers = {topic.number for topic in wanted}
+        for number, ns, raw in found.messages():
+            if number in numbers:
+                yield topics[number], ns, raw
+
+    def decode(topic: Topic, raw: bytes) -> Any:
+        return decoded(store, topic.msgtype, raw, ros2=found.ros2)
+
+    return Bag(found.ros2, tuple(topics.values()), messages, decode, found.lost)
+
+
+def _store_of(found: Salvaged) -> Any:
+    """ROS's own types, and those that the bag describes."""
+    from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE if found.ros2 else Stores.ROS1_NOETIC)
+    for connection in found.connections:
+        if connection.definition and connection.msgtype not in store.fielddefs:
+            try:
+                types = get_types_from_msg(connection.definition, connection.msgtype)
+                store.register({name: item for name, item in types.items() if name not in store.fielddefs})
+            except TypesysError:
+                continue  # then messages of this type are told as unknown
+    return store

@@ -1,0 +1,48 @@
+"""Laser scans and point clouds of ROS -> points in the scanner's frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mission.geometry import FloatArray
+
+
+def _of_laser_scan(message: Any) -> FloatArray:
+    ranges = np.asarray(message.ranges, float)
+    angles = message.angle_min + message.angle_increment * np.arange(len(ranges))
+    good = np.isfinite(ranges) & (ranges >= message.range_min) & (ranges <= message.range_max)
+    ranges, angles = ranges[good], angles[good]
+    flat = np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=-1)
+    return np.column_stack([flat, np.zeros(len(flat))])
+
+
+KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+"""Number types of sensor_msgs/PointField."""
+
+
+def _of_point_cloud(message: Any) -> FloatArray:
+    order = ">" if message.is_bigendian else "<"
+    places = {item.name: item for item in message.fields if item.name in ("x", "y", "z")}
+    if {"x", "y"} - places.keys() or any(item.datatype not in KINDS for item in places.values()):
+        return np.empty((0, 3))
+    kind = np.dtype({
+        "names": list(places),
+        "formats": [order + KINDS[item.datatype] for item in places.values()],
+        "offsets": [item.offset for item in places.values()],
+        "itemsize": message.point_step,
+    })  # fmt: skip
+    data = np.asarray(message.data, np.uint8).tobytes()
+    rows = np.frombuffer(data[: len(data) // kind.itemsize * kind.itemsize], kind)
+    z = rows["z"] if "z" in places else np.zeros(len(rows))
+    xyz = np.stack([rows["x"], rows["y"], z], axis=-1).astype(float)
+    return xyz[np.isfinite(xyz).all(axis=1)]
+
+
+SWEEPS: dict[str, Callable[[Any], FloatArray]] = {
+    "sensor_msgs/msg/LaserScan": _of_laser_scan,
+    "sensor_msgs/msg/PointCloud2": _of_point_cloud,
+}
+"""How each type's points (n, 3) are told."""

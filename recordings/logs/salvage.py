@@ -1,0 +1,373 @@
+"""Reads damaged bags record by record, without their index, up to where nothing makes sense any more.
+
+Of a ROS 1 bag (format 2.0) and of MCAP every chunk that can be unpacked is taken, of a cut one what is
+there; of SQLite every row that can be reached. What was passed over is counted in bytes or rows.
+"""
+
+from __future__ import annotations
+
+import bz2
+import os
+import shutil
+import sqlite3
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from mmap import ACCESS_READ, mmap
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+from urllib.parse import quote
+
+from mission.errors import InputError
+
+Raw = tuple[int, int, bytes]
+"""Number of the connection, when it was logged (ns), and the bytes."""
+
+BAG_MAGIC = b"#ROSBAG V2.0\n"
+MCAP_MAGIC = b"\x89MCAP0\r\n"
+SQLITE_MAGIC = b"SQLite format 3\0"
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+
+
+class Connection(NamedTuple):
+    """A topic as the bag describes it."""
+
+    number: int
+    topic: str
+    msgtype: str
+    """With `/msg/` in the middle, as ROS 2 writes it."""
+    definition: str
+
+
+@dataclass
+class Salvaged:
+    """What there is in damaged files."""
+
+    ros2: bool
+    connections: tuple[Connection, ...]
+    messages: Callable[[], Iterator[Raw]]
+    lost: Callable[[], str]
+
+
+@dataclass
+class _Loss:
+    """What was passed over, as it is read."""
+
+    why: str
+    lines: list[str] = field(default_factory=list)
+
+    def tell(self, line: str) -> None:
+        if line not in self.lines:
+            self.lines.append(line)
+
+    def __str__(self) -> str:
+        return "; ".join([self.why, *self.lines])
+
+
+class _Part(NamedTuple):
+    """How one kind of file is read: its records, each a connection or a message."""
+
+    ros2: bool
+    records: Callable[[Path, _Loss], Iterator[Connection | Raw]]
+
+
+@contextmanager
+def salvage(paths: Sequence[Path], why: str) -> Iterator[Salvaged]:
+    """Read what can be read of the files of a bag; `why` is what a reader of whole files said.
+
+    Raises
+    ------
+    InputError
+        When a file is none of these kinds.
+    """
+    loss = _Loss(why)
+    parts = [(path, _part(path)) for path in paths]
+    if len({part.ros2 for _, part in parts}) > 1:
+        raise InputError(f"{paths[0].parent}: holds bags of ROS 1 and of ROS 2; give one of them")
+
+    def read() -> Iterator[Connection | Raw]:
+        for number, (path, part) in enumerate(parts):
+            for record in part.records(path, loss):
+                yield _shifted(record, number * FILES_APART)
+
+    def messages() -> Iterator[Raw]:
+        return (record for record in read() if not isinstance(record, Connection))
+
+    found = {record.number: record for record in read() if isinstance(record, Connection)}
+    yield Salvaged(parts[0][1].ros2, tuple(found.values()), messages, lambda: str(loss))
+
+
+FILES_APART = 1 << 32
+"""Connections are numbered anew in every file."""
+
+
+def _shifted(record: Connection | Raw, by: int) -> Connection | Raw:
+    if isinstance(record, Connection):
+        return record._replace(number=record.number + by)
+    return (record[0] + by, *record[1:])
+
+
+def _part(path: Path) -> _Part:
+    with path.open("rb") as file:
+        begin = file.read(16)
+    kinds = {
+        BAG_MAGIC: _Part(ros2=False, records=_bag_records),
+        MCAP_MAGIC: _Part(ros2=True, records=_mcap_records),
+        SQLITE_MAGIC: _Part(ros2=True, records=_db3_records),
+    }
+    for magic, part in kinds.items():
+        if begin.startswith(magic):
+            return part
+    raise InputError(f"{path}: does not begin as a .bag, .mcap or .db3 does; nothing of it can be read")
+
+
+Bytes = bytes | mmap
+"""Of which slices can be cut, each as bytes."""
+
+
+@contextmanager
+def _mapped(path: Path) -> Iterator[mmap]:
+    """A file's bytes without reading them all."""
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as mapped:
+        yield mapped
+
+
+def _bag_records(path: Path, loss: _Loss) -> Iterator[Connection | Raw]:
+    with _mapped(path) as data:
+        yield from _bag_stream(data, len(BAG_MAGIC), path.name, loss)
+
+
+def _bag_stream(data: Bytes, at: int, name: str, loss: _Loss) -> Iterator[Connection | Raw]:
+    """Records of a file, or of an unpacked chunk: a header of fields, then data, each with its length."""
+    while at < len(data):
+        record = _bag_record(data, at)
+        if record is None:
+            loss.tell(f"{name}: the last {len(data) - at} bytes make no sense")
+            return
+        fields, body, at = record
+        operation = fields.get(b"op", b"\0")[:1]
+        if operation == b"\x05":
+            plain = _unpacked(fields.get(b"compression", b"").decode("ascii", "replace"), body)
+            if plain is None:
+                loss.tell(f"{name}: a chunk of {len(body)} bytes cannot be unpacked")
+            else:
+                yield from _bag_stream(plain, 0, f"{name}, a chunk", loss)
+        elif operation == b"\x07":
+            yield from _bag_connection(fields, body)
+        elif (
+            operation == b"\x02" and len(fields.get(b"time", b"")) == 8 and len(fields.get(b"conn", b"")) == 4
+        ):
+            seconds, rest = struct.unpack("<II", fields[b"time"])
+            yield struct.unpack("<I", fields[b"conn"])[0], seconds * 10**9 + rest, body
+
+
+def _bag_record(data: Bytes, at: int) -> tuple[dict[bytes, bytes], bytes, int] | None:
+    """Its header's fields, its data and where the next begins; None if it makes no sense.
+
+    A chunk that is cut off at the end of the file is given as far as it goes.
+    """
+    if at + 4 > len(data):
+        return None
+    (length,) = struct.unpack_from("<I", data, at)
+    begin = at + 4 + length
+    if length > LONGEST_HEADER or begin + 4 > len(data):
+        return None
+    fields = _fields(data[at + 4 : begin])
+    (size,) = struct.unpack_from("<I", data, begin)
+    end = begin + 4 + size
+    if b"op" not in fields or (end > len(data) and fields[b"op"][:1] != b"\x05"):
+        return None
+    return fields, data[begin + 4 : end], end
+
+
+LONGEST_HEADER = 1 << 20
+
+
+def _fields(header: bytes) -> dict[bytes, bytes]:
+    """A header's fields by name, as far as they make sense."""
+    fields: dict[bytes, bytes] = {}
+    place = 0
+    while place + 4 <= len(header):
+        (size,) = struct.unpack_from("<I", header, place)
+        name, equals, value = header[place + 4 : place + 4 + size].partition(b"=")
+        if not equals:
+            break
+        fields[name] = value
+        place += 4 + size
+    return fields
+
+
+def _bag_connection(fields: dict[bytes, bytes], body: bytes) -> Iterator[Connection]:
+    about = _fields(body)
+    if len(fields.get(b"conn", b"")) == 4 and b"type" in about:
+        package, _, kind = _words(about[b"type"]).partition("/")
+        yield Connection(
+            struct.unpack("<I", fields[b"conn"])[0],
+            _words(fields.get(b"topic") or about.get(b"topic", b"")),
+            f"{package}/msg/{kind}",
+            _words(about.get(b"message_definition", b"")),
+        )
+
+
+def _words(value: bytes) -> str:
+    return value.decode("utf-8", "replace")
+
+
+def _mcap_records(path: Path, loss: _Loss) -> Iterator[Connection | Raw]:
+    with _mapped(path) as data:
+        yield from _mcap_stream(data, len(MCAP_MAGIC), path.name, loss, {})
+
+
+def _mcap_stream(
+    data: Bytes, at: int, name: str, loss: _Loss, schemas: dict[int, tuple[str, str]]
+) -> Iterator[Connection | Raw]:
+    """Records of a file, or of an unpacked chunk: an operation, a length, a body."""
+    while at + 9 <= len(data):
+        operation, length = struct.unpack_from("<BQ", data, at)
+        begin, end = at + 9, at + 9 + length
+        if operation == 0x0F or (operation == 0x89 and end > len(data)):  # the data's end, or of the file
+            return
+        if not 0 < operation < 0x80 or (end > len(data) and operation != 0x06):
+            break
+        body = data[begin:end]
+        at = end
+        try:
+            yield from _mcap_record(operation, body, name, loss, schemas)
+        except (struct.error, UnicodeDecodeError):
+            loss.tell(f"{name}: a record of {length} bytes makes no sense")
+    if at < len(data):
+        loss.tell(f"{name}: the last {len(data) - at} bytes make no sense")
+    elif at > len(data):
+        loss.tell(f"{name}: ends {at - len(data)} bytes too early")
+
+
+def _mcap_record(
+    operation: int, body: bytes, name: str, loss: _Loss, schemas: dict[int, tuple[str, str]]
+) -> Iterator[Connection | Raw]:
+    if operation == 0x05:
+        number, _, logged = struct.unpack_from("<HIQ", body)
+        yield number, logged, body[22:]
+    elif operation == 0x03:
+        (number,) = struct.unpack_from("<H", body)
+        kind, at = _text(body, 2)
+        _, at = _text(body, at)
+        schemas[number] = (kind, body[at + 4 :].decode("utf-8", "replace"))
+    elif operation == 0x04:
+        number, schema = struct.unpack_from("<HH", body)
+        kind, definition = schemas.get(schema, ("", ""))
+        yield Connection(number, _text(body, 4)[0], kind, definition)
+    elif operation == 0x06:
+        compression, at = _text(body, 28)
+        plain = _unpacked(compression, body[at + 8 :])
+        if plain is None:
+            loss.tell(f"{name}: a chunk of {len(body)} bytes cannot be unpacked")
+        else:
+            yield from _mcap_stream(plain, 0, f"{name}, a chunk", loss, schemas)
+
+
+def _text(body: bytes, at: int) -> tuple[str, int]:
+    (length,) = struct.unpack_from("<I", body, at)
+    return body[at + 4 : at + 4 + length].decode("utf-8"), at + 4 + length
+
+
+def _unpacked(compression: str, body: bytes) -> bytes | None:
+    """A chunk's bytes, as far as they go; None where not even their beginning can be unpacked."""
+    if compression in ("", "none"):
+        return body
+    try:
+        return _UNPACKING[compression](body) or None
+    except (KeyError, OSError, RuntimeError, EOFError, ValueError):
+        return None
+
+
+def _lz4(body: bytes) -> bytes:
+    from lz4.frame import LZ4FrameDecompressor
+
+    return _piecewise(LZ4FrameDecompressor().decompress, body)
+
+
+def _zstd(body: bytes) -> bytes:
+    from backports import zstd
+
+    return _piecewise(zstd.ZstdDecompressor().decompress, body)
+
+
+def _bz2(body: bytes) -> bytes:
+    return _piecewise(bz2.BZ2Decompressor().decompress, body)
+
+
+def _piecewise(unpack: Callable[[bytes], bytes], body: bytes) -> bytes:
+    """What comes out before something is wrong."""
+    from backports import zstd
+
+    plain = bytearray()
+    for at in range(0, len(body), PIECE):
+        try:
+            plain += unpack(body[at : at + PIECE])
+        except (OSError, RuntimeError, EOFError, ValueError, zstd.ZstdError):
+            break
+    return bytes(plain)
+
+
+PIECE = 4096
+_UNPACKING: dict[str, Callable[[bytes], bytes]] = {"lz4": _lz4, "zstd": _zstd, "bz2": _bz2}
+
+
+def _db3_records(path: Path, loss: _Loss) -> Iterator[Connection | Raw]:
+    with TemporaryDirectory(prefix="stopgo-") as folder:
+        whole = _of_full_length(path, Path(folder))
+        connection = sqlite3.connect(f"file:{quote(str(whole))}?immutable=1", uri=True)
+        try:
+            topics = _rows(connection, "SELECT id, name, type FROM topics", path, loss)
+            yield from (Connection(int(number), str(name), str(kind), "") for number, name, kind in topics)
+            yield from _db3_messages(connection, path, loss)
+        finally:
+            connection.close()
+
+
+def _of_full_length(path: Path, folder: Path) -> Path:
+    """The file, or of one that is cut off a copy as long as its head says: SQLite opens nothing shorter."""
+    with path.open("rb") as file:
+        begin = file.read(32)
+    size, pages = (int.from_bytes(begin[a:b], "big") for a, b in ((16, 18), (28, 32)))
+    length = (65_536 if size == 1 else size) * pages
+    if path.stat().st_size >= length:
+        return path.resolve()
+    copy = folder / "copy.db3"
+    shutil.copyfile(path, copy)
+    os.truncate(copy, length)
+    return copy
+
+
+def _rows(connection: sqlite3.Connection, statement: str, path: Path, loss: _Loss) -> list[tuple]:
+    try:
+        return connection.execute(statement).fetchall()
+    except sqlite3.DatabaseError as error:
+        loss.tell(f"{path.name}: {error}")
+        return []
+
+
+def _db3_messages(connection: sqlite3.Connection, path: Path, loss: _Loss) -> Iterator[Raw]:
+    """Rows in order; behind one that cannot be read the search goes on in wider and wider steps."""
+    after, step, last = 0, 1, 0
+    while step < FARTHEST_ROW:
+        try:
+            for row in connection.execute(
+                "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ? ORDER BY id", (after,)
+            ):
+                if step > 1:
+                    loss.tell(f"{path.name}: rows {last + 1} to {row[0] - 1} cannot be read")
+                after, step, last = row[0], 1, row[0]
+                if None not in row:
+                    yield int(row[1]), int(row[2]), bytes(row[3])
+        except sqlite3.DatabaseError:
+            after, step = after + step, step * 2
+        else:
+            break
+    if step > 1:
+        loss.tell(f"{path.name}: rows from {last + 1} on cannot be read")
+
+
+FARTHEST_ROW = 1 << 40

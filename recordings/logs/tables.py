@@ -1,0 +1,202 @@
+"""Trajectories as text: TUM (`t x y z qx qy qz qw`) and tables with a header, separated by , ; or tabs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from mission.errors import InputError
+from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, fixes_of, poses_of
+from recordings.logs.files import digest_of
+from recordings.logs.ros_poses import headings_of
+
+Row = tuple[float, ...]
+TUM_COLUMNS = 8
+WALL_S = 1e9
+"""Times from September 2001 on are taken for seconds since 1970."""
+
+
+def read_table(path: Path, reading: Reading) -> FieldLog:
+    """Read a trajectory in TUM's format, or a table with a header.
+
+    Raises
+    ------
+    InputError
+        When it is neither, or no line of it can be read.
+    """
+    return read_tum(path, reading) if _looks_like_tum(path) else read_csv(path, reading)
+
+
+def read_tum(path: Path, reading: Reading) -> FieldLog:
+    """Read a trajectory in TUM's format; lines that are none are left out and counted.
+
+    Raises
+    ------
+    InputError
+        When no line is one.
+    """
+    rows: list[Row] = []
+    lost = 0
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in file:
+            words = line.split("#")[0].replace(",", " ").split()
+            row = _numbers(words) if len(words) == TUM_COLUMNS else None
+            lost += bool(words) and row is None
+            rows += [] if row is None else [row]
+    if not rows:
+        raise InputError(f"{path}: no line is `t x y z qx qy qz qw`; is it a trajectory in TUM's format?")
+    table = np.array(rows)
+    ns = np.rint(table[:, 0] * 1e9).astype(np.int64)
+    track = poses_of("TUM", "trajectory", ns, table[:, 1:3], headings_of(table[:, 4:]))
+    return _log(path, "TUM trajectory", track, len(rows), lost, ns)
+
+
+def _numbers(words: list[str]) -> Row | None:
+    try:
+        return tuple(map(float, words))
+    except ValueError:
+        return None
+
+
+def read_csv(path: Path, reading: Reading) -> FieldLog:
+    """Read a table whose header names a time and x, y or latitude, longitude.
+
+    Raises
+    ------
+    InputError
+        When the header lacks one of them, or no row can be read.
+    """
+    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        begin = file.readline()
+        separator = max(",;\t", key=begin.count)
+        columns = _Columns(
+            [name.strip() for name in next(csv.reader(io.StringIO(begin), delimiter=separator))], path
+        )
+        rows, lost = [], 0
+        for cells in csv.reader(file, delimiter=separator):
+            row = columns.row(cells)
+            lost += bool(cells) and row is None
+            rows += [] if row is None else [row]
+    if not rows:
+        raise InputError(f"{path}: no row has numbers for {', '.join(columns.needed)}")
+    ns = [row[0] for row in rows]
+    track = columns.track([row[1] for row in rows], ns)
+    return _log(path, "CSV trajectory", track, len(rows), lost, np.array(ns, np.int64))
+
+
+TIMES: dict[str, float] = {
+    "t": 1e9, "time": 1e9, "timestamp": 1e9, "stamp": 1e9, "seconds": 1e9, "sec": 1e9, "time_s": 1e9,
+    "t_s": 1e9, "timestamp_s": 1e9, "time_ms": 1e6, "timestamp_ms": 1e6, "time_us": 1e3, "timestamp_us": 1e3,
+    "time_ns": 1.0, "timestamp_ns": 1.0, "ns": 1.0, "robot_ns": 1.0,
+}  # fmt: skip
+"""Names of a time's column, and nanoseconds per unit."""
+PLACES = (
+    ("x", "y"),
+    ("x_m", "y_m"),
+    ("px", "py"),
+    ("pos_x", "pos_y"),
+    ("lat", "lon"),
+    ("latitude", "longitude"),
+)
+TURNS: dict[str, Callable[[float], float]] = {
+    **dict.fromkeys(("heading", "yaw", "theta", "heading_rad", "yaw_rad"), float),
+    **dict.fromkeys(("heading_deg", "yaw_deg", "theta_deg"), lambda degrees: float(np.radians(degrees))),
+    **dict.fromkeys(
+        ("bearing_deg", "bearing", "course_deg"), lambda degrees: float(np.radians(90 - degrees))
+    ),
+}
+QUATERNIONS = (("qx", "qy", "qz", "qw"), ("q_x", "q_y", "q_z", "q_w"))
+
+
+class _Columns:
+    """Which column is what, by the header's names."""
+
+    def __init__(self, names: list[str], path: Path) -> None:
+        at = {re.sub(r"[\s\[\]()]+", "_", name.lower()).strip("_"): k for k, name in enumerate(names)}
+        self.time = next((name for name in TIMES if name in at), "")
+        self.place: tuple[str, ...] = next((pair for pair in PLACES if set(pair) <= at.keys()), ())
+        self.turn = next((name for name in TURNS if name in at), "")
+        self.quaternion: tuple[str, ...] = next(
+            (names for names in QUATERNIONS if set(names) <= at.keys()), ()
+        )
+        self.at = at
+        if not self.time or not self.place:
+            known = ", ".join(names)[:80]
+            raise InputError(
+                f"{path}: its header ({known}) names no time with x and y or lat and lon; "
+                "name the columns as in: time,x,y,heading_deg"
+            )
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        return (self.time, *self.place)
+
+    def row(self, cells: list[str]) -> tuple[int, Row] | None:
+        """Time in ns; then x and y, and the heading in radians (NaN where none is told)."""
+        try:
+            ns = self._ns(cells[self.at[self.time]])
+            x, y = (float(cells[self.at[name]]) for name in self.place)
+            return ns, (x, y, self._heading(cells))
+        except (ValueError, IndexError, OverflowError):
+            return None
+
+    def _ns(self, cell: str) -> int:
+        if re.match(r"\d{4}-\d\d-\d\d[T ]", cell):
+            when = datetime.fromisoformat(cell)
+            return round((when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp() * 1e6) * 1000
+        unit = TIMES[self.time]
+        return int(cell) * int(unit) if cell.strip().isdigit() else round(float(cell) * unit)
+
+    def _heading(self, cells: list[str]) -> float:
+        if self.turn:
+            return TURNS[self.turn](float(cells[self.at[self.turn]]))
+        if self.quaternion:
+            numbers = np.array([[float(cells[self.at[name]]) for name in self.quaternion]])
+            return float(headings_of(numbers)[0])
+        return float("nan")
+
+    def track(self, rows: list[Row], ns: list[int]) -> Poses | None:
+        table = np.array(rows)
+        if self.place[0].startswith("lat"):
+            return fixes_of("CSV", "wgs84", ns, table[:, :2], 90.0 - np.degrees(table[:, 2]))
+        return poses_of("CSV", "table", ns, table[:, :2], table[:, 2])
+
+
+def _log(path: Path, form: str, track: Poses | None, rows: int, lost: int, ns: np.ndarray) -> FieldLog:
+    last = float(ns.max()) / 1e9
+    return FieldLog(
+        path=str(path),
+        format=form,
+        digest=digest_of([path]),
+        messages=rows,
+        clock="wall" if last > WALL_S else "since boot",
+        begin_ns=int(ns.min()),
+        end_ns=int(ns.max()),
+        channels=(Channel("pose", "", rows),),
+        poses=() if track is None else (track,),
+        lost=f"{lost} of {rows + lost} lines cannot be read" if lost else "",
+    )
+
+
+def _looks_like_tum(path: Path) -> bool:
+    """Whether the first line that is no comment has eight numbers."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in _first_lines(file):
+            words = line.split("#")[0].replace(",", " ").split()
+            if words:
+                return len(words) == TUM_COLUMNS and _numbers(words) is not None
+    return False
+
+
+def _first_lines(file: io.TextIOBase) -> Iterator[str]:
+    for _ in range(100):
+        line = file.readline(4096)
+        if not line:
+            return
+        yield line

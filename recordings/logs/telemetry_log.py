@@ -1,0 +1,422 @@
+"""MAVLink telemetry logs (.tlog): packets as a station heard them, each after the time in microseconds.
+
+Packets are walked by their lengths; where one does not follow another the walk looks for the next that has
+the right checksum. Only messages that tell something here are decoded.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from mmap import ACCESS_READ, mmap
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+os.environ.setdefault("MAVLINK20", "1")
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from mission.document import SiteOrigin
+from mission.errors import InputError
+from mission.geometry import FloatArray, IntArray
+from mission.mavlink.autopilots import autopilot_named, autopilot_of
+from mission.mavlink.autopilots.kind import ROVERS
+from mission.mavlink.items import Command, Item
+from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, Upload, fixes_of, poses_of
+from recordings.logs.files import digest_of
+
+STAMP = 8
+MAGIC_1, MAGIC_2 = 0xFE, 0xFD
+SIGNED = 1
+OLDEST_US, NEWEST_US = 10**14, 4 * 10**15
+"""Stamps from 1973 to 2096 are believed: they tell a packet from bytes that look like one."""
+TICK_EVERY = 50_000
+STATIONS = 250
+"""Systems from this number on are ground stations."""
+TOLD = (
+    "HEARTBEAT", "SYS_STATUS", "SYSTEM_TIME", "ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT",
+    "MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_CURRENT", "MISSION_COUNT", "MISSION_ITEM_REACHED",
+    "MISSION_ACK", "GPS_GLOBAL_ORIGIN", "COMMAND_LONG", "ODOMETRY", "VISION_POSITION_ESTIMATE",
+    "BATTERY_STATUS", "STATUSTEXT", "CAMERA_IMAGE_CAPTURED", "CAMERA_TRIGGER",
+)  # fmt: skip
+"""Messages that are decoded."""
+NUMBERS = frozenset(dialect.__dict__[f"MAVLINK_MSG_ID_{name}"] for name in TOLD)
+
+
+class Packet(NamedTuple):
+    """One packet of the log, not decoded."""
+
+    ns: int
+    number: int
+    system: int
+    component: int
+    raw: bytes
+
+
+class Heard(NamedTuple):
+    """A decoded message, and when a station heard it."""
+
+    ns: int
+    system: int
+    message: Any
+
+
+def read_telemetry_log(path: Path, reading: Reading) -> FieldLog:
+    """Read a .tlog to its end.
+
+    Raises
+    ------
+    InputError
+        When no packet in it can be read.
+    """
+    walk = _Walk(path, reading)
+    sorter = _Sorter()
+    for packet in walk.packets():
+        sorter.take(packet)
+    if not sorter.counts:
+        raise InputError(f"{path}: no packet in it can be read; is it a MAVLink .tlog?")
+    return FieldLog(
+        path=str(path),
+        format="MAVLink tlog",
+        digest=digest_of([path]),
+        messages=sum(sorter.counts.values()),
+        clock="wall",
+        begin_ns=sorter.span[0],
+        end_ns=sorter.span[1],
+        channels=sorter.channels(),
+        poses=tuple(sorter.poses()),
+        uploads=tuple(sorter.uploads),
+        remarks=tuple(sorter.remarks),
+        battery=tuple(sorter.battery),
+        lost=walk.lost,
+        oddities=(*sorter.oddities(), *walk.oddities),
+    )
+
+
+def messages_of(path: Path) -> Iterator[Heard]:
+    """The messages of TOLD, once more, for whoever follows the vehicle's run by them."""
+    decoder = _Decoder()
+    for packet in _Walk(path, Reading()).packets():
+        message = decoder.message(packet)
+        if message is not None:
+            yield Heard(packet.ns, packet.system, message)
+
+
+class _Decoder:
+    """Makes messages of packets; what has a wrong checksum is none."""
+
+    def __init__(self) -> None:
+        self._mavlink = dialect.MAVLink(None)
+
+    def message(self, packet: Packet) -> Any | None:
+        return self.decoded(packet.raw) if packet.number in NUMBERS else None
+
+    def decoded(self, raw: bytes) -> Any | None:
+        try:
+            return self._mavlink.decode(bytearray(raw))
+        except (dialect.MAVError, struct.error, IndexError, UnicodeDecodeError):
+            return None
+
+
+class _Walk:
+    """Goes through a file from packet to packet."""
+
+    def __init__(self, path: Path, reading: Reading) -> None:
+        self._path, self._tick = path, reading.tick
+        self._decoder = _Decoder()
+        self.lost_bytes = self.size = self.tail_bytes = 0
+
+    @property
+    def lost(self) -> str:
+        return f"{self.lost_bytes} of {self.size} bytes make no sense" if self.lost_bytes else ""
+
+    @property
+    def oddities(self) -> tuple[str, ...]:
+        if not self.tail_bytes:
+            return ()
+        return (f"the last packet is cut off ({self.tail_bytes} bytes), as when a station is switched off",)
+
+    def packets(self) -> Iterator[Packet]:
+        with self._path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data:
+            self.size, self.lost_bytes = len(data), 0
+            at = steps = 0
+            sure = False
+            while at + STAMP < len(data):
+                packet, end = _packet(data, at)
+                followed = packet is not None and (end == len(data) or _packet(data, end)[0] is not None)
+                if packet is None or not (
+                    (followed and sure) or self._decoder.decoded(packet.raw) is not None
+                ):
+                    if packet is None and end > len(data) and sure:  # the log ends in the middle of a packet
+                        self.tail_bytes = len(data) - at
+                        break
+                    at, sure = at + 1, False
+                    self.lost_bytes += 1
+                    continue
+                yield packet
+                at, sure, steps = end, True, steps + 1
+                if steps % TICK_EVERY == 0:
+                    self._tick(at / self.size)
+
+
+def _packet(data: mmap, at: int) -> tuple[Packet | None, int]:
+    """The packet whose stamp begins here, if one may, and where it ends."""
+    if at + STAMP + 12 > len(data) + 4:
+        return None, len(data) + 1
+    (stamp,) = struct.unpack_from(">Q", data, at)
+    begin = at + STAMP
+    if not OLDEST_US < stamp < NEWEST_US or data[begin] not in (MAGIC_1, MAGIC_2):
+        return None, 0
+    if data[begin] == MAGIC_1:
+        end = begin + 8 + data[begin + 1]
+        head = data[begin : begin + 6]
+        system, component, number = head[3], head[4], head[5]
+    else:
+        head = data[begin : begin + 10]
+        if len(head) < 10:
+            return None, len(data) + 1
+        end = begin + 12 + head[1] + (13 if head[2] & SIGNED else 0)
+        system, component, number = head[5], head[6], int.from_bytes(head[7:10], "little")
+    if end > len(data):
+        return None, end
+    return Packet(stamp * 1000, number, system, component, data[begin:end]), end
+
+
+@dataclass
+class _Vehicle:
+    """What one system told, as it is read."""
+
+    kind: str = "generic"
+    attitude: list[tuple[int, float]] = field(default_factory=list)
+    local: list[tuple[int, float, float]] = field(default_factory=list)
+    earth: list[tuple[int, float, float, float]] = field(default_factory=list)
+    odometry: list[tuple[int, float, float, float]] = field(default_factory=list)
+    origin: SiteOrigin | None = None
+    mode: str = ""
+    boots: int = 0
+    boot_ms: int = 0
+
+
+TRIED = 5
+UNKNOWN_BEARING = 65_535
+MISSION_TYPE = 0
+
+
+@dataclass
+class _Sorter:
+    """Takes packets one after another, each to what it tells of."""
+
+    counts: Counter[tuple[int, int]] = field(default_factory=Counter)
+    """By system and number."""
+    vehicles: dict[int, _Vehicle] = field(default_factory=dict)
+    uploads: list[Upload] = field(default_factory=list)
+    remarks: list[Remark] = field(default_factory=list)
+    battery: list[tuple[int, float]] = field(default_factory=list)
+    span: tuple[int, int] = (0, 0)
+    bad: Counter[tuple[int, int]] = field(default_factory=Counter)
+    """Messages with a wrong checksum; of those that are not looked at the first few are tried."""
+    _decoder: _Decoder = field(default_factory=_Decoder)
+    _sent: dict[int, Item] = field(default_factory=dict)
+    _due: tuple[int, int] | None = None
+    """When an upload was announced, and how many items it is to have."""
+
+    def take(self, packet: Packet) -> None:
+        self.counts[packet.system, packet.number] += 1
+        self.span = (min(self.span[0] or packet.ns, packet.ns), max(self.span[1], packet.ns))
+        if packet.number not in NUMBERS:
+            self._try(packet)
+            return
+        message = self._decoder.message(packet)
+        if message is None:
+            self.bad[packet.system, packet.number] += 1
+            return
+        taking = getattr(self, f"_{message.get_type().lower()}", None)
+        if taking is not None:
+            taking(packet, message, self.vehicles.setdefault(packet.system, _Vehicle()))
+
+    def _try(self, packet: Packet) -> None:
+        key = (packet.system, packet.number)
+        if self.bad[key] == self.counts[key] - 1 < TRIED and self._decoder.decoded(packet.raw) is None:
+            self.bad[key] += 1
+
+    def _heartbeat(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        if packet.system >= STATIONS or told.autopilot == dialect.MAV_AUTOPILOT_INVALID:
+            return
+        kind = autopilot_of(told.autopilot)
+        vehicle.kind = kind.name
+        mode = kind.mode_name(told) if told.type in ROVERS else f"mode {told.custom_mode}"
+        if mode != vehicle.mode:
+            vehicle.mode = mode
+            self.remarks.append(Remark(packet.ns, "mode", mode))
+
+    def _attitude(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        vehicle.attitude.append((packet.ns, told.yaw))
+        if told.time_boot_ms + 1000 < vehicle.boot_ms:
+            vehicle.boots += 1
+        vehicle.boot_ms = told.time_boot_ms
+
+    def _local_position_ned(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        vehicle.local.append((packet.ns, told.y, told.x))
+
+    def _global_position_int(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        bearing = np.nan if told.hdg == UNKNOWN_BEARING else told.hdg / 100
+        vehicle.earth.append((packet.ns, told.lat / 1e7, told.lon / 1e7, bearing))
+
+    def _odometry(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        w, x, y, z = told.q
+        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        vehicle.odometry.append((packet.ns, told.y, told.x, np.pi / 2 - yaw))
+
+    def _gps_global_origin(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        vehicle.origin = SiteOrigin(
+            lat=told.latitude / 1e7, lon=told.longitude / 1e7, alt=told.altitude / 1000, heading_deg=0.0
+        )
+
+    def _sys_status(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        if 0 <= told.battery_remaining <= 100:
+            self.battery.append((packet.ns, told.battery_remaining / 100))
+
+    _battery_status = _sys_status
+
+    def _statustext(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        self.remarks.append(Remark(packet.ns, "text", str(told.text).rstrip("\0")))
+
+    def _command_long(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        self.remarks.append(Remark(packet.ns, "command", _command(told.command)))
+
+    def _mission_item_reached(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        last = next((remark for remark in reversed(self.remarks) if remark.kind == "reached"), None)
+        if last is None or last.number != told.seq:  # it is repeated, so that a lost one is recovered
+            self.remarks.append(Remark(packet.ns, "reached", f"item {told.seq}", told.seq))
+
+    def _camera_image_captured(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        result = "" if told.capture_result == 1 else ", failed"
+        self.remarks.append(
+            Remark(packet.ns, "trigger", f"image {told.image_index}{result}", told.image_index)
+        )
+
+    def _camera_trigger(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        self.remarks.append(Remark(packet.ns, "trigger", f"trigger {told.seq}", told.seq))
+
+    def _mission_count(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        if getattr(told, "mission_type", MISSION_TYPE) == MISSION_TYPE:
+            self._sent, self._due = {}, (packet.ns, told.count)
+
+    def _mission_item_int(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        if getattr(told, "mission_type", MISSION_TYPE) == MISSION_TYPE:
+            params = (told.param1, told.param2, told.param3, told.param4)
+            self._item(packet, told.seq, Item(told.command, told.frame, params, told.x, told.y, told.z))
+
+    def _mission_item(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        if getattr(told, "mission_type", MISSION_TYPE) == MISSION_TYPE:
+            params = (told.param1, told.param2, told.param3, told.param4)
+            x, y = (round(value * 1e7) for value in (told.x, told.y))
+            self._item(packet, told.seq, Item(told.command, told.frame, params, x, y, told.z))
+
+    def _item(self, packet: Packet, sequence: int, item: Item) -> None:
+        self._sent[sequence] = item
+        if self._due is not None and len(self._sent) >= self._due[1]:
+            self._keep(self._due[0], complete=True)
+
+    def _mission_ack(self, packet: Packet, told: Any, vehicle: _Vehicle) -> None:
+        if self._due is not None and self._sent:
+            self._keep(self._due[0], complete=False)
+
+    def _keep(self, ns: int, *, complete: bool) -> None:
+        """The list that was sent is whole, or was broken off."""
+        kinds = [vehicle.kind for vehicle in self.vehicles.values() if vehicle.kind != "generic"]
+        kind = autopilot_named(kinds[0] if kinds else "generic")
+        items = [
+            item for sequence, item in sorted(self._sent.items()) if not (kind.home_first and sequence == 0)
+        ]
+        if not any(upload.items == tuple(items) and upload.ns == ns for upload in self.uploads):
+            home = self._sent.get(0) if kind.home_first else None
+            self.uploads.append(Upload(ns, tuple(items), kind.name, complete=complete, home=_site(home)))
+        self._sent, self._due = {}, None
+
+    def channels(self) -> tuple[Channel, ...]:
+        """By name; with the system where several told the same."""
+        several = len({system for system, _ in self.counts}) > 1
+        return tuple(
+            Channel(f"{system}/{_name(number)}" if several else _name(number), "", count)
+            for (system, number), count in sorted(
+                self.counts.items(), key=lambda item: (item[0][0], _name(item[0][1]))
+            )
+        )
+
+    def poses(self) -> Iterator[Poses]:
+        for system, vehicle in self.vehicles.items():
+            for track in _tracks(str(system), vehicle):
+                if track is not None:
+                    yield track
+
+    def oddities(self) -> tuple[str, ...]:
+        lines = [
+            f"{self.counts[key] if count == TRIED else count} messages {_name(key[1])} of system {key[0]} "
+            "have a wrong checksum or another dialect's, left out"
+            for key, count in sorted(self.bad.items())
+            if count
+        ]
+        lines += [
+            f"system {system} was started anew {vehicle.boots} times"
+            for system, vehicle in self.vehicles.items()
+            if vehicle.boots
+        ]
+        return tuple(lines)
+
+
+def _command(number: int) -> str:
+    known = dialect.enums["MAV_CMD"].get(number)
+    return f"{known.name.removeprefix('MAV_CMD_')} ({number})" if known is not None else f"command {number}"
+
+
+def _site(home: Item | None) -> SiteOrigin | None:
+    if home is None or home.command != Command.NAV_WAYPOINT or (home.x, home.y) == (0, 0):
+        return None
+    return SiteOrigin(lat=home.x / 1e7, lon=home.y / 1e7, alt=home.z, heading_deg=0.0)
+
+
+def _name(number: int) -> str:
+    known = dialect.mavlink_map.get(number)
+    return str(known.msgname) if known is not None else f"message {number}"
+
+
+def _tracks(robot: str, vehicle: _Vehicle) -> Iterator[Poses | None]:
+    rule = autopilot_named(vehicle.kind).rule
+    if vehicle.local:
+        ns, xy = _columns(vehicle.local)
+        heading = np.pi / 2 - _yaw_at(vehicle, ns)
+        yield poses_of(
+            "LOCAL_POSITION_NED",
+            "local",
+            ns,
+            xy,
+            heading,
+            robot=robot,
+            rank=1,
+            origin=vehicle.origin,
+            rule=rule,
+        )
+    if vehicle.odometry:
+        ns, table = _columns(vehicle.odometry)
+        yield poses_of("ODOMETRY", "odometry", ns, table[:, :2], table[:, 2], robot=robot, rank=3)
+    if vehicle.earth:
+        ns, table = _columns(vehicle.earth)
+        yield fixes_of("GLOBAL_POSITION_INT", rule, ns, table[:, :2], table[:, 2], robot=robot, rank=2)
+
+
+def _columns(rows: list[Any]) -> tuple[IntArray, FloatArray]:
+    return np.array([row[0] for row in rows], np.int64), np.array([row[1:] for row in rows], float)
+
+
+def _yaw_at(vehicle: _Vehicle, ns: IntArray) -> FloatArray:
+    """Clockwise from north at given times."""
+    if not vehicle.attitude:
+        return np.full(len(ns), np.nan)
+    times, yaw = _columns(vehicle.attitude)
+    order = np.argsort(times, kind="stable")
+    return np.interp(ns, times[order], np.unwrap(yaw[order, 0]))

@@ -1,0 +1,195 @@
+"""PX4's own logs (.ulg), by pyulog."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mission.document import SiteOrigin
+from mission.errors import InputError
+from mission.geometry import FloatArray
+from mission.mavlink.autopilots.kind import Mode
+from mission.mavlink.autopilots.px4 import PX4
+from mission.mavlink.items import Item
+from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, fixes_of, poses_of
+from recordings.logs.files import digest_of
+
+WANTED = [
+    "vehicle_local_position", "vehicle_global_position", "vehicle_gps_position", "vehicle_attitude",
+    "vehicle_status", "vehicle_command", "battery_status", "camera_capture", "camera_trigger",
+    "vehicle_local_position_groundtruth", "vehicle_attitude_groundtruth",
+]  # fmt: skip
+LARGE = 200 << 20
+"""Bytes from which only messages that tell something here are taken into memory."""
+NAVIGATION = {
+    0: (1, 0), 1: (2, 0), 2: (3, 0), 3: (4, 4), 4: (4, 3), 5: (4, 5), 10: (5, 0), 14: (6, 0), 15: (7, 0),
+    17: (4, 2), 18: (4, 6),
+}  # fmt: skip
+"""PX4's nav_state -> main and sub mode, as a heartbeat tells them."""
+
+
+def read_ulog(path: Path, reading: Reading) -> FieldLog:
+    """Read a .ulg to its end.
+
+    Raises
+    ------
+    InputError
+        When nothing in it can be read.
+    """
+    log = _opened(path)
+    reading.tick(1.0)
+    offset = _since_1970_us(log)
+    begin, end = ((int(us) + offset) * 1000 for us in (log.start_timestamp, log.last_timestamp))
+    return FieldLog(
+        path=str(path),
+        format="PX4 ULog",
+        digest=digest_of([path]),
+        messages=sum(len(data.data["timestamp"]) for data in log.data_list),
+        clock="wall" if offset else "since boot",
+        begin_ns=begin,
+        end_ns=end,
+        channels=tuple(_channels(log)),
+        poses=tuple(track for track in _poses(log, offset) if track is not None),
+        remarks=tuple(sorted(_remarks(log, offset), key=lambda remark: remark.ns)),
+        battery=tuple(_battery(log, offset)),
+        lost="parts of the file are damaged and were passed over" if log.file_corruption else "",
+        oddities=(*_dropouts(log), *_invalid(log)),
+    )
+
+
+def _opened(path: Path) -> Any:
+    from pyulog import ULog
+    from pyulog.exceptions import ULogException
+
+    only = WANTED if path.stat().st_size > LARGE else None
+    try:
+        log = ULog(str(path), only, disable_str_exceptions=True)
+    except (
+        ULogException,
+        TypeError,
+        ValueError,
+        KeyError,
+        IndexError,
+        struct.error,
+        AttributeError,
+        UnicodeDecodeError,
+    ) as error:
+        reason = " ".join(str(error).split())[:80]
+        raise InputError(f"{path}: cannot be read as a PX4 ULog ({reason}); was it copied whole?") from None
+    if not log.data_list:
+        raise InputError(f"{path}: no message in it can be read; was it copied whole?")
+    return log
+
+
+def _channels(log: Any) -> Iterator[Channel]:
+    for data in sorted(log.data_list, key=lambda data: (data.name, data.multi_id)):
+        name = data.name if data.multi_id == 0 else f"{data.name}/{data.multi_id}"
+        yield Channel(name, "", len(data.data["timestamp"]))
+
+
+def _dropouts(log: Any) -> tuple[str, ...]:
+    if not log.dropouts:
+        return ()
+    seconds = sum(item.duration for item in log.dropouts) / 1000
+    return (f"{len(log.dropouts)} dropouts in the log, {seconds:.3f} s together",)
+
+
+def _invalid(log: Any) -> tuple[str, ...]:
+    local = _columns(log, "vehicle_local_position")
+    if local is None or "xy_valid" not in local or local["xy_valid"].any():
+        return ()
+    return (f"vehicle_local_position: none of its {len(local['x'])} positions is valid, by its own word",)
+
+
+def _columns(log: Any, name: str) -> dict[str, Any] | None:
+    found = [data.data for data in log.data_list if data.name == name and data.multi_id == 0]
+    return found[0] if found and len(found[0]["timestamp"]) else None
+
+
+def _since_1970_us(log: Any) -> int:
+    """What to add to times since boot, where a GPS receiver told the date; else 0."""
+    gps = _columns(log, "vehicle_gps_position")
+    if gps is None or "time_utc_usec" not in gps:
+        return 0
+    dated = np.flatnonzero(gps["time_utc_usec"] > 0)
+    return int(gps["time_utc_usec"][dated[0]]) - int(gps["timestamp"][dated[0]]) if len(dated) else 0
+
+
+def _ns(columns: dict[str, Any], offset_us: int) -> np.ndarray:
+    return (columns["timestamp"].astype(np.int64) + offset_us) * 1000
+
+
+def _poses(log: Any, offset_us: int) -> Iterator[Poses | None]:
+    for name, truth in (("vehicle_local_position", False), ("vehicle_local_position_groundtruth", True)):
+        local = _columns(log, name)
+        if local is not None:
+            yield _local(log, name, local, offset_us, truth=truth)
+    placed = _columns(log, "vehicle_global_position")
+    if placed is not None:
+        degrees = np.stack([placed["lat"], placed["lon"]], axis=-1)
+        ns = _ns(placed, offset_us)
+        yield fixes_of("vehicle_global_position", "px4", ns, degrees, np.degrees(_yaw(log, placed)), rank=2)
+
+
+def _local(log: Any, name: str, local: dict[str, Any], offset_us: int, *, truth: bool) -> Poses | None:
+    """North and east metres from the estimator's origin, where its position is valid."""
+    good = local["xy_valid"].astype(bool) if "xy_valid" in local else np.ones(len(local["x"]), bool)
+    xy = np.stack([local["y"], local["x"]], axis=-1).astype(float)
+    xy[~good] = np.nan
+    heading = np.pi / 2 - _yaw(log, local)
+    ns = _ns(local, offset_us)
+    return poses_of(name, "local", ns, xy, heading, rank=1, origin=_origin(local), rule="px4", truth=truth)
+
+
+def _yaw(log: Any, columns: dict[str, Any]) -> FloatArray:
+    """Clockwise from north, radians."""
+    for name in ("heading", "yaw"):
+        if name in columns:
+            return np.asarray(columns[name], float)
+    attitude = _columns(log, "vehicle_attitude")
+    if attitude is None:
+        return np.full(len(columns["timestamp"]), np.nan)
+    w, x, y, z = (np.asarray(attitude[f"q[{k}]"], float) for k in range(4))
+    yaw = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+    return np.interp(columns["timestamp"], attitude["timestamp"], yaw)
+
+
+def _origin(local: dict[str, Any]) -> SiteOrigin | None:
+    if "ref_lat" not in local or not local["xy_global"].any():
+        return None
+    last = int(np.flatnonzero(local["xy_global"])[-1])
+    lat, lon = float(local["ref_lat"][last]), float(local["ref_lon"][last])
+    lat, lon = (value / 1e7 if abs(value) > 360 else value for value in (lat, lon))
+    return SiteOrigin(lat=lat, lon=lon, alt=0.0, heading_deg=0.0)
+
+
+def _remarks(log: Any, offset_us: int) -> Iterator[Remark]:
+    status = _columns(log, "vehicle_status")
+    if status is not None and "nav_state" in status:
+        states = status["nav_state"].astype(int)
+        changed = np.flatnonzero(np.concatenate([[True], np.diff(states) != 0]))
+        for ns, state in zip(_ns(status, offset_us)[changed].tolist(), states[changed].tolist(), strict=True):
+            known = NAVIGATION.get(state)
+            yield Remark(ns, "mode", PX4.modes.name(Mode(*known)) if known else f"nav_state {state}")
+    command = _columns(log, "vehicle_command")
+    if command is not None:
+        for ns, number in zip(_ns(command, offset_us).tolist(), command["command"].tolist(), strict=True):
+            yield Remark(ns, "command", Item(int(number), 0).name)
+    for name in ("camera_capture", "camera_trigger"):
+        shots = _columns(log, name)
+        for ns in _ns(shots, offset_us).tolist() if shots is not None else ():
+            yield Remark(ns, "trigger", name)
+    for message in log.logged_messages:
+        yield Remark((int(message.timestamp) + offset_us) * 1000, "text", message.message)
+
+
+def _battery(log: Any, offset_us: int) -> Iterator[tuple[int, float]]:
+    battery = _columns(log, "battery_status")
+    if battery is not None and "remaining" in battery:
+        for ns, share in zip(_ns(battery, offset_us).tolist(), battery["remaining"].tolist(), strict=True):
+            if 0 <= share <= 1:
+                yield ns, float(share)

@@ -1,0 +1,129 @@
+"""Autopilots' logs: columns of a .BIN, packets of a .tlog, and what is made of damaged ones."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from mission.errors import InputError
+from recordings.logs import read_log
+from tests.recordings.logs.writing import BEGIN_NS, write_dataflash, write_telemetry_log
+
+KINDS = {
+    "POS": ("QLLf", "TimeUS,Lat,Lng,Alt"),
+    "ATT": ("Qc", "TimeUS,Yaw"),
+    "XKF1": ("QBfff", "TimeUS,C,PN,PE,Yaw"),
+    "ORGN": ("QBLL", "TimeUS,Type,Lat,Lng"),
+    "CMD": ("QHHHffffLLfB", "TimeUS,CTot,CNum,CId,Prm1,Prm2,Prm3,Prm4,Lat,Lng,Alt,Frame"),
+    "MODE": ("QMB", "TimeUS,Mode,ModeNum"),
+}
+LAT, LON = 470_000_000, 80_000_000
+
+
+def flash_rows(count: int = 100) -> list[tuple[str, tuple]]:
+    """North at 1 m/s, told ten times a second; in AUTO from the beginning, with a mission of one item."""
+    rows: list[tuple[str, tuple]] = [
+        ("ORGN", (0, 0, LAT, LON)),
+        ("CMD", (0, 2, 0, 16, 0.0, 0.0, 0.0, 0.0, LAT, LON, 5.0, 0)),
+        ("CMD", (0, 2, 1, 16, 1.0, 0.0, 0.0, 0.0, LAT + 900, LON, 0.0, 3)),
+        ("MODE", (0, 10, 10)),
+    ]
+    for k in range(count):
+        us = k * 100_000
+        rows.append(("ATT", (us, 0)))
+        rows.append(("XKF1", (us, 0, 0.1 * k, 0.0, 0.0)))
+        rows.append(("XKF1", (us, 1, 99.0, 99.0, 0.0)))
+        rows.append(("POS", (us, LAT + round(0.1 * k / 0.011131884502145034), LON, 0.0)))
+    return rows
+
+
+def test_a_dataflash_log_gives_the_first_filters_metres(tmp_path: Path) -> None:
+    log = read_log(write_dataflash(tmp_path / "a.BIN", flash_rows(), KINDS))
+    tracks = {track.source: track for track in log.poses}
+    filtered = tracks["XKF1"]
+    assert np.allclose(filtered.xy, [(0.0, 0.1 * k) for k in range(100)], atol=1e-6)
+    assert np.allclose(filtered.heading, math.pi / 2)
+    assert filtered.origin is not None
+    assert (filtered.origin.lat, filtered.origin.lon) == (47.0, 8.0)
+    assert np.allclose(tracks["POS"].xy, filtered.xy, atol=0.006)
+    assert [remark.text for remark in log.remarks] == ["AUTO"]
+    (upload,) = log.uploads
+    assert upload.complete
+    assert [(item.command, item.x) for item in upload.items] == [(16, LAT + 900)]
+    assert (log.clock, log.lost, log.messages) == ("since boot", "", len(KINDS) + 4 + 400)
+
+
+def test_noise_inside_a_dataflash_log_is_passed_over_and_counted(tmp_path: Path) -> None:
+    path = write_dataflash(tmp_path / "a.BIN", flash_rows(), KINDS)
+    data = path.read_bytes()
+    path.write_bytes(data[:-200] + b"\xa3\x95\xff noise" + data[-200:])
+    log = read_log(path)
+    assert log.lost.startswith("9 of ")
+    assert len(next(track for track in log.poses if track.source == "XKF1").ns) == 100
+
+
+def test_a_vehicle_that_is_switched_off_cuts_its_last_message(tmp_path: Path) -> None:
+    path = write_dataflash(tmp_path / "a.BIN", flash_rows(), KINDS)
+    path.write_bytes(path.read_bytes()[:-5])
+    log = read_log(path)
+    assert log.lost == ""
+    assert "last message is cut off" in log.oddities[0]
+
+
+def told(count: int = 50) -> list[tuple[int, int, object]]:
+    """A rover that drives east at 1 m/s, heard by a station that sends it a mission."""
+    m = dialect
+    rows: list[tuple[int, int, object]] = [
+        (BEGIN_NS, 1, m.MAVLink_heartbeat_message(10, 3, 1 | 128, 10, 4, 3)),
+        (BEGIN_NS, 1, m.MAVLink_gps_global_origin_message(LAT, LON, 5000)),
+        (BEGIN_NS, 255, m.MAVLink_mission_count_message(1, 1, 2)),
+        (BEGIN_NS, 255, m.MAVLink_mission_item_int_message(1, 1, 0, 0, 16, 0, 1, 0, 0, 0, 0, LAT, LON, 5)),
+        (
+            BEGIN_NS,
+            255,
+            m.MAVLink_mission_item_int_message(1, 1, 1, 6, 16, 0, 1, 1, 0, 0, 0, LAT + 9, LON, 0),
+        ),
+    ]
+    for k in range(count):
+        ns = BEGIN_NS + k * 10**8
+        rows.append((ns, 1, m.MAVLink_attitude_message(k * 100, 0, 0, math.pi / 2, 0, 0, 0)))
+        rows.append((ns, 1, m.MAVLink_local_position_ned_message(k * 100, 0, 0.1 * k, 0, 0, 1, 0)))
+    return rows
+
+
+def test_a_telemetry_log_gives_local_metres_mode_and_mission(tmp_path: Path) -> None:
+    log = read_log(write_telemetry_log(tmp_path / "a.tlog", told()))
+    (track,) = log.poses
+    assert np.allclose(track.xy, [(0.1 * k, 0.0) for k in range(50)], atol=1e-5)
+    assert np.allclose(track.heading, 0.0, atol=1e-6)
+    assert (track.robot, track.rule) == ("1", "ardupilot")
+    assert [remark.text for remark in log.remarks if remark.kind == "mode"] == ["AUTO"]
+    (upload,) = log.uploads
+    assert [item.x for item in upload.items] == [LAT + 9]
+
+
+@pytest.mark.parametrize("at", [0.2, 0.5, 0.9])
+def test_noise_inside_a_telemetry_log_costs_no_more_than_what_it_hits(tmp_path: Path, at: float) -> None:
+    path = write_telemetry_log(tmp_path / "a.tlog", told())
+    data = bytearray(path.read_bytes())
+    place = data.index(b"\xfd", int(len(data) * at)) + 12
+    data[place : place + 3] = b"\xfd\xfe\xfd"
+    path.write_bytes(bytes(data))
+    log = read_log(path)
+    assert len(log.poses[0].ns) >= 48
+    assert log.lost or log.oddities
+
+
+def test_a_log_of_neither_kind_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.tlog"
+    path.write_bytes(b"x" * 1000)
+    with pytest.raises(InputError, match="no packet"):
+        read_log(path)
+    path = tmp_path / "a.ulg"
+    path.write_bytes(b"ULog\x01\x12\x35" + b"\0" * 30)
+    with pytest.raises(InputError, match=r"a\.ulg"):
+        read_log(path)

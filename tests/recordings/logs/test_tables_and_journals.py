@@ -1,0 +1,82 @@
+"""Trajectories as text, and stopgo's own journal."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mission.errors import InputError
+from recordings.logs import read_log
+
+
+def test_tum_is_read_by_its_quaternions_and_bad_lines_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "a.tum"
+    half = math.sin(math.pi / 4)
+    path.write_text(f"# t x y z\n1.5 1 2 0 0 0 0 1\nnonsense\n2.0 1 3 0 0 0 {half} {half}\n")
+    log = read_log(path)
+    (track,) = log.poses
+    assert track.ns.tolist() == [1_500_000_000, 2_000_000_000]
+    assert np.allclose(track.heading, [0.0, math.pi / 2])
+    assert log.lost == "1 of 3 lines cannot be read"
+
+
+@pytest.mark.parametrize(
+    "head, row, xy, heading",
+    [
+        ("time,x,y,heading_deg", "1,2,3,90", (2, 3), math.pi / 2),
+        ("timestamp_ns;X [m];Y [m];yaw", "1000000000;2;3;1.5", (2, 3), 1.5),
+        ("t\tx\ty\tqx\tqy\tqz\tqw", "1\t2\t3\t0\t0\t0\t1", (2, 3), 0.0),
+        ("time,lat,lon,bearing_deg", "1,47,8,0", (0, 0), math.pi / 2),
+    ],
+)
+def test_a_table_is_read_by_its_header(
+    tmp_path: Path, head: str, row: str, xy: tuple[float, float], heading: float
+) -> None:
+    path = tmp_path / "a.csv"
+    name = "a.csv"
+    path.write_text(f"{head}\n{row}\n")
+    if "[m]" in head:
+        path.write_text(f"{head.replace(' [m]', '_m')}\n{row}\n")
+    (track,) = read_log(tmp_path / name).poses
+    assert track.ns.tolist() == [10**9]
+    assert np.allclose(track.xy, [xy])
+    assert np.allclose(track.heading, [heading])
+
+
+@pytest.mark.parametrize("content", ["a,b\n1,2\n", "time,x,y\n", "time,x,y\nu,v,w\n", "\n"])
+def test_a_table_without_poses_is_refused(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(content)
+    with pytest.raises(InputError, match=r"a\.csv"):
+        read_log(path)
+
+
+def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.xyz").write_text("hello")
+    for path in (tmp_path / "a.xyz", tmp_path / "missing.bag", tmp_path):
+        with pytest.raises(InputError, match=str(path)):
+            read_log(path)
+
+
+def test_a_journal_is_read_with_what_its_writer_had_not_put_away(tmp_path: Path) -> None:
+    """Copied from a robot that was killed: the newest lines are in the file beside it."""
+    from bridge.robot.journal import open_journal
+    from mission.events import Arrived, Pose, Started
+
+    about = {"robot": "r1", "boot_id": "b", "run_id": "run", "mission_id": "m", "revision": 1, "number": 0}
+    with open_journal(tmp_path / "state", "r1") as journal:
+        journal.append(Started(**about, robot_ns=10**18, mission_time_s=0.0, commander="me"))
+        pose = Pose(x=1.0, y=2.0, heading=0.5)
+        journal.append(
+            Arrived(**about, robot_ns=10**18 + 5, mission_time_s=5.0, stop="s1", pose=pose, deviation_m=0.01)
+        )
+        shutil.copytree(tmp_path / "state", tmp_path / "copy")
+    before = {p.name: p.read_bytes() for p in (tmp_path / "copy").iterdir()}
+    log = read_log(tmp_path / "copy")
+    assert [type(event).__name__ for event in log.events] == ["Started", "Arrived"]
+    assert log.poses[0].xy.tolist() == [[1.0, 2.0]]
+    assert {p.name: p.read_bytes() for p in (tmp_path / "copy").iterdir()} == before
