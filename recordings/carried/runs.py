@@ -38,7 +38,7 @@ def _source(path: Path, digest: str, contents: Contents) -> LogSource:
 
 
 def _log(run_id: str, values: Values, source: LogSource) -> RunLog:
-    names = entities.Run(run_id)
+    names = entities.RunEntities(run_id)
     events = {event.number: event for event in _events(values, names.events, source.name)}
     ns, poses = values.columns(names.flat(entities.ROBOT), "x", "y", "heading")
     told = tuple(events[number] for number in sorted(events))

@@ -38,9 +38,10 @@ def test_a_recording_of_a_run_is_reviewed_as_any_other(profile: str, tmp_path: P
         station.command("start")
         assert watch_run(station, record, say=print).state == "FINISHED"
     assert told(site.events) == ALL
-    (run,) = review(tmp_path / "field.rrd").runs
-    assert (run.scanned, run.unconfirmed, run.ended) == (["S1", "S2", "S3"], [], "Finished")
-    assert set(run.deviation_m) == {"S1", "S2", "S3"}
+    (run,) = review([tmp_path / "field.rrd"]).comparisons
+    assert [stop.outcome for stop in run.stops] == ["scanned"] * 3
+    assert run.driven_s is not None
+    assert all(stop.deviation_m is not None for stop in run.stops)
 
 
 def test_scans_of_a_vehicle_that_tells_nothing_are_not_made_up(tmp_path: Path) -> None:
