@@ -26,7 +26,7 @@ from tests.recordings.reading import cells, on, static
 from tests.recordings.test_views import assert_shown
 from tests.recordings.viewer import has_vulkan, viewer
 
-RUN = entities.Run(run.RUN)
+RUN = entities.RunEntities(run.RUN)
 TWO = RUN.revision(2)
 TAKEN_NS = 62_000_000_000
 """After 2 s to settle and 60 s of scan at the first stop, where the mission begins."""
@@ -107,7 +107,7 @@ def test_a_run_that_begins_by_a_later_revision_shows_it_from_its_beginning(
             recording.mission(driven)
             for report in run.reports(driven, run=name):
                 tell(recording, report)
-    second = entities.Run("run-2").revision(2).flat(entities.NEW_STOPS)
+    second = entities.RunEntities("run-2").revision(2).flat(entities.NEW_STOPS)
     assert list(on(path, second, "Points2D:positions", entities.MISSION_TIME)) == [0]
     assert TWO.flat(entities.NEW_STOPS) not in check(path).rows
 
