@@ -1,8 +1,9 @@
-"""The bridge's commands, each added to the front door; what `watch` records by is named here."""
+"""The bridge's commands, each added to the front door; what `watch` records and compares by is named here."""
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,8 @@ from bridge.console import say
 from mission.errors import InputError
 
 if TYPE_CHECKING:
-    from bridge.station.watch import Recording
+    from mission.heard_run import HeardRun, RunTaker
+    from recordings.carried.reading import Recording
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -35,17 +37,37 @@ def add_commands(app: typer.Typer) -> None:
     app.add_typer(tunnel_commands(), name="tunnel")
 
 
-def recording(path: Path | None, *, view: bool) -> AbstractContextManager[Recording | None]:
-    """The field recording at `path`, looked at if wanted; nothing of Rerun is loaded without one."""
+@contextmanager
+def recording(path: Path | None, plan: Path | None, *, view: bool) -> Iterator[HeardRun]:
+    """What hears a run: records it at `path`, looked at if wanted, and compares it with the plan.
+
+    Nothing of Rerun is loaded without a recording and a plan.
+    """
+    from mission.heard_run import HeardRun
+
     if path is None and view:
         raise InputError("--view shows what is recorded: say where, with --rrd FIELD.rrd")
-    if path is None:
-        return nullcontext()
+    known = None if plan is None else plan_recording(plan)
+    with nullcontext() if path is None else _field(path, known, view=view) as record:
+        yield HeardRun(record, () if known is None else known.sights)
+
+
+def _field(path: Path, plan: Recording | None, *, view: bool) -> AbstractContextManager[RunTaker]:
     from recordings.field import FieldRecording
 
-    record = FieldRecording(path, say=say)
+    record = FieldRecording(path, plan=plan, say=say)
     if not view:
         return record
     from recordings.viewer import Viewed
 
     return Viewed(record)
+
+
+def plan_recording(path: Path) -> Recording:
+    """A plan's recording that tells what its stops see."""
+    from recordings.carried.reading import read_recording
+
+    found = read_recording(path)
+    if not found.sights:
+        raise InputError(f"{path}: tells not what stops see; give a plan.rrd that this version wrote")
+    return found

@@ -1,48 +1,101 @@
-"""A run as it is heard, report by report; gives its log whenever it is asked."""
+"""A run as it is heard, report by report; gives its log, and its comparison, whenever they are asked for."""
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Sequence
+from typing import Protocol
 
-from mission.events import AnyEvent, PoseReport
+import numpy as np
+
+from mission.comparing.compare import compare
+from mission.comparison import Comparison
+from mission.document import Mission
+from mission.events import AnyEvent, PoseReport, StateReport
 from mission.run_log import LogSource, RunLog, Track
+from mission.sight import Sight
 
 SOURCE = LogSource(name="heard", format="live", digest="", messages=0)
 
 
-class HeardRun:
-    """Collects what is told of runs, and keeps that of the newest one."""
+class RunTaker(Protocol):
+    """What takes a run as it is told, such as a recording."""
 
-    def __init__(self) -> None:
+    def mission(self, mission: Mission) -> None: ...
+
+    def state(self, report: StateReport) -> None: ...
+
+    def pose(self, report: PoseReport) -> None: ...
+
+    def event(self, event: AnyEvent) -> None: ...
+
+
+class HeardRun:
+    """Keeps what is told of the newest run, and hands everything on to a recording, if there is one.
+
+    `sights` tell what the stops of its plan see.
+    """
+
+    def __init__(self, onward: RunTaker | None = None, sights: Sequence[Sight] = ()) -> None:
+        self._onward = onward
+        self.sights = sights
         self._run_id: str | None = None
-        self._events: dict[int, AnyEvent] = {}
-        self._poses: list[PoseReport] = []
+        self._missions: dict[str, Mission] = {}
+        self._forget()
+
+    def mission(self, mission: Mission) -> None:
+        """Take the mission that is run, or a revision of it."""
+        self._missions[mission.digest] = mission
+        if self._onward is not None:
+            self._onward.mission(mission)
+
+    def state(self, report: StateReport) -> None:
+        """Hand a state on."""
+        if self._onward is not None:
+            self._onward.state(report)
 
     def pose(self, report: PoseReport) -> None:
         """Take a pose, if it is of a run."""
         if self._is_of(report.run_id):
-            self._poses.append(report)
+            self._ns.append(report.robot_ns)
+            self._poses.extend((report.pose.x, report.pose.y, report.pose.heading))
+        if self._onward is not None:
+            self._onward.pose(report)
 
     def event(self, event: AnyEvent) -> None:
         """Take an event, if it is of a run; one that is told again counts once."""
         if self._is_of(event.run_id):
             self._events[event.number] = event
-
-    def _is_of(self, run_id: str | None) -> bool:
-        """Whether it is a run's; what was kept of another is let go."""
-        if run_id and run_id != self._run_id:
-            self._run_id, self._events, self._poses = run_id, {}, []
-        return bool(run_id)
+        if self._onward is not None:
+            self._onward.event(event)
 
     def log(self) -> RunLog | None:
         """What was heard of the newest run; None if it told nothing yet."""
         events = tuple(self._events[number] for number in sorted(self._events))
         if not events:
             return None
-        last = events[-1]
-        return RunLog(
-            last.robot, last.run_id, last.mission_id, last.revision, SOURCE, track_of(self._poses), events
-        )
+        last, table = events[-1], np.array(self._poses).reshape(-1, 3)
+        poses = Track.of(np.array(self._ns, dtype=np.int64), table[:, :2], table[:, 2])
+        return RunLog(last.robot, last.run_id, last.mission_id, last.revision, SOURCE, poses, events)
+
+    def compared(self) -> Comparison | None:
+        """The newest run beside its mission; None if nothing was heard of either."""
+        log = self.log()
+        mine = [item for item in self._missions.values() if log is not None and item.id == log.mission_id]
+        if log is None or not mine:
+            return None
+        return compare(log, sorted(mine, key=lambda mission: mission.revision), self.sights)
+
+    def _is_of(self, run_id: str | None) -> bool:
+        """Whether it is a run's; what was kept of another is let go."""
+        if run_id and run_id != self._run_id:
+            self._run_id = run_id
+            self._forget()
+        return bool(run_id)
+
+    def _forget(self) -> None:
+        self._events: dict[int, AnyEvent] = {}
+        self._ns, self._poses = array("q"), array("d")
 
 
 def track_of(reports: Sequence[PoseReport]) -> Track:

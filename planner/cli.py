@@ -20,12 +20,11 @@ if TYPE_CHECKING:
     from bridge.station.station import Station
     from mission.comparison import Comparison
     from mission.document import Mission
-    from mission.events import AnyEvent, PoseReport
     from mission.floor import FloorPlan
+    from mission.heard_run import HeardRun
     from mission.plan import PartPlan
     from mission.settings import Settings
     from planner.report import PlanReport
-    from recordings.field import FieldRecording
     from recordings.plan import PlanRecording
 
 EXAMPLE = "Example: stopgo plan floor.dxf -o plan --range 8 --start 2.5,3.0,90"
@@ -254,9 +253,7 @@ def demo_command(
 
     from bridge.commands.spawn import robot_process
     from bridge.station.station import connect
-    from mission.comparing.compare import compare
     from mission.settings import read_settings
-    from mission.sight import sight_of
 
     if not 0 < speed_up < 1e6:
         raise InputError(f"speed_up = {speed_up}: must be above 0 and below a million")
@@ -274,51 +271,29 @@ def demo_command(
             station.push(report.mission)
             typer.echo(f"pushed mission {report.mission.id}, read back from the robot")
             station.command("start")
-            tee, ended = _follow(station, report.mission, out / "field.rrd")
-    sight = sight_of(report.part.route, report.mission, report.figures)
-    heard = tee.heard.log()
-    if heard is None:
+            heard, ended = _follow(station, report, out / "field.rrd")
+    compared = heard.compared()
+    if compared is None:
         raise OutcomeUnknown("demo: the run ended and told nothing")
-    return _say_demo(compare(heard, tee.missions, [sight]), ended, out)
+    return _say_demo(compared, ended, out)
 
 
-def _follow(station: Station, mission: Mission, path: Path) -> tuple[EventTee, str]:
+def _follow(station: Station, report: PlanReport, path: Path) -> tuple[HeardRun, str]:
     """Record the run to its end; what was told of it, and the state it ended in."""
     from bridge.station.watch import watch_run
+    from mission.heard_run import HeardRun
+    from mission.sight import sight_of
+    from recordings.carried.reading import read_recording
     from recordings.field import FieldRecording
 
-    with FieldRecording(path, mission, say=lambda line: typer.echo(line, err=True)) as recording:
-        tee = EventTee(recording, mission)
-        last = watch_run(station, tee, say=lambda line: typer.echo(f"  {line}", err=True))
-    return tee, last.state
-
-
-class EventTee:
-    """Hands a run to a recording and keeps its log, and the revisions of its mission."""
-
-    def __init__(self, recording: FieldRecording, mission: Mission) -> None:
-        from mission.heard_run import HeardRun
-
-        self.heard = HeardRun()
-        self.missions = [mission]
-        self.state = recording.state
-        self._recording = recording
-
-    def mission(self, mission: Mission) -> None:
-        """Record the mission and keep it, if it is another revision."""
-        if mission.revision != self.missions[-1].revision:
-            self.missions.append(mission)
-        self._recording.mission(mission)
-
-    def pose(self, report: PoseReport) -> None:
-        """Record a pose and keep it."""
-        self.heard.pose(report)
-        self._recording.pose(report)
-
-    def event(self, event: AnyEvent) -> None:
-        """Record an event and keep it."""
-        self.heard.event(event)
-        self._recording.event(event)
+    plan = read_recording(report.files["recording"])
+    with FieldRecording(
+        path, report.mission, plan=plan, say=lambda line: typer.echo(line, err=True)
+    ) as record:
+        heard = HeardRun(record, [sight_of(report.part.route, report.mission, report.figures)])
+        heard.mission(report.mission)
+        last = watch_run(station, heard, say=lambda line: typer.echo(f"  {line}", err=True))
+    return heard, last.state
 
 
 def _say_demo(comparison: Comparison, ended: str, out: Path) -> int:

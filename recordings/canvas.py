@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
+from rerun.chunk import Chunk
 
 from mission.document import Mission
 from mission.geometry import FloatArray
@@ -92,6 +93,11 @@ class Canvas:
             self.stream.set_time(entities.ROBOT_TIME, timestamp=np.datetime64(robot_ns, "ns"))
         self.counts[entity] += 1
         self.stream.log(entity, archetype)
+
+    def take(self, chunk: Chunk) -> None:
+        """Take a part of another recording of the same origin as it is."""
+        self.counts[str(chunk.entity_path)] += chunk.num_rows
+        self.stream.send_chunks([chunk])
 
     def say(self, text: str, *, level: str = "INFO", step: int = 0) -> None:
         """One line of the plan's log, at this planning step and at the mission's start."""

@@ -16,6 +16,8 @@ from mission.heard_run import track_of
 from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
 from recordings.carried.checking import carry_end
 from recordings.carried.mission import carry_mission
+from recordings.carried.plan import carry_plan
+from recordings.carried.reading import Recording
 from recordings.compact import compact
 from recordings.pieces import Pieces
 from recordings.runs.drawing import RunDrawing
@@ -32,13 +34,19 @@ class FieldRecording:
     `rerun` opens too and which remains when the writer is killed, and gets its name when it is closed.
     On a full disk the run goes on: what finds no room waits in memory, which `say` is told once; what has
     found none at the end is lost, and the file keeps its partial name.
+    With the recording of its plan, it shows the floor and carries what the stops see.
     Reports wait for the mission, because it gives the recording id and the local origin; reports of no
     run are left out, as is everything when no mission came. What is told of a new revision waits for that
     too: the plan stays as it was drawn first, and each run shows what revisions changed, when they did.
     """
 
     def __init__(
-        self, path: Path, mission: Mission | None = None, *, say: Callable[[str], None] = lambda line: None
+        self,
+        path: Path,
+        mission: Mission | None = None,
+        *,
+        plan: Recording | None = None,
+        say: Callable[[str], None] = lambda line: None,
     ) -> None:
         self.path = path
         self._say = say
@@ -52,6 +60,7 @@ class FieldRecording:
         self._pieces: Pieces | None = None
         self._port: int | None = None
         self._given = mission
+        self._plan = plan
         self._open = ExitStack()
 
     def __enter__(self) -> FieldRecording:
@@ -148,6 +157,8 @@ class FieldRecording:
         self._canvas = self._open.enter_context(open_canvas(sheet, port=self._port))
         draw_mission(self._canvas, mission)
         carry_mission(self._canvas, mission)
+        if self._plan is not None:
+            carry_plan(self._canvas, self._plan, mission)
         self._save()
 
     def _take(self, report: Report) -> None:

@@ -12,16 +12,19 @@ import typer
 
 from bridge.commands.connection import Connection, reached, with_connection
 from bridge.commands.order_commands import Json, status_json
-from bridge.console import print_json, say
+from bridge.console import print_json, say, tell
 
 if TYPE_CHECKING:
-    from bridge.station.watch import Recording
+    from mission.events import StateReport
+    from mission.heard_run import HeardRun
 
 
 class Recorder(Protocol):
-    """Opens a recording at a path, looked at if wanted; `None` without one."""
+    """Opens what hears a run: records it at a path, looked at if wanted, and knows its plan."""
 
-    def __call__(self, path: Path | None, *, view: bool) -> AbstractContextManager[Recording | None]: ...
+    def __call__(
+        self, path: Path | None, plan: Path | None, *, view: bool
+    ) -> AbstractContextManager[HeardRun]: ...
 
 
 def watch_by(recording: Recorder) -> Callable[..., None]:
@@ -34,29 +37,52 @@ def watch_by(recording: Recorder) -> Callable[..., None]:
         rrd: Annotated[
             Path | None, typer.Option("--rrd", metavar="FIELD.rrd", help="Record the run for Rerun.")
         ] = None,
+        plan: Annotated[
+            Path | None,
+            typer.Option("--plan", metavar="PLAN.rrd", help="Its plan: what the stops see, and the floor."),
+        ] = None,
         view: Annotated[bool, typer.Option("--view", help="Open the viewer on what is recorded.")] = False,
         json_: Json = False,
     ) -> None:
         """Follow the robot's run until it ends, gaps filled from its journal; Ctrl-C never touches the robot.
 
-        Ends with 0 when the run finished, 1 when it was aborted, and 2 when it finished and its recording is
-        incomplete, as on a full disk. While a vehicle is watched over MAVLink, what
-        its mission says of a stop that failed is done by this command.
+        Then tells every stop as planned and as driven and, with the plan, what the scans really saw.
+        Ends with 0 when the run finished and brought what was asked, 1 when it was aborted or brought less
+        (without the plan: when a stop was left out), 3 when nobody says that stops were scanned, as of some
+        autopilots, and 2 when it brought it and its recording is incomplete, as on a full disk. While a
+        vehicle is watched over MAVLink, what its mission says of a stop that failed is done by this command.
 
-        Example: stopgo watch --robot r1 --rrd field.rrd
+        Example: stopgo watch --robot r1 --plan plan.rrd --rrd field.rrd
 
         Example: stopgo watch --mavlink udpout:127.0.0.1:14550 --rrd field.rrd
         """
         from bridge.station.watch import Lines, Table, watch_showing
 
         with (
-            recording(rrd, view=view) as record,
+            recording(rrd, plan, view=view) as heard,
             reached(connection.to_look(compares=True)) as station,
         ):
-            state = watch_showing(station, record, Table() if sys.stderr.isatty() else Lines(say))
-            if json_:
-                print_json(status_json(state))
-            if state.state != "FINISHED":  # which weighs more than what became of the recording
-                raise typer.Exit(1)
+            state = watch_showing(station, heard, Table() if sys.stderr.isatty() else Lines(say))
+            code = tell_compared(heard, state, json_=json_)
+            if code:  # which weighs more than what became of the recording
+                raise typer.Exit(code)
 
     return watch
+
+
+def tell_compared(heard: HeardRun, state: StateReport, *, json_: bool) -> int:
+    """Tell the run beside its mission; the exit code that it comes to."""
+    from mission.comparing.judging import judge
+    from mission.comparing.telling import comparison_json, comparison_text
+
+    compared = heard.compared()
+    if json_:
+        beside = {} if compared is None else {"comparison": comparison_json(compared)}
+        print_json(status_json(state) | beside)
+    elif compared is not None:
+        tell(comparison_text(compared))
+    if compared is None or state.state != "FINISHED":
+        return 0 if state.state == "FINISHED" else 1
+    if heard.sights and compared.acquired is None:
+        say("--plan: is the plan of another mission than was run; what the scans saw is not known")
+    return judge(compared).exit_code

@@ -22,23 +22,12 @@ from mission.events import (
     Scanned,
     StateReport,
 )
+from mission.heard_run import RunTaker
 from mission.schedule import schedule
 from mission.table import printable
 
 REDRAW_S = 0.2
 LAST_EVENTS = 8
-
-
-class Recording(Protocol):
-    """What a recording of a run takes; the field recording in `recordings` is one."""
-
-    def mission(self, mission: Mission) -> None: ...
-
-    def state(self, report: StateReport) -> None: ...
-
-    def pose(self, report: PoseReport) -> None: ...
-
-    def event(self, event: AnyEvent) -> None: ...
 
 
 class Showing(Protocol):
@@ -49,12 +38,12 @@ class Showing(Protocol):
     def show(self, report: Followed) -> None: ...
 
 
-def watch_run(station: Station, record: Recording | None, *, say: Callable[[str], None]) -> StateReport:
+def watch_run(station: Station, record: RunTaker | None, *, say: Callable[[str], None]) -> StateReport:
     """Follow the run to its end, told line by line, and return the last state."""
     return watch_showing(station, record, Lines(say))
 
 
-def watch_showing(station: Station, record: Recording | None, showing: Showing) -> StateReport:
+def watch_showing(station: Station, record: RunTaker | None, showing: Showing) -> StateReport:
     """Follow the run to its end and return the last state.
 
     Raises
@@ -89,7 +78,7 @@ def _plan_of(report: Followed) -> tuple[str | None, int | None] | None:
     return report.run_id, report.revision
 
 
-def _introduce(station: Station, report: Any, record: Recording | None, showing: Showing) -> None:
+def _introduce(station: Station, report: Any, record: RunTaker | None, showing: Showing) -> None:
     """Fetch the mission that is run, so that it can be drawn and counted down."""
     mission = station.mission(report.mission_id or "", report.revision or 0)
     showing.mission(mission)
@@ -97,7 +86,7 @@ def _introduce(station: Station, report: Any, record: Recording | None, showing:
         record.mission(mission)
 
 
-def hand_over(record: Recording, report: Followed) -> None:
+def hand_over(record: RunTaker, report: Followed) -> None:
     """Give a report to the recording's method for it."""
     if isinstance(report, StateReport):
         record.state(report)

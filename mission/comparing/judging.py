@@ -52,7 +52,8 @@ def _answer(comparison: Comparison) -> Certainty:
         return acquired.answer
     if comparison.missing:
         return "no"
-    return "yes" if comparison.scanned else "unknown"
+    unsure = any(item.outcome == "unconfirmed" for item in comparison.asked)
+    return "unknown" if unsure else "yes"
 
 
 def _outside(comparison: Comparison) -> list[StopComparison]:

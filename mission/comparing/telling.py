@@ -8,6 +8,7 @@ from typing import Any
 from mission.acquired import Acquired
 from mission.comparing.judging import judge
 from mission.comparison import Comparison, StopComparison
+from mission.events import Aborted, Finished
 from mission.figures import Share, percent
 from mission.table import duration, printable, table
 
@@ -93,6 +94,7 @@ def comparison_json(comparison: Comparison) -> dict[str, Any]:
         "run_id": comparison.run_id,
         "robot": comparison.log.robot,
         "revisions": [mission.revision for mission in comparison.missions],
+        "ended": _ended(comparison),
         "answer": judgement.answer,
         "verdict": judgement.text,
         "scanned": comparison.scanned,
@@ -111,6 +113,12 @@ def comparison_json(comparison: Comparison) -> dict[str, Any]:
             for span in comparison.spans
         ],
     }
+
+
+def _ended(comparison: Comparison) -> str | None:
+    """The event by which the run ended."""
+    ends = [type(event).__name__ for event in comparison.log.events if isinstance(event, Finished | Aborted)]
+    return ends[-1] if ends else None
 
 
 def _stop_json(item: StopComparison) -> dict[str, Any]:

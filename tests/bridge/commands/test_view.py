@@ -38,15 +38,15 @@ def test_without_a_screen_one_line_says_so(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(viewer.sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    with pytest.raises(InputError, match="no screen here"), recording(tmp_path / "f.rrd", view=True):
+    with pytest.raises(InputError, match="no screen here"), recording(tmp_path / "f.rrd", None, view=True):
         pass
     with pytest.raises(InputError, match="no screen here"):
         open_viewer([tmp_path / "f.rrd"])
 
 
 def test_to_view_is_to_record(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="with --rrd"):
-        recording(None, view=True)
+    with pytest.raises(InputError, match="with --rrd"), recording(None, None, view=True):
+        pass
 
 
 def test_the_viewer_listens_on_this_machine_only() -> None:
