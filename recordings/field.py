@@ -15,7 +15,7 @@ from mission.files.atomic import must_be_writable
 from mission.heard_run import track_of
 from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
 from recordings.carried.checking import carry_end
-from recordings.carried.mission import carry_mission
+from recordings.carried.missions import carry_mission
 from recordings.carried.plan import carry_plan
 from recordings.carried.reading import Recording
 from recordings.compact import compact

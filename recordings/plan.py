@@ -17,7 +17,7 @@ from mission.sight import Sight
 from recordings import entities
 from recordings.canvas import Canvas, LocalOrigin, Sheet, local_origin, mission_origin, open_canvas
 from recordings.carried.checking import carry_end
-from recordings.carried.mission import carry_mission
+from recordings.carried.missions import carry_mission
 from recordings.carried.sight import carry_sight
 from recordings.layout import Bounds
 from recordings.read import check

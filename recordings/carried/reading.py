@@ -10,8 +10,8 @@ from mission.errors import InputError
 from mission.run_log import RunLog
 from mission.sight import Sight
 from recordings import entities
-from recordings.carried.mission import missions_in
-from recordings.carried.runs import logs_in
+from recordings.carried.missions import missions_in
+from recordings.carried.run_logs import logs_in
 from recordings.carried.sight import sights_in
 from recordings.carried.values import Values
 from recordings.read import Contents, check_apart, chunks

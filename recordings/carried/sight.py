@@ -14,7 +14,7 @@ from mission.planning import Targets
 from mission.sight import SeenFrom, Sight
 from recordings import entities
 from recordings.canvas import Canvas
-from recordings.carried.values import Row, Values
+from recordings.carried.values import Cells, Values
 
 NOT_ASKED = -1.0
 """Stands where no share is asked."""
@@ -88,7 +88,7 @@ def _told(share: float) -> float | None:
     return None if share == NOT_ASKED else float(share)
 
 
-def _sight(row: Row) -> Sight:
+def _sight(row: Cells) -> Sight:
     mission_id, digest, rule = row["mission"]
     units = np.asarray(row["units"], dtype=np.int64)
     targets = Targets(
@@ -121,7 +121,7 @@ def _within(first: IntArray, last: IntArray, total: int) -> bool:
     return bool(np.all(first >= 0) and np.all(first <= last) and np.all(last < total))
 
 
-def _ledger(row: Row, targets: Targets, rule: str) -> Ledger:
+def _ledger(row: Cells, targets: Targets, rule: str) -> Ledger:
     total = targets.total
     change = np.asarray(row["change"], dtype=np.int64)
     counts = np.diff(np.concatenate([change, [total]]))

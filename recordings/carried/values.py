@@ -12,7 +12,7 @@ from rerun.chunk import Chunk
 from mission.geometry import FloatArray, IntArray
 from recordings import entities
 
-Row = dict[str, Any]
+Cells = dict[str, Any]
 """Values by component, without the archetype's name: numbers as arrays, texts as tuples."""
 
 
@@ -28,13 +28,13 @@ class Values:
         if entities.carries(entity):
             self.chunks.setdefault(entity, []).append(chunk)
 
-    def below(self, parent: str) -> Iterator[Row]:
+    def below(self, parent: str) -> Iterator[Cells]:
         """The rows of every entity right below `parent`."""
         for entity in sorted(self.chunks):
             if entity.rpartition("/")[0] == parent:
                 yield from self.rows(entity)
 
-    def rows(self, entity: str) -> Iterator[Row]:
+    def rows(self, entity: str) -> Iterator[Cells]:
         """Every row of an entity, in the order of the file."""
         for chunk in self.chunks.get(entity, ()):
             batch = chunk.to_record_batch()
