@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mission.errors import InputError
+from mission.files.atomic import must_be_writable
 
 if TYPE_CHECKING:
-    from recordings.logs import Reading
+    from mission.document import Mission, Transform
+    from recordings.logs import FieldLog, Reading
+    from recordings.replay.placing import Align, Placing
+    from recordings.replay.replayed import Replay
 
 
 def add_commands(app: typer.Typer) -> None:
     """Add this folder's verbs to the front door."""
     app.command(epilog="Example: stopgo review plan.rrd field.rrd --view")(review)
-    app.command(epilog="Example: stopgo replay field.bag --list")(replay)
+    app.command(
+        epilog="Example: stopgo replay field.bag --mission plan/mission.json --align stops -o replay.rrd"
+    )(replay)
 
 
 def review(
@@ -60,30 +67,144 @@ def replay(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            metavar="LOG...", help=".bag, rosbag2, .mcap, .db3, .tlog, .BIN, .ulg, TUM, CSV, journal."
+            metavar="LOG...", help=".bag, rosbag2, .mcap, .db3, .tlog, .BIN, .ulg, TUM, CSV, journal"
         ),
     ],
-    list_: Annotated[bool, typer.Option("--list", help="Tell what is in each log.")] = False,
+    mission: Annotated[
+        Path | None, typer.Option(help="What was to be driven; without it the MAVLink mission in the log.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Recording to write (.rrd).")] = None,
+    list_: Annotated[bool, typer.Option("--list", help="Only tell what is in each log.")] = False,
+    map_: Annotated[
+        str | None, typer.Option("--map", help="X,Y,HEADING (m, degrees) of the site in the log's frame.")
+    ] = None,
+    align: Annotated[
+        str | None, typer.Option(help="first: the log begins at the start; stops: by where it halts.")
+    ] = None,
+    time_offset: Annotated[float, typer.Option(help="Seconds to add to the log's times.")] = 0.0,
+    poses: Annotated[str | None, typer.Option(help="Source of the poses, as --list names it.")] = None,
+    robot_name: Annotated[str | None, typer.Option(help="Which robot, where a log has several.")] = None,
     stamps: Annotated[
         str, typer.Option(help="header: the messages' own stamps count; log: when they were logged.")
     ] = "header",
     frame: Annotated[
         str | None, typer.Option(help="Take the poses in this frame from transforms (tf).")
     ] = None,
+    csv: Annotated[Path | None, typer.Option(help="Table of stops to write (.csv).")] = None,
     json_: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
-) -> None:
-    """Tell what a robot's own log holds: messages, poses, missions, modes, and what of it is damaged."""
-    from mission.table import printable_lines
-    from recordings.logs import listing, read_log
+) -> int:
+    """Lay a robot's own log beside the mission: which stops were done, how far off, and what was missed.
 
-    if not list_:
-        raise InputError("replay: say what to do with the log; --list tells what is in it")
-    read = [read_log(path, _reading(stamps, frame, path)) for path in logs]
-    if json_:
-        told = [listing.as_json(log) for log in read]
-        typer.echo(json.dumps(told[0] if len(told) == 1 else {"logs": told}, ensure_ascii=False))
+    How the log's frame lies in the mission's is never guessed: the georeference tells, or --map, or --align.
+
+    Exit code 1: a stop was missed, or visited outside its tolerance; 2: the log cannot be read, or is of
+    another mission.
+    """
+    read = [_read(path, stamps, frame) for path in logs]
+    if list_:
+        _tell_logs(read, as_json=json_)
+        return 0
+    from recordings.replay.judged import judged
+    from recordings.replay.replaying import replay as laid
+
+    for path in (out, csv):
+        if path is not None:
+            must_be_writable(path)
+    if csv is not None and len(read) > 1:
+        raise InputError("--csv: is a table of one log; give one log")
+    driven = _mission(mission, read)
+    how = _placing(map_, align, time_offset, poses, robot_name)
+    replays = [laid(log, driven, how) for log in read]
+    _write_replays(replays, out, csv)
+    _tell_replays(replays, as_json=json_)
+    return max(judged(item).exit_code for item in replays)
+
+
+def _read(path: Path, stamps: str, frame: str | None) -> FieldLog:
+    from recordings.logs import read_log
+
+    return read_log(path, _reading(stamps, frame, path))
+
+
+def _tell_logs(logs: list[FieldLog], *, as_json: bool) -> None:
+    from mission.table import printable_lines
+    from recordings.logs import listing
+
+    if as_json:
+        _echo_json([listing.as_json(log) for log in logs], "logs")
     else:
-        typer.echo(printable_lines("\n".join(map(listing.as_text, read))))
+        typer.echo(printable_lines("\n".join(map(listing.as_text, logs))))
+
+
+def _echo_json(told: list[dict[str, Any]], name: str) -> None:
+    """One object; of several, under a name."""
+    typer.echo(json.dumps(told[0] if len(told) == 1 else {name: told}, ensure_ascii=False))
+
+
+def _mission(path: Path | None, logs: list[FieldLog]) -> Mission:
+    """What is named, else what the first log holds."""
+    from mission.files.mission_json import read
+    from mission.problems import problems_of
+    from recordings.replay.uploaded import mission_in
+
+    if path is None:
+        return mission_in(logs[0])
+    document = read(path)
+    for problem in problems_of(document)[:1]:
+        raise InputError(f"{path}: {problem} (stopgo check {path} lists all)")
+    return document
+
+
+def _placing(
+    map_: str | None, align: str | None, time_offset: float, poses: str | None, robot: str | None
+) -> Placing:
+    from recordings.replay.placing import Placing
+
+    if align is not None and map_ is not None:
+        raise InputError("--map and --align both say how the log lies; give one of them")
+    if not math.isfinite(time_offset) or abs(time_offset) > 1e9:
+        raise InputError(f"--time-offset {time_offset}: must be seconds")
+    ways: dict[str | None, Align | None] = {None: None, "first": "first", "stops": "stops"}
+    if align not in ways:
+        raise InputError(f"--align {align}: must be first or stops")
+    to_map = None if map_ is None else _transform(map_)
+    return Placing(to_map, ways[align], time_offset, poses, robot)
+
+
+def _transform(text: str) -> Transform:
+    from mission.document import Transform
+
+    try:
+        x, y, heading = map(float, text.split(","))
+    except ValueError:
+        raise InputError(
+            f"--map {text}: must be X,Y,HEADING in metres and degrees, such as 2.5,3,90"
+        ) from None
+    if not all(map(math.isfinite, (x, y, heading))):
+        raise InputError(f"--map {text}: must be numbers")
+    return Transform(x=x, y=y, heading=math.radians(heading))
+
+
+def _write_replays(replays: list[Replay], out: Path | None, csv: Path | None) -> None:
+    from mission.files.atomic import write_atomic
+    from recordings.replay.telling import as_csv
+
+    if out is not None:
+        from recordings.replay.drawing import write_recording
+
+        write_recording(replays, out)
+    if csv is not None:
+        write_atomic(csv, as_csv(replays[0]))
+
+
+def _tell_replays(replays: list[Replay], *, as_json: bool) -> None:
+    from recordings.replay.telling import as_json as told_json
+    from recordings.replay.telling import as_text
+
+    if as_json:
+        _echo_json([told_json(item) for item in replays], "replays")
+    else:
+        typer.echo("\n\n".join(map(as_text, replays)))
 
 
 def _reading(stamps: str, frame: str | None, path: Path) -> Reading:

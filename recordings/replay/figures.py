@@ -1,0 +1,146 @@
+"""What a replay amounts to beyond its stops: the way driven, and where time was lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mission.document import Mission
+from mission.geometry import BoolArray, FloatArray
+from mission.run.way import legs_of
+from mission.run_log import Track
+from recordings.replay.matching import Match
+from recordings.replay.replayed import Replay
+
+SMOOTHED_S = 0.5
+"""The way is measured between means over as long as this: noise would lengthen it."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """The way driven, in metres; distances beside the route are positive to its left."""
+
+    driven_m: float
+    planned_m: float
+    """Of the legs up to the last stop that was visited, and of the return if all were."""
+    mean_m: float | None
+    rms_m: float | None
+    median_m: float | None
+    """Of the distances without their signs, as those below."""
+    p95_m: float | None
+    greatest_m: float | None
+    greatest_s: float | None
+    """When it was that far, in seconds since the run began."""
+
+    @property
+    def extra_m(self) -> float:
+        return self.driven_m - self.planned_m
+
+
+@dataclass(frozen=True)
+class Lost:
+    """Time that a run took longer than planned, or won."""
+
+    where: str
+    seconds: float
+
+
+def way_of(replay: Replay) -> Way:
+    """Measured where the robot was on a leg, halts included in the figures beside the route."""
+    beside = replay.comparison.beside
+    metres = replay.beside
+    away = np.abs(metres)
+    at = beside.greatest
+    when = None if at is None else float(replay.run.seconds([beside.ns[at]])[0])
+    told = bool(len(metres))
+    return Way(
+        driven_m=driven_m(replay.run.poses, replay.matches),
+        planned_m=_planned_m(replay.mission, replay.matches),
+        mean_m=float(metres.mean()) if told else None,
+        rms_m=float(np.sqrt((metres**2).mean())) if told else None,
+        median_m=float(np.median(away)) if told else None,
+        p95_m=float(np.percentile(away, 95)) if told else None,
+        greatest_m=float(away.max()) if told else None,
+        greatest_s=when,
+    )
+
+
+def driven_m(track: Track, matches: tuple[Match, ...]) -> float:
+    """Length of the way between halts, along means of half a second."""
+    if len(track) < 2:
+        return 0.0
+    index = ((track.ns - track.ns[0]) / (SMOOTHED_S * 1e9)).astype(np.int64)
+    many = np.bincount(index)
+    means = np.stack([np.bincount(index, column) for column in track.xy.T], axis=-1)
+    held = many > 0
+    places = means[held] / many[held, None]
+    ns = track.ns[0] + (np.flatnonzero(held) + 0.5) * SMOOTHED_S * 1e9
+    return _length(places, _moving(ns, matches))
+
+
+def _moving(ns: FloatArray, matches: tuple[Match, ...]) -> BoolArray:
+    """Whether each step between times (n,) is outside every halt (n - 1,)."""
+    moving = np.ones(max(len(ns) - 1, 0), bool)
+    for match in matches:
+        halt = match.standing
+        moving &= ~((ns[:-1] >= halt.begin_ns) & (ns[1:] <= halt.end_ns))
+    return moving
+
+
+def _length(places: FloatArray, moving: BoolArray) -> float:
+    return float(np.hypot(*np.diff(places, axis=0).T)[moving].sum())
+
+
+def _planned_m(mission: Mission, matches: tuple[Match, ...]) -> float:
+    """Of the legs that were to be driven by then."""
+    visited = [match.stop for match in matches if match.stop is not None]
+    if not visited:
+        return 0.0
+    whole = max(visited) + 1 == len(mission.stops)
+    legs = legs_of(mission)[: None if whole else max(visited) + 1]
+    return sum(float(np.hypot(*np.diff(np.array(leg), axis=0).T).sum()) for leg in legs if len(leg) > 1)
+
+
+def lost_times(replay: Replay) -> tuple[Lost, ...]:
+    """Where the run was slower or faster than planned by a second or more, the slowest first."""
+    found = [item for item in _lost(replay) if abs(item.seconds) >= 1.0]
+    return tuple(sorted(found, key=lambda item: -item.seconds))
+
+
+def _lost(replay: Replay) -> Iterator[Lost]:
+    """Legs between stops visited one after another, halts at stops, halts elsewhere, visits once more."""
+    mission = replay.mission
+    planned = {item.stop: item.planned_s for item in replay.comparison.stops}
+    before: Match | None = None
+    elsewhere = 0.0
+    for match in replay.matches:
+        halt = match.standing
+        if match.stop is None:
+            yield Lost(f"halt {halt.seconds:.0f} s at ({halt.x:.2f}, {halt.y:.2f}), at no stop", halt.seconds)
+            elsewhere += halt.seconds
+            continue
+        stop = mission.stops[match.stop]
+        stay = stop.settle_s + stop.scan.duration_s
+        if match.how != "visit":
+            yield Lost(f"once more at {stop.id}", halt.seconds)
+        else:
+            yield Lost(f"standing at {stop.id}", halt.seconds - stay)
+            yield from _leg(before, match, mission, planned, elsewhere)
+        before, elsewhere = match, 0.0
+
+
+def _leg(
+    before: Match | None, match: Match, mission: Mission, planned: dict[str, float | None], elsewhere: float
+) -> Iterator[Lost]:
+    """Driving from the stop before, without what was stood on the way."""
+    if before is None or before.stop is None or match.stop is None or match.stop != before.stop + 1:
+        return
+    stop, last = mission.stops[match.stop], mission.stops[before.stop]
+    arrive, arrived = planned[stop.id], planned[last.id]
+    if arrive is None or arrived is None:
+        return
+    should = arrive - arrived - last.settle_s - last.scan.duration_s
+    took = (match.standing.begin_ns - before.standing.end_ns) / 1e9 - elsewhere
+    yield Lost(f"driving from {last.id} to {stop.id}", took - should)

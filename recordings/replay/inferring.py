@@ -1,0 +1,114 @@
+"""Halts and what a log tells -> the events of a run, as a robot of stopgo would have told them.
+
+A log that tells nothing of scans has stops that are `Unconfirmed`: the robot stood there as long as a scan
+takes, and that is all that is known. A halt that was too short is `Failed`, a stop that was passed `Skipped`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mission.document import Mission, Stop
+from mission.events import AnyEvent, Arrived, Failed, Finished, Pose, Settled, Skipped, Started, Unconfirmed
+from mission.run_log import Track
+from recordings.logs.field_log import Remark
+from recordings.replay.matching import Match, long_enough
+from recordings.replay.standing import Standing
+
+
+@dataclass(frozen=True)
+class Told:
+    """An event without what all events have."""
+
+    ns: int
+    kind: type
+    fields: dict[str, Any]
+
+
+def events_of(
+    matches: Sequence[Match],
+    mission: Mission,
+    track: Track,
+    remarks: Sequence[Remark],
+    *,
+    run_id: str,
+    robot: str,
+) -> tuple[AnyEvent, ...]:
+    """The events of a run that drove as the halts say; it is over if the last stop was visited."""
+    began, ended = _begin(track, matches, remarks), int(track.ns[-1])
+    told = [Told(began, Started, {"commander": "not told by the log"})]
+    told += sorted(_told(matches, mission, remarks), key=lambda item: item.ns)
+    if len(mission.stops) - 1 in {match.stop for match in matches}:
+        told.append(Told(ended, Finished, {}))
+    about = {
+        "robot": robot, "boot_id": "", "run_id": run_id,
+        "mission_id": mission.id, "revision": mission.revision,
+    }  # fmt: skip
+    return tuple(
+        item.kind(
+            number=number, robot_ns=item.ns, mission_time_s=(item.ns - began) / 1e9, **about, **item.fields
+        )
+        for number, item in enumerate(told, 1)
+    )
+
+
+def _begin(track: Track, matches: Sequence[Match], remarks: Sequence[Remark]) -> int:
+    """When the vehicle began its mission last before the first stop, if the log tells; else with the log."""
+    first = next((match.standing.begin_ns for match in matches if match.stop is not None), None)
+    modes = [remark.ns for remark in remarks if remark.kind == "mode" and remark.text in DRIVES]
+    before = [ns for ns in modes if first is None or ns <= first]
+    return max(before[-1], int(track.ns[0])) if before else int(track.ns[0])
+
+
+DRIVES = ("AUTO", "MISSION")
+"""Modes in which a vehicle follows its mission."""
+
+
+def _told(matches: Sequence[Match], mission: Mission, remarks: Sequence[Remark]) -> Iterator[Told]:
+    farthest = -1
+    for match in matches:
+        if match.stop is None:
+            continue
+        for passed in range(farthest + 1, match.stop):
+            yield _passed(mission.stops[passed], match.standing.begin_ns)
+        farthest = max(farthest, match.stop)
+        yield from _visit(mission.stops[match.stop], match.standing, remarks)
+
+
+def _during(halt: Standing, remark: Remark) -> bool:
+    return halt.begin_ns - 10**9 <= remark.ns <= halt.end_ns + 10**9
+
+
+def _of_scan(trigger: Remark | None, halt: Standing, remarks: Sequence[Remark]) -> str:
+    """What the log tells of a scan, and of how long was waited for it."""
+    if trigger is None:
+        return "nothing in the log tells of a scan"
+    items = [remark for remark in remarks if remark.kind == "command" and remark.ns >= trigger.ns]
+    waits = items[:1] if items and items[0].text.startswith("NAV_DELAY") and _during(halt, items[0]) else []
+    if len(items) < 2 or not waits:
+        return f"{trigger.text} in the log"
+    return f"{trigger.text}, then waited {(items[1].ns - waits[0].ns) / 1e9:.2f} s"
+
+
+def _passed(stop: Stop, before_ns: int) -> Told:
+    return Told(before_ns - 1, Skipped, {"stop": stop.id, "reason": "no halt there in the log"})
+
+
+def _visit(stop: Stop, halt: Standing, remarks: Sequence[Remark]) -> Iterator[Told]:
+    pose = Pose(x=halt.x, y=halt.y, heading=halt.heading)
+    away = math.dist(halt.xy, (stop.x, stop.y))
+    yield Told(halt.begin_ns, Arrived, {"stop": stop.id, "pose": pose, "deviation_m": away})
+    trigger = next((remark for remark in remarks if remark.kind == "trigger" and _during(halt, remark)), None)
+    if trigger is not None:
+        yield Told(max(trigger.ns, halt.begin_ns), Settled, {"stop": stop.id, "pose": pose})
+    word = f"; {_of_scan(trigger, halt, remarks)}"
+    if not long_enough(halt, stop):
+        planned = stop.settle_s + stop.scan.duration_s
+        reason = f"stood {halt.seconds:.1f} s of {planned:.1f} s{word}"
+        yield Told(halt.end_ns, Failed, {"stop": stop.id, "reason": reason})
+    else:
+        reason = f"stood {halt.seconds:.1f} s{word}"
+        yield Told(halt.end_ns, Unconfirmed, {"stop": stop.id, "pose": pose, "reason": reason})

@@ -1,0 +1,56 @@
+"""Whether a replay shows that the mission was driven as planned: one answer, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from mission.comparing.judging import Judgement, named
+from mission.comparison import StopComparison
+from recordings.replay.replayed import Replay
+
+VISITED = ("scanned", "unconfirmed")
+
+
+def judged(replay: Replay) -> Judgement:
+    """Yes, if the robot stood at every stop within its tolerance for as long as its scan takes."""
+    lines = tuple(_sentences(replay))
+    return Judgement("no" if missing(replay) or outside(replay) else "yes", lines)
+
+
+def missing(replay: Replay) -> list[StopComparison]:
+    """Stops at which the robot did not stand, or not long enough."""
+    return [item for item in replay.comparison.asked if item.outcome not in VISITED]
+
+
+def outside(replay: Replay) -> list[StopComparison]:
+    """Stops at which it stood too far away, or, by a simulator's truth, in truth did."""
+    away = [item for item in replay.comparison.asked if item.outcome in VISITED and item.outside_tolerance]
+    return away
+
+
+def _sentences(replay: Replay) -> Iterator[str]:
+    asked = replay.comparison.asked
+    good = len(asked) - len(missing(replay)) - len(outside(replay))
+    yield f"{good} of {len(asked)} stops were visited within tolerance."
+    for outcome, words in WORDS.items():
+        stops = [item.stop for item in asked if item.outcome == outcome]
+        if stops:
+            yield f"{words} {named(stops)}."
+    for item in outside(replay):
+        far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
+        yield f"{item.stop} was missed by {far:.0f} mm ({limit:.0f} mm are tolerated)."
+    if replay.extra:
+        yield f"The robot halted {len(replay.extra)} times at no stop."
+    if replay.inferred:
+        yield "Visits were told from where the robot stood; that scans were made is not in the log."
+    if replay.log.lost:
+        yield f"The log is damaged, and this is of what could be read: {replay.log.lost}."
+
+
+WORDS = {
+    "skipped": "No halt at",
+    "failed": "Too short a halt at",
+    "arrived": "No scan at",
+    "not reached": "Not reached:",
+}
+HEADLINES = {"yes": "Driven as planned", "no": "Not driven as planned", "unknown": "Not known"}

@@ -1,0 +1,62 @@
+"""A log laid beside its mission, whole: what `stopgo replay` knows of one log."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mission.comparison import Comparison
+from mission.document import Mission
+from mission.geometry import FloatArray
+from mission.run_log import RunLog
+from recordings.logs.field_log import FieldLog
+from recordings.replay.matching import Match
+from recordings.replay.placing import Placed
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """One log beside one mission."""
+
+    log: FieldLog
+    mission: Mission
+    placed: Placed
+    matches: tuple[Match, ...]
+    """What each halt of the robot was, in order of time."""
+    run: RunLog
+    """The run that the log tells of, as any other run."""
+    comparison: Comparison
+    uploads: tuple[str, ...]
+    """How the missions in the log differ from this one, a line each."""
+    inferred: bool
+    """Whether the run's events were inferred from halts, and not told by the log."""
+
+    @cached_property
+    def extra(self) -> tuple[Match, ...]:
+        """Halts at no stop."""
+        return tuple(match for match in self.matches if match.how == "extra")
+
+    def at(self, stop: int) -> tuple[Match, ...]:
+        """Halts at a stop, by its index."""
+        return tuple(match for match in self.matches if match.stop == stop)
+
+    def true_offset_m(self, stop: int) -> float | None:
+        """Distance from the stop of where a simulator says that the robot stood there last."""
+        halts, truth = self.at(stop), self.placed.truth
+        if not halts or truth is None:
+            return None
+        halt, place = halts[-1].standing, self.mission.stops[stop]
+        poses = truth.between(halt.begin_ns, halt.end_ns)
+        if not len(poses):
+            return None
+        x, y = np.median(poses.xy, axis=0)
+        return math.dist((float(x), float(y)), (place.x, place.y))
+
+    @cached_property
+    def beside(self) -> FloatArray:
+        """Signed metres beside the route at every pose that was on a leg."""
+        metres = self.comparison.beside.metres
+        return metres[np.isfinite(metres)]

@@ -1,0 +1,169 @@
+"""A log and a mission -> the log laid beside the mission; refused where they do not belong together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from mission.comparing.compare import compare
+from mission.document import Mission
+from mission.errors import InputError
+from mission.events import AnyEvent
+from mission.geometry import FloatArray
+from mission.run.way import legs_of
+from mission.run_log import LogSource, RunLog, Track
+from mission.sight import Sight
+from recordings.logs.field_log import FieldLog, Remark
+from recordings.replay.inferring import events_of
+from recordings.replay.matching import Match, matched, reaches
+from recordings.replay.placing import Placed, Placing, placed
+from recordings.replay.replayed import Replay
+from recordings.replay.standing import standings
+from recordings.replay.uploaded import differences_of
+
+NEAR_ROUTE_M = 2.0
+LEAST_ON_ROUTE = 0.2
+"""A log of which less than this share runs within NEAR_ROUTE_M of the route is of another mission."""
+
+
+def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight] = ()) -> Replay:
+    """Lay a log beside its mission.
+
+    Raises
+    ------
+    InputError
+        When the log has no pose, cannot be placed, or is not of this mission.
+    AnswerIsNo
+        When `--align stops` finds no placing, or several.
+    """
+    laid = placed(log, mission, how)
+    matches = _matches(laid, mission)
+    _must_belong(log, laid.track, mission, matches)
+    offset = laid.alignment.time_offset_ns
+    events = _own_events(log, mission, offset)
+    remarks = [replace(remark, ns=remark.ns + offset) for remark in log.remarks]
+    told = events or _inferred(log, laid, mission, matches, remarks)
+    run = RunLog(
+        robot=told[0].robot if told else laid.source.robot,
+        run_id=told[0].run_id if told else None,
+        mission_id=mission.id,
+        revision=told[-1].revision if told else mission.revision,
+        source=_source(log, laid),
+        poses=laid.track,
+        events=told,
+        alignment=laid.alignment,
+    )
+    return Replay(
+        log=log,
+        mission=mission,
+        placed=laid,
+        matches=matches,
+        run=run,
+        comparison=compare(run, [mission], sights),
+        uploads=differences_of(log, mission),
+        inferred=not events,
+    )
+
+
+def _matches(laid: Placed, mission: Mission) -> tuple[Match, ...]:
+    halts = standings(laid.track, speed=mission.robot.speed, turns=laid.turns)
+    return matched(halts, mission, laid.track)
+
+
+def _inferred(
+    log: FieldLog, laid: Placed, mission: Mission, matches: Sequence[Match], remarks: Sequence[Remark]
+) -> tuple[AnyEvent, ...]:
+    robot = laid.source.robot or Path(log.path).stem
+    return events_of(matches, mission, laid.track, remarks, run_id=f"replay-{log.digest[:12]}", robot=robot)
+
+
+def _own_events(log: FieldLog, mission: Mission, offset_ns: int) -> tuple[AnyEvent, ...]:
+    """What a log of stopgo's tells of the newest run of this mission.
+
+    Raises
+    ------
+    InputError
+        When it tells of runs, and of none of this mission.
+    """
+    mine = [event for event in log.events if event.mission_id == mission.id and event.run_id]
+    if log.events and not mine:
+        others = ", ".join(dict.fromkeys(event.mission_id[:12] for event in log.events if event.mission_id))
+        raise InputError(
+            f"{log.path}: has no run of mission {mission.id[:12]}; it has runs of {others or 'none'}"
+        )
+    if not mine:
+        return ()
+    from msgspec.structs import replace as changed
+
+    return tuple(
+        changed(event, robot_ns=event.robot_ns + offset_ns)
+        for event in mine
+        if event.run_id == mine[-1].run_id
+    )
+
+
+def _source(log: FieldLog, laid: Placed) -> LogSource:
+    notes = (*((f"damaged: {log.lost}",) if log.lost else ()), *log.oddities, *laid.source.oddities)
+    return LogSource(Path(log.path).name, log.format, log.digest, log.messages, lost=0, notes=notes)
+
+
+def _must_belong(log: FieldLog, track: Track, mission: Mission, matches: Sequence[Match]) -> None:
+    """Refuse a log whose robot was never near a stop, or hardly ever near the route."""
+    stops = np.array([(stop.x, stop.y) for stop in mission.stops])
+    away = nearest_to(stops, track.xy)
+    nearest = int(away.argmin())
+    name = f"mission {mission.name} ({mission.id[:12]})"
+    if away[nearest] > reaches(mission)[nearest] and not any(match.stop is not None for match in matches):
+        raise InputError(
+            f"{log.path}: was never near a stop of {name}; nearest was {mission.stops[nearest].id}, "
+            f"{away[nearest]:.1f} m off; the wrong mission, or a frame placed wrong (--map, --align)?"
+        )
+    share = on_route(track, mission)
+    if share < LEAST_ON_ROUTE:
+        raise InputError(
+            f"{log.path}: only {share:.0%} of the way driven lies within {NEAR_ROUTE_M:g} m of the route of "
+            f"{name}; the wrong mission, or a frame placed wrong (--map, --align)?"
+        )
+
+
+def nearest_to(points: FloatArray, xy: FloatArray) -> FloatArray:
+    """How near poses (n, 2) ever came to each point (m, 2): (m,)."""
+    return np.array([np.hypot(*(xy - point).T).min() for point in points])
+
+
+def on_route(track: Track, mission: Mission) -> float:
+    """Share of the way driven that lies near the route; of poses where nothing was driven."""
+    kept = _thinned(track.xy)
+    pieces = [
+        np.stack([leg[:-1], leg[1:]], axis=1) for leg in map(np.array, legs_of(mission)) if len(leg) > 1
+    ]
+    if not pieces:
+        stops = np.array([(stop.x, stop.y) for stop in mission.stops])
+        return float(
+            (np.hypot(*(kept[:, None] - stops).transpose(2, 0, 1)).min(axis=1) <= NEAR_ROUTE_M).mean()
+        )
+    near = np.zeros(len(kept), bool)
+    for a, b in np.concatenate(pieces):
+        near |= _away(kept, a, b) <= NEAR_ROUTE_M
+    return float(near.mean())
+
+
+def _thinned(xy: FloatArray) -> FloatArray:
+    """Places at least 0.2 m apart along the way, so that standing does not count."""
+    kept = [xy[0]]
+    for place in xy[:: max(1, len(xy) // 100_000)]:
+        if math.dist(place, kept[-1]) >= 0.2:
+            kept.append(place)
+    return np.array(kept)
+
+
+def _away(xy: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    """Distances of points (n, 2) from a straight piece."""
+    along, to = b - a, xy - a
+    square = float(along @ along)
+    t = np.clip(to @ along / square, 0.0, 1.0) if square else np.zeros(len(xy))
+    return np.hypot(*(to - t[:, None] * along).T)

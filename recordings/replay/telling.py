@@ -1,0 +1,155 @@
+"""A replay as a person reads it on a terminal, as one JSON object, and as a table of stops."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from typing import Any
+
+from mission.comparing.telling import comparison_json, comparison_table
+from mission.run_log import Alignment
+from mission.table import printable
+from recordings.logs.field_log import FieldLog
+from recordings.replay.figures import lost_times, way_of
+from recordings.replay.judged import HEADLINES, judged
+from recordings.replay.replayed import Replay
+
+MOST_LOST = 5
+"""Places where time was lost that are listed on a terminal; --json has all."""
+
+
+def as_text(replay: Replay) -> str:
+    """The stops, the way, the time, and the answer."""
+    judgement = judged(replay)
+    lines = [
+        _head(replay.log),
+        f"  poses      {replay.placed.source.source}, {len(replay.run.poses)} of them",
+        f"  placed     {alignment_text(replay.run.alignment)}",
+        *(f"  note       {line}" for line in notes_of(replay)),
+        "",
+        *(f"  {line}" for line in comparison_table(replay.comparison).split("\n")),
+        "",
+        *_truth(replay),
+        *_way(replay),
+        *(f"  time lost  {item.seconds:+7.1f} s  {item.where}" for item in lost_times(replay)[:MOST_LOST]),
+        f"{HEADLINES[judgement.answer]}. {' '.join(judgement.sentences)}",
+    ]
+    return "\n".join(printable(line) for line in lines)
+
+
+def _head(log: FieldLog) -> str:
+    return f"{log.path}: {log.format}, {log.messages} messages, sha256 {log.digest[:12]}…"
+
+
+def alignment_text(alignment: Alignment | None) -> str:
+    """How the log was brought to the mission's frame, in a line."""
+    if alignment is None:
+        return "as it is"
+    moved = (
+        f"turned {math.degrees(alignment.heading):.2f}°, then shifted by "
+        f"({alignment.x:.3f}, {alignment.y:.3f}) m; times {alignment.time_offset_ns / 1e9:+.3f} s"
+    )
+    if alignment.residual_rms_m is None or alignment.residual_max_m is None:
+        return f"{alignment.how}: {moved}"
+    rest = f"{1000 * alignment.residual_rms_m:.0f} mm rms, {1000 * alignment.residual_max_m:.0f} mm at most"
+    return f"{alignment.how}: {moved}; what is left is {rest}"
+
+
+def notes_of(replay: Replay) -> tuple[str, ...]:
+    """What is odd about the log, and how missions in it differ from ours."""
+    lost = (f"DAMAGED: {replay.log.lost}",) if replay.log.lost else ()
+    turns = (
+        () if replay.placed.turns else ("no headings in the log: the direction of driving stands for them",)
+    )
+    return (*lost, *replay.log.oddities, *replay.placed.source.oddities, *turns, *replay.uploads)
+
+
+def _truth(replay: Replay) -> list[str]:
+    """By a simulator's word, where it stood."""
+    offsets = [(stop.id, replay.true_offset_m(k)) for k, stop in enumerate(replay.mission.stops)]
+    told = [f"{name} {1000 * away:.0f} mm" for name, away in offsets if away is not None]
+    return [f"  in truth   {', '.join(told)}"] if told else []
+
+
+def _way(replay: Replay) -> list[str]:
+    way = way_of(replay)
+    lines = [
+        f"  way        {way.driven_m:.1f} m driven, {way.planned_m:.1f} m planned to the last stop visited "
+        f"({way.extra_m:+.1f} m)"
+    ]
+    if way.rms_m is not None and way.mean_m is not None:
+        lines.append(
+            f"  beside     mean {1000 * way.mean_m:+.0f} mm (left positive), rms {1000 * way.rms_m:.0f}, "
+            f"median {1000 * (way.median_m or 0):.0f}, 95 % below {1000 * (way.p95_m or 0):.0f}, "
+            f"greatest {1000 * (way.greatest_m or 0):.0f} mm at {way.greatest_s or 0:.1f} s"
+        )
+    return lines
+
+
+def as_json(replay: Replay) -> dict[str, Any]:
+    """Everything, for programs: metres, radians and seconds."""
+    judgement, alignment = judged(replay), replay.run.alignment
+    return {
+        "log": replay.log.path,
+        "format": replay.log.format,
+        "sha256": replay.log.digest,
+        "lost": replay.log.lost,
+        "notes": list(notes_of(replay)),
+        "poses": {"source": replay.placed.source.source, "count": len(replay.run.poses)},
+        "alignment": None if alignment is None else vars(alignment),
+        "inferred": replay.inferred,
+        "answer": judgement.answer,
+        "verdict": f"{HEADLINES[judgement.answer]}. {' '.join(judgement.sentences)}",
+        "way": {**vars(way_of(replay)), "extra_m": way_of(replay).extra_m},
+        "time_lost": [vars(item) for item in lost_times(replay)],
+        "halts": [_halt_json(replay, k) for k in range(len(replay.matches))],
+        "true_offset_m": {stop.id: replay.true_offset_m(k) for k, stop in enumerate(replay.mission.stops)},
+        "run": comparison_json(replay.comparison),
+    }
+
+
+def _halt_json(replay: Replay, number: int) -> dict[str, Any]:
+    match = replay.matches[number]
+    halt, stops = match.standing, replay.mission.stops
+    begin, end = replay.run.seconds([halt.begin_ns, halt.end_ns]).tolist()
+    return {
+        "how": match.how,
+        "stop": None if match.stop is None else stops[match.stop].id,
+        "nearest": stops[match.near].id,
+        "away_m": match.away_m,
+        "begin_s": begin,
+        "end_s": end,
+        "x": halt.x,
+        "y": halt.y,
+        "heading": halt.heading,
+        "moved_m": halt.moved_m,
+    }
+
+
+COLUMNS = (
+    *("stop", "outcome", "planned_s", "arrived_s", "late_s", "deviation_m", "along_m", "across_m"),
+    *("heading_rad", "tolerance_m", "tries", "reason"),
+)
+
+
+def as_csv(replay: Replay) -> bytes:
+    """A row per stop: what was planned and what was, how long the robot stood, and how it moved meanwhile."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow((*COLUMNS, "stood_s", "moved_m", "true_offset_m"))
+    numbers = {stop.id: k for k, stop in enumerate(replay.mission.stops)}
+    for item in replay.comparison.asked:
+        halts = replay.at(numbers[item.stop])
+        stood = (halts[-1].standing.seconds, halts[-1].standing.moved_m) if halts else (None, None)
+        cells = (*(getattr(item, name) for name in COLUMNS), *stood, replay.true_offset_m(numbers[item.stop]))
+        writer.writerow("" if cell is None else _cell(cell) for cell in cells)
+    return text.getvalue().encode()
+
+
+def _cell(value: object) -> str:
+    """Numbers to a tenth of a millimetre; no text that a spreadsheet would take for a formula."""
+    if isinstance(value, float):
+        return f"{value:.4f}"
+    text = printable(str(value))
+    return f"'{text}" if text[:1] in ("=", "+", "-", "@") else text

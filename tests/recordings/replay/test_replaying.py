@@ -1,0 +1,229 @@
+"""A log laid beside its mission: placed as told, every figure that of the drive, another's refused."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from msgspec.structs import replace as changed
+
+from mission.__main__ import main
+from mission.document import Frame, Mission, SiteOrigin, Transform, sealed
+from mission.errors import InputError
+from mission.files.mission_json import write
+from mission.run_log import Track
+from recordings.logs.field_log import FieldLog, Poses, Remark, poses_of
+from recordings.replay.figures import lost_times, way_of
+from recordings.replay.judged import judged
+from recordings.replay.placing import Placing
+from recordings.replay.replaying import replay
+from recordings.replay.telling import as_csv, as_json, as_text
+from tests.recordings.logs.writing import Messages, write_bag
+from tests.recordings.replay.driving import Drive, Odd, Senses, driven, logged, wandering
+
+MISSION = wandering(1)
+FIRST = Placing(align="first")
+
+
+def log_of(track: Track, *, frame: str = "odom", remarks: tuple[Remark, ...] = (), **about: Any) -> FieldLog:
+    poses = poses_of("/odom", frame, track.ns, track.xy, track.heading, **about)
+    assert poses is not None
+    return held(poses, remarks=remarks)
+
+
+def held(*poses: Poses, remarks: tuple[Remark, ...] = ()) -> FieldLog:
+    ns = np.concatenate([track.ns for track in poses]) if poses else np.zeros(1, np.int64)
+    return FieldLog(
+        "field.bag", "test", "d" * 64, 1, "wall", int(ns.min()), int(ns.max()), poses=poses, remarks=remarks
+    )
+
+
+def offset_of(drive: Drive, mission: Mission, stop: int) -> float:
+    halt = [halt for halt in drive.halts if halt.stop == stop][-1]
+    return math.dist((halt.x, halt.y), (mission.stops[stop].x, mission.stops[stop].y))
+
+
+def test_every_figure_of_a_clean_log_is_that_of_the_drive() -> None:
+    drive = driven(MISSION, Odd(skipped=frozenset({3}), beside_m=0.01))
+    found = replay(log_of(logged(drive)), MISSION, FIRST)
+    outcomes = {item.stop: item.outcome for item in found.comparison.stops}
+    assert outcomes.pop("s04") == "skipped"
+    assert set(outcomes.values()) == {"unconfirmed"}
+    for k, item in enumerate(found.comparison.stops):
+        if item.outcome == "unconfirmed":
+            assert item.deviation_m == pytest.approx(offset_of(drive, MISSION, k), abs=1e-6)
+            truth = next(halt for halt in drive.halts if halt.stop == k)
+            assert item.arrived_s == pytest.approx(truth.begin_s, abs=0.2)
+    assert judged(found).answer == "no"
+
+
+def test_a_drive_as_planned_is_one() -> None:
+    found = replay(log_of(logged(driven(MISSION))), MISSION, FIRST)
+    assert judged(found).answer == "yes"
+    assert judged(found).exit_code == 0
+    way = way_of(found)
+    assert way.driven_m == pytest.approx(way.planned_m, rel=0.01)
+    assert way.greatest_m == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "how, frame, changes",
+    [
+        (Placing(to_map=Transform(x=5.0, y=-3.0, heading=0.8)), "odom", {}),
+        (FIRST, "odom", {}),
+        (Placing(align="stops"), "odom", {}),
+        (Placing(), "map", {"frame": Frame(name="site", to_map=Transform(x=5.0, y=-3.0, heading=0.8))}),
+    ],
+)
+def test_a_log_in_another_frame_is_placed_in_every_way(
+    how: Placing, frame: str, changes: dict[str, Any]
+) -> None:
+    mission = sealed(changed(MISSION, **changes))
+    track = logged(driven(mission), Senses(turned=0.8, shifted=(5.0, -3.0)))
+    found = replay(log_of(track, frame=frame), mission, how)
+    assert judged(found).answer == "yes"
+    assert found.comparison.greatest_deviation_m == pytest.approx(0, abs=0.002)
+    assert found.run.alignment is not None
+    assert math.remainder(found.run.alignment.heading + 0.8, math.tau) == pytest.approx(0, abs=1e-3)
+
+
+def test_a_log_on_the_earth_is_placed_by_the_georeference() -> None:
+    """The site's +y bears 90°, east: the log's metres east and north are turned by that."""
+    mission = sealed(changed(MISSION, georeference=SiteOrigin(lat=47.0, lon=8.0, alt=0.0, heading_deg=90.0)))
+    track = logged(driven(mission), Senses(turned=-math.pi / 2))
+    about = {"origin": SiteOrigin(lat=47.0, lon=8.0, alt=0.0, heading_deg=0.0), "rule": "ardupilot"}
+    found = replay(log_of(track, frame="local", **about), mission, Placing())
+    assert found.comparison.greatest_deviation_m == pytest.approx(0, abs=1e-6)
+    about["origin"] = SiteOrigin(lat=48.0, lon=8.0, alt=0.0, heading_deg=0.0)
+    with pytest.raises(InputError, match="wrong mission"):
+        replay(log_of(track, frame="local", **about), mission, Placing())
+
+
+def test_a_log_is_never_placed_by_a_guess() -> None:
+    with pytest.raises(InputError, match="--align first"):
+        replay(log_of(logged(driven(MISSION))), MISSION, Placing())
+
+
+def test_a_log_of_another_mission_is_refused() -> None:
+    track = logged(driven(MISSION))
+    with pytest.raises(InputError, match="wrong mission"):
+        replay(log_of(track), MISSION, Placing(to_map=Transform(x=500.0, y=0.0, heading=0.0)))
+
+
+def test_a_log_without_poses_says_what_it_has() -> None:
+    with pytest.raises(InputError, match="no pose in it"):
+        replay(held(), MISSION, FIRST)
+
+
+def test_several_robots_are_not_mixed() -> None:
+    track = logged(driven(MISSION))
+    both = [poses_of(f"/{r}/odom", "odom", track.ns, track.xy, track.heading, robot=r) for r in ("r1", "r2")]
+    log = held(*(poses for poses in both if poses is not None))
+    with pytest.raises(InputError, match="several robots"):
+        replay(log, MISSION, FIRST)
+    assert replay(log, MISSION, Placing(align="first", robot="r2")).placed.source.robot == "r2"
+
+
+def test_a_time_offset_moves_the_run_and_is_told() -> None:
+    track = logged(driven(MISSION))
+    found = replay(log_of(track), MISSION, Placing(align="first", time_offset_s=-2.5))
+    assert found.run.poses.ns[0] == track.ns[0] - 2_500_000_000
+    assert "times -2.500 s" in as_text(found)
+
+
+def test_a_halt_too_short_for_a_scan_is_none() -> None:
+    drive = driven(MISSION)
+    rows = np.array(drive.rows)
+    halt = drive.halts[4]
+    kept = (rows[:, 0] <= halt.begin_s + 5) | (rows[:, 0] > halt.end_s)
+    rows = rows[kept]
+    rows[:, 0] = np.arange(len(rows)) / 10  # nine seconds of the scan never were
+    track = Track.of(rows[:, 0] * 1e9, rows[:, 1:3], rows[:, 3])
+    found = replay(log_of(track), MISSION, FIRST)
+    assert found.comparison.stops[4].outcome == "failed"
+    assert "of 14.0 s" in found.comparison.stops[4].reason
+
+
+def test_time_lost_is_found_where_it_was() -> None:
+    drive = driven(MISSION, Odd(extra_before=frozenset({5})))
+    found = replay(log_of(logged(drive)), MISSION, FIRST)
+    stood = next(halt for halt in drive.halts if halt.stop is None)
+    worst = lost_times(found)[0]
+    assert worst.where.endswith("at no stop")
+    assert worst.seconds == pytest.approx(stood.end_s - stood.begin_s, abs=0.5)
+
+
+def test_text_json_and_csv_tell_the_same() -> None:
+    drive = driven(MISSION, Odd(skipped=frozenset({2}), extra_before=frozenset({4}), beside_m=0.02))
+    found = replay(log_of(logged(drive)), MISSION, FIRST)
+    told = json.loads(json.dumps(as_json(found)))
+    rows = list(csv.DictReader(io.StringIO(as_csv(found).decode())))
+    text = as_text(found)
+    for stop, row in zip(told["run"]["stops"], rows, strict=True):
+        assert row["stop"] == stop["stop"]
+        assert row["outcome"] == stop["outcome"]
+        if stop["deviation_m"] is not None:
+            assert float(row["deviation_m"]) == pytest.approx(stop["deviation_m"], abs=1e-4)
+            assert f"{1000 * stop['along_m']:+.1f}" in text
+    assert told["verdict"] in text
+    assert [halt["how"] for halt in told["halts"]].count("extra") == 1
+
+
+def test_the_command_reads_a_bag_and_writes_table_and_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    messages = Messages(ros2=True)
+    drive = driven(MISSION, Odd(beside_m=0.3))
+    track = logged(drive)
+    rows = [
+        ("/odom", "nav_msgs/msg/Odometry", ns, messages.odometry(ns, (x, y, heading)))
+        for ns, (x, y), heading in zip(
+            track.ns.tolist(), track.xy.tolist(), track.heading.tolist(), strict=True
+        )
+    ]
+    bag = write_bag(tmp_path / "field.mcap", rows)
+    plan = tmp_path / "mission.json"
+    write(MISSION, plan)
+    given = [str(bag), "--mission", str(plan), "--align", "first", "--json"]
+    files = ["--csv", str(tmp_path / "stops.csv"), "-o", str(tmp_path / "replay.rrd")]
+    assert main(["replay", *given, *files]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert told["answer"] == "no"
+    assert told["run"]["stops"][0]["deviation_m"] == pytest.approx(offset_of(drive, MISSION, 0), abs=1e-6)
+    assert len((tmp_path / "stops.csv").read_text().splitlines()) == 1 + len(MISSION.stops)
+    from recordings.review import review
+
+    (run,) = review(tmp_path / "replay.rrd").runs
+    assert run.ended == "Finished"
+    assert len(run.unconfirmed) == len(MISSION.stops)
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (["--map", "1,2"], "--map 1,2"),
+        (["--map", "1,2,nan"], "--map 1,2,nan"),
+        (["--align", "best"], "--align best"),
+        (["--map", "1,2,3", "--align", "first"], "one of them"),
+        (["--time-offset", "inf"], "--time-offset"),
+        (["--stamps", "mine"], "--stamps mine"),
+        (["--poses", "/nothing", "--align", "first"], "--poses /nothing"),
+        ([], "--align first"),
+    ],
+)
+def test_bad_options_are_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], words: str
+) -> None:
+    path, plan = tmp_path / "a.csv", tmp_path / "mission.json"
+    path.write_text("time,x,y\n0,0,0\n1,0,0\n")
+    write(MISSION, plan)
+    assert main(["replay", str(path), "--mission", str(plan), *options]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
