@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import signal
 import sys
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 from mission.errors import MissingExtra, StopgoError
 from mission.process import PIPE_CLOSED, Signals, drop_output, have_output, reader_is_gone
@@ -87,11 +88,17 @@ def build_app() -> typer.Typer:
     return app
 
 
-def _run(arguments: list[str]) -> int:
-    """The command's own exit code, if it does not raise."""
+@cache
+def front_door() -> Any:
+    """The same, ready to run; made once, however many commands a process runs."""
     import typer
 
-    command = typer.main.get_command(build_app())
+    return typer.main.get_command(build_app())
+
+
+def _run(arguments: list[str]) -> int:
+    """The command's own exit code, if it does not raise."""
+    command = front_door()
     with command.make_context("stopgo", list(arguments) or ["--help"]) as context:
         result = command.invoke(context)
     return result if isinstance(result, int) else 0

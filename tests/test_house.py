@@ -10,9 +10,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-import typer
 
-from mission.__main__ import build_app
+from mission.__main__ import front_door, main
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("mission", "planner", "bridge", "recordings")
@@ -33,14 +32,18 @@ MODULES = modules()
 
 
 @cache
+def tree_of(name: str) -> ast.Module:
+    return ast.parse(MODULES[name].read_text(encoding="utf-8"))
+
+
+@cache
 def imported(name: str) -> tuple[str, ...]:
     """Dotted names of our modules that a module imports, wherever in it."""
     return tuple(_imported(name))
 
 
 def _imported(name: str) -> Iterator[str]:
-    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
+    for node in ast.walk(tree_of(name)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name.split(".")[0] in FOLDERS)
         elif isinstance(node, ast.ImportFrom):
@@ -210,7 +213,7 @@ def test_what_a_run_is_knows_no_clock_no_disk_and_no_line(name: str) -> None:
         "time",
         "zenoh",
     }
-    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
+    tree = tree_of(name)
     named = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     named |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     assert not {one.partition(".")[0] for one in named} & outer
@@ -234,19 +237,18 @@ def test_the_front_door_opens_without_slow_libraries() -> None:
 
 
 def test_every_module_says_what_it_is_for() -> None:
-    for name, path in MODULES.items():
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        assert ast.get_docstring(tree), f"{name} has no first sentence"
+    for name in MODULES:
+        assert ast.get_docstring(tree_of(name)), f"{name} has no first sentence"
 
 
 def commands() -> list[str]:
-    app = typer.main.get_command(build_app())
-    return sorted(getattr(app, "commands", {}))
+    return sorted(front_door().commands)
 
 
 @pytest.mark.parametrize("command", commands())
-def test_every_command_has_help_with_an_example(command: str) -> None:
-    text = run(sys.executable, "-m", "mission", command, "--help")
+def test_every_command_has_help_with_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--help"]) == 0
+    text = capsys.readouterr().out
     assert "Example" in text, f"stopgo {command} --help shows no example"
     assert f"stopgo {command}" in text
 

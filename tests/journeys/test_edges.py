@@ -7,9 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import typer
 
-from mission.__main__ import build_app, main
+from mission.__main__ import front_door, main
 from mission.files.mission_json import write
 from tests.mission.worlds import square_tour
 
@@ -87,7 +86,7 @@ def test_what_cannot_be_written_is_one_line(
 
 
 def names() -> list[str]:
-    return sorted(getattr(typer.main.get_command(build_app()), "commands", {}))
+    return sorted(front_door().commands)
 
 
 @pytest.mark.parametrize("command", [name for name in names() if name not in ("demo", "status")])
