@@ -78,6 +78,10 @@ class _Board:
         bare = cover.worth * (self._covered == 0)[None, :]
         self._adds = np.ascontiguousarray((cover.sees @ bare.T).toarray().T)
         """(demands, rows)."""
+        self._losses: dict[int, tuple[bytes, IntArray]] = {}
+        """By the row that leaves: which columns only it sees, and their worth to each demand."""
+        self._regains: dict[int, tuple[bytes, IntArray, IntArray]] = {}
+        """By the row that leaves: of which columns and demands; cells of (demands, rows), and their sums."""
 
     @property
     def missing(self) -> IntArray:
@@ -104,12 +108,32 @@ class _Board:
         """What is missing in all, and how much of the whole is covered (rows,), by who comes for `out`."""
         columns = self._cover.columns_of(out)
         alone = columns[self._covered[columns] == 1]
-        left = self._reached - self._worth_of(alone)
+        left = self._reached - self._lost_with(out, alone)
         asked = self._cover.needed - left
-        open_demands = np.union1d([0], np.flatnonzero(asked > 0))
-        adds = self._adds[open_demands] + self._regained(alone, open_demands)
+        is_open = asked > 0
+        is_open[0] = True
+        open_demands = np.flatnonzero(is_open)
+        adds = self._adds[open_demands]
+        cells, sums = self._regains_after(out, alone, open_demands)
+        adds.reshape(-1)[cells] += sums
         short = np.maximum(0, asked[open_demands][:, None] - adds)
         return self._weight[open_demands] @ short, left[0] + adds[0]
+
+    def _lost_with(self, out: int, alone: IntArray) -> IntArray:
+        """What the columns that only a row sees are worth to each demand; anew when they change."""
+        known = alone.tobytes()
+        if out not in self._losses or self._losses[out][0] != known:
+            self._losses[out] = known, self._worth_of(alone)
+        return self._losses[out][1]
+
+    def _regains_after(self, out: int, alone: IntArray, demands: IntArray) -> tuple[IntArray, IntArray]:
+        """What each row would see again: worked out anew where a swap has changed something nearby."""
+        known = alone.tobytes() + demands.tobytes()
+        if out not in self._regains or self._regains[out][0] != known:
+            regained = self._regained(alone, demands).ravel()
+            cells = np.flatnonzero(regained)
+            self._regains[out] = known, cells, regained[cells]
+        return self._regains[out][1:]
 
     def _worth_of(self, columns: IntArray) -> IntArray:
         """What columns are worth to each demand (demands,)."""
