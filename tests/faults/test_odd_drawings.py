@@ -64,8 +64,8 @@ def odd_drawing(rng: random.Random) -> Drawing:
 
 @pytest.mark.parametrize("strategy", ["grid", "triangulation"])
 def test_an_odd_drawing_is_planned_or_refused_in_one_line(strategy: str) -> None:
-    planned = 0
-    for seed in range(size(short=60, full=5000)):
+    planned, trials = 0, size(short=36, full=5000)
+    for seed in range(trials):
         drawing = odd_drawing(random.Random(seed))
         try:
             floor = floor_in(drawing, source=Path("odd.dxf"), digest="0" * 64, d_dis=0.05)
@@ -73,4 +73,4 @@ def test_an_odd_drawing_is_planned_or_refused_in_one_line(strategy: str) -> None
             planned += 1
         except StopgoError as error:
             assert "\n" not in str(error), seed
-    assert planned > 20
+    assert planned > trials // 3

@@ -37,19 +37,24 @@ def components(path: Path) -> dict[str, tuple[set[str], set[str]]]:
     """For each entity, its static components and those with times."""
     found: dict[str, tuple[set[str], set[str]]] = {}
     for chunk in chunks(path):
-        names = set(chunk.to_record_batch().schema.names) - set(chunk.timeline_names)
-        names = {name for name in names if not name.startswith("rerun.")}
-        found.setdefault(str(chunk.entity_path), (set(), set()))[not chunk.is_static].update(names)
+        found.setdefault(str(chunk.entity_path), (set(), set()))[not chunk.is_static].update(names_of(chunk))
     return found
+
+
+def names_of(chunk: Any) -> set[str]:
+    """The components that a chunk has cells of."""
+    names = set(chunk.to_record_batch().schema.names) - set(chunk.timeline_names)
+    return {name for name in names if not name.startswith("rerun.")}
 
 
 def everything(path: Path) -> list[str]:
     """Every cell of the recording as text, in an order of its own."""
-    found = []
-    for entity, names in components(path).items():
-        for component in sorted(set().union(*names)):
-            found += [f"{entity} {component} {cell}" for cell in cells(path, entity, component)]
-    return sorted(found)
+    return sorted(
+        f"{chunk.entity_path} {component} {cell}"
+        for chunk in chunks(path)
+        for component in names_of(chunk)
+        for cell in _cells(chunk, component)
+    )
 
 
 def _cells(chunk: Any, component: str) -> list[Cell]:

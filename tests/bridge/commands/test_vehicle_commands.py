@@ -1,4 +1,4 @@
-"""The whole way as a person goes it: commands in processes of their own, one of them killed."""
+"""The whole way as a person goes it; a vehicle and who watches it in processes of their own, one killed."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from mission.events import Finished, Scanned, Unconfirmed
 from mission.files.mission_json import write
 from recordings.carried.reading import read_recording
 from tests.bridge.mavlink.scripted import free_udp_port
+from tests.called import stopgo
 from tests.mission.mavlink.following.worlds import tour
 
 STOPGO = (sys.executable, "-m", "mission")
@@ -41,14 +42,14 @@ class Vehicle:
         assert self.process.stderr is not None
         assert "ready" in self.process.stderr.readline()
 
+    def words(self, verb: str, *options: str) -> list[str]:
+        return [verb, *options, "--mavlink", self.url, "--vehicle", "1", "--state", str(self.state)]
+
     def command(self, verb: str, *options: str) -> list[str]:
-        way = ["--mavlink", self.url, "--vehicle", "1", "--state", str(self.state)]
-        return [*STOPGO, verb, *options, *way]
+        return [*STOPGO, *self.words(verb, *options)]
 
     def run(self, verb: str, *options: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            self.command(verb, *options), capture_output=True, text=True, timeout=120, check=False
-        )
+        return stopgo(*self.words(verb, *options))
 
 
 @pytest.fixture
@@ -123,8 +124,5 @@ def test_options_of_the_other_way_are_refused(vehicle: Vehicle) -> None:
 
 
 def test_an_unsigned_way_out_of_this_machine_is_refused(tmp_path: Path) -> None:
-    told = subprocess.run(
-        [*STOPGO, "start", "--mavlink", "udpout:192.0.2.1:14550", "--state", str(tmp_path)],
-        capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
+    told = stopgo("start", "--mavlink", "udpout:192.0.2.1:14550", "--state", str(tmp_path))
     assert told.returncode == 2 and "--signing-key" in told.stderr

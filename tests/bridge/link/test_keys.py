@@ -23,9 +23,9 @@ from bridge.station.station import Station, connect
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import PoseReport, Scanned
 from mission.run.orders import Order
-from tests.bridge.link.test_zenoh import stopgo
 from tests.bridge.station.test_fleet import router
 from tests.bridge.world import corridor
+from tests.called import stopgo
 
 NOW = now_utc()
 

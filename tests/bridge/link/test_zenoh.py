@@ -19,11 +19,7 @@ from mission.document import sealed
 from mission.errors import InputError, RobotUnreachable
 from mission.events import Finished, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor
-
-
-def stopgo(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "mission", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+from tests.called import stopgo
 
 
 def test_a_mission_is_pushed_started_and_followed_to_its_end(tmp_path: Path) -> None:

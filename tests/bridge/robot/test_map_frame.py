@@ -18,8 +18,8 @@ from bridge.robot.map_frame import OnMap, turned, turned_back, turned_point
 from bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from mission.document import Frame, Transform, sealed
 from mission.events import Pose
-from tests.bridge.link.test_zenoh import stopgo
 from tests.bridge.world import EXACT, Field, corridor
+from tests.called import stopgo
 
 QUARTER = Transform(x=10.0, y=20.0, heading=math.pi / 2)
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from bridge.commands.spawn import end_robot, free_port, start_robot
 from bridge.station.station import connect
 from mission.events import Finished, PoseReport, Scanned
-from tests.bridge.link.test_zenoh import stopgo
 from tests.bridge.world import corridor
+from tests.called import stopgo
 
 ROOT = Path(__file__).parents[3]
 

@@ -18,9 +18,9 @@ from bridge.mavlink.line.peer import reached
 from bridge.mavlink.line.url import Url
 from bridge.station.station import connect
 from mission.events import Scanned
-from tests.bridge.link.test_zenoh import stopgo
 from tests.bridge.mavlink.driving.world import Operator, is_state, site_mission, until
 from tests.bridge.mavlink.scripted import free_udp_port
+from tests.called import stopgo
 
 
 @contextmanager

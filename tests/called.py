@@ -1,0 +1,17 @@
+"""Commands called in this process, told of as if they had run in one of their own."""
+
+from __future__ import annotations
+
+import io
+from contextlib import redirect_stderr, redirect_stdout
+from subprocess import CompletedProcess
+
+from mission.__main__ import main
+
+
+def stopgo(*arguments: str) -> CompletedProcess[str]:
+    """What a command printed, and its exit code; for all but signals, killed processes and imports."""
+    out, error = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(error):
+        code = main(list(arguments))
+    return CompletedProcess(["stopgo", *arguments], code, out.getvalue(), error.getvalue())
