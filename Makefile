@@ -7,11 +7,11 @@ STAMP := $(VENV)/.installed
 # Every test that starts a process would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test lint types faults benchmarks clean
+.PHONY: demo test lint types faults benchmarks wheels clean
 
-$(STAMP): pyproject.toml constraints.txt
+$(STAMP): pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	PIP_CONSTRAINT=$(CURDIR)/constraints.txt $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
+	PIP_CONSTRAINT="$(CURDIR)/constraints.txt" $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
 	touch $(STAMP)
 
 demo: $(STAMP)
@@ -35,5 +35,9 @@ faults: $(STAMP)
 benchmarks: $(STAMP)
 	for name in paper shares visibility tours growth bridge fleet mavlink; do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
+# Builds what is published, and installs it with each extra in an environment of its own.
+wheels: $(STAMP)
+	$(BIN)/python -m tests.wheels $(PYTHONS)
+
 clean:
-	rm -rf $(VENV) recordings/demo .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) build dist *.egg-info recordings/demo .pytest_cache .mypy_cache .ruff_cache

@@ -28,6 +28,17 @@ if TYPE_CHECKING:
     from mission.settings import Settings
 
 FOLDERS = ("mission", "planner", "bridge", "recordings")
+_HERE = Path(__file__).resolve().parent
+HOME = _HERE / "_stopgo" if (_HERE / "_stopgo").is_dir() else _HERE
+"""Where the four folders are: below `_stopgo` where stopgo is installed, else beside this file."""
+
+
+def _own_folders_first() -> None:
+    """Let our four folders be found before others of the same name, such as those on PYTHONPATH."""
+    sys.path[:] = [str(HOME), *(place for place in sys.path if place != str(HOME))]
+
+
+_own_folders_first()
 
 
 def settings(parameters: str | Path | None = None, **changes: Any) -> Settings:
@@ -196,17 +207,16 @@ def _too_old() -> str:
 
 
 def _shadow() -> str:
-    """Which of our folders another package of the same name stands in front of, and where; else empty."""
+    """Which of our folders is missing, or was loaded from elsewhere before; else empty."""
     from importlib.util import find_spec
 
-    home = Path(__file__).resolve().parent
     for name in FOLDERS:
         spec = find_spec(name)
         found = None if spec is None or spec.origin is None else Path(spec.origin).resolve().parent
-        if found != home / name:
+        if found != HOME / name:
             where = "is missing" if found is None else f"is taken from {found}"
             return (
-                f"the package '{name}' {where}, not from {home / name}: another package has this name; "
+                f"the package '{name}' {where}, not from {HOME / name}: another package has this name; "
                 "take it out of PYTHONPATH, or install stopgo in an environment of its own"
             )
     return ""
@@ -224,3 +234,7 @@ __all__ = [
     "settings",
     "write_mission",
 ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

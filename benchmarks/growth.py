@@ -67,7 +67,7 @@ def whole_command(floor: Path, *, runs: int = 5) -> float:
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(runs + 1):
             begin = time.perf_counter()
-            command = [sys.executable, "-m", "mission", "plan", str(floor), "-o", folder]
+            command = [sys.executable, "-m", "stopgo", "plan", str(floor), "-o", folder]
             subprocess.run(command, cwd=ROOT, capture_output=True, check=True)
             times.append(time.perf_counter() - begin)
     return statistics.median(times[1:])

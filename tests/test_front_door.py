@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import os
 import re
 import subprocess
 import sys
@@ -59,20 +58,3 @@ def test_importing_it_loads_nothing_slow() -> None:
     code = f"import sys, stopgo; print(sorted({slow} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
-
-
-def test_a_package_of_the_same_name_in_front_is_told_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "mission").mkdir()
-    (tmp_path / "mission" / "__init__.py").write_text("")
-    code = "import sys, stopgo; sys.exit(stopgo.main())"
-    done = subprocess.run(
-        [sys.executable, "-c", code, "--help"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert f"'mission' is taken from {tmp_path / 'mission'}" in done.stderr

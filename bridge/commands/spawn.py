@@ -55,7 +55,7 @@ def start_robot(
 
 def start(*arguments: str, called: str) -> subprocess.Popen[str]:
     """The process of a stopgo command that says when it is ready; raises as `start_robot` does."""
-    command = [sys.executable, "-m", "mission", *arguments]
+    command = [sys.executable, "-m", "stopgo", *arguments]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     lines: list[str] = []
     ready = threading.Event()

@@ -5,13 +5,13 @@ One SQLite file. What belongs together is written in one transaction and is on d
 
 from __future__ import annotations
 
-import fcntl
 import os
 import sqlite3
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import IO, TypeVar
 
 import msgspec
@@ -257,11 +257,12 @@ def shared_journal(directory: Path, robot: str) -> Iterator[Journal]:
     Whoever writes from what was read does both in one `transaction`.
     """
     with _lock_file(directory, "lock") as lock, _lock_file(directory, "opening") as opening:
-        _take(lock.fileno(), directory, fcntl.LOCK_SH)
+        _take(lock.fileno(), directory, shared=True)
+        locks = _locks(directory)
         # Two at once cannot make the tables, or change how the file is written.
-        fcntl.flock(opening.fileno(), fcntl.LOCK_EX)
+        locks.flock(opening.fileno(), locks.LOCK_EX)
         with _opened(directory, robot) as journal:
-            fcntl.flock(opening.fileno(), fcntl.LOCK_UN)
+            locks.flock(opening.fileno(), locks.LOCK_UN)
             yield journal
 
 
@@ -302,14 +303,27 @@ def _connect(path: Path) -> sqlite3.Connection:
     return connection
 
 
-def _take(lock: int, directory: Path, how: int = fcntl.LOCK_EX) -> None:
+def _take(lock: int, directory: Path, *, shared: bool = False) -> None:
+    locks = _locks(directory)
     try:
-        fcntl.flock(lock, how | fcntl.LOCK_NB)
+        locks.flock(lock, (locks.LOCK_SH if shared else locks.LOCK_EX) | locks.LOCK_NB)
     except BlockingIOError:
         holder = os.pread(lock, 32, 0).decode(errors="replace").strip() or "unknown"
         raise InputError(
             f"--state {directory}: in use by another robot process (pid {holder}); give each its own"
         ) from None
+
+
+def _locks(directory: Path) -> ModuleType:
+    """The system's file locks, which keep two processes from one journal."""
+    try:
+        import fcntl
+    except ModuleNotFoundError:
+        raise InputError(
+            f"--state {directory}: a robot's journal is kept on Linux and macOS only; here you can plan, and "
+            "command and watch robots that run elsewhere"
+        ) from None
+    return fcntl
 
 
 def _claim(journal: Journal, directory: Path, robot: str) -> None:
