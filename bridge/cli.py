@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from bridge.commands.doctor import doctor
 from bridge.commands.key_commands import key_commands
 from bridge.commands.mission_commands import clear, fetch_mission, push
 from bridge.commands.order_commands import add_orders
@@ -30,6 +31,7 @@ def add_commands(app: typer.Typer) -> None:
     app.command()(push)
     app.command("fetch-mission")(fetch_mission)
     app.command()(clear)
+    app.command()(doctor)
     add_orders(app)
     app.command()(watch_by(recording))
     app.add_typer(simulate_commands(), name="simulate")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import sys
 from functools import cache
@@ -19,6 +20,8 @@ FOLDERS = ("planner.cli", "bridge.cli", "recordings.cli", "mission.cli")
 """Each folder's commands; each module has `add_commands(app)` and imports slow libraries where used."""
 
 INTERRUPTED = 130
+COMPLETING = "_STOPGO_COMPLETE"
+"""Set by the shell's completion that `--install-completion` sets up."""
 
 EXTRAS = {
     "shapely": "plan", "scipy": "plan", "networkx": "plan", "ezdxf": "plan", "highspy": "plan",
@@ -67,7 +70,6 @@ def build_app() -> typer.Typer:
     app = typer.Typer(
         name="stopgo",
         help="Plan where a laser scanner must stand, and drive a robot through those stops.",
-        add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
         context_settings={"help_option_names": ["-h", "--help"]},
@@ -99,6 +101,8 @@ def front_door() -> Any:
 def _run(arguments: list[str]) -> int:
     """The command's own exit code, if it does not raise."""
     command = front_door()
+    if COMPLETING in os.environ:  # a shell asks what the words typed so far may become
+        command.main(list(arguments), prog_name="stopgo")
     with command.make_context("stopgo", list(arguments) or ["--help"]) as context:
         result = command.invoke(context)
     return result if isinstance(result, int) else 0

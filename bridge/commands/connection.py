@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from bridge.profile import counting, read_profile
 from mission.errors import InputError
 
 if TYPE_CHECKING:
@@ -133,7 +134,10 @@ def connection_of(
     if mavlink is None:
         alone(given, "--robot", *VEHICLES)
         if robot is None:
-            raise InputError("say which robot: --robot NAME, or --mavlink URL for a vehicle")
+            raise InputError(
+                "say which robot: --robot NAME, or --mavlink URL for a vehicle "
+                "(or preset it in stopgo.toml or as STOPGO_ROBOT)"
+            )
         return Connection(robot, connect, site, who, timeout, insecure, keys, given=given)
     alone(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
     return Connection(
@@ -149,6 +153,19 @@ def given_in(context: typer.Context) -> GivenOptions:
     return frozenset(
         option for parameter in context.command.params if parameter.name in typed for option in parameter.opts
     )
+
+
+def with_presets(given: GivenOptions, values: dict[str, Any]) -> dict[str, Any]:
+    """The values of options, with what is preset in place of those that were not given."""
+    presets = counting(read_profile(), {option.removeprefix("--") for option in given})
+    told: dict[str, Any] = {PARAMETERS.get(name, name): preset.value for name, preset in presets.items()}
+    if "keys" in told:
+        told["keys"] = Path(told["keys"])
+    return {name: told.get(name, value) for name, value in values.items()}
+
+
+PARAMETERS = {"as": "who"}
+"""What options are called inside, where it is otherwise."""
 
 
 def alone(given: GivenOptions, what: str, *options: str) -> None:
@@ -177,8 +194,9 @@ def _with_connection(without: tuple[str, ...], command: CommandBody) -> CommandB
     )
 
     def called(context: typer.Context, **values: Any) -> Any:
-        chosen = {option.name: values.pop(option.name) for option in options}
-        return command(connection_of(given_in(context), **chosen), **values)
+        given = given_in(context)
+        chosen = with_presets(given, {option.name: values.pop(option.name) for option in options})
+        return command(connection_of(given, **chosen), **values)
 
     context = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context)
     everything = [context, *options, *own]

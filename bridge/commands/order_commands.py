@@ -25,6 +25,7 @@ from bridge.commands.connection import (
     given_in,
     in_time,
     with_connection,
+    with_presets,
 )
 from bridge.console import print_json, refusals_in, tell
 
@@ -125,6 +126,7 @@ def status(
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
     keys: KeyFolder = None,
+    all_: Annotated[bool, typer.Option("--all", help="All robots, though one is preset.")] = False,
     json_: Json = False,
 ) -> None:
     """Tell what the robot is doing, or what all robots of the site are.
@@ -136,14 +138,22 @@ def status(
     from bridge.station.station import fleet
 
     given = given_in(context)
-    if robot is None and mavlink is None:
+    told = with_presets(given, {
+        "robot": robot, "mavlink": mavlink, "connect": connect, "site": site, "keys": keys,
+    })  # fmt: skip
+    if all_:
+        alone(given, "--all", "--robot", "--mavlink")
+        told |= {"robot": None, "mavlink": None}
+    if told["robot"] is None and told["mavlink"] is None:
         alone(given, "all robots of a site", *VEHICLES)
-        reports = fleet(connect, site=site, timeout_s=timeout, insecure=insecure, keys=keys)
+        reports = fleet(
+            told["connect"], site=told["site"], timeout_s=timeout, insecure=insecure, keys=told["keys"]
+        )
         as_json: dict[str, Any] = {"robots": [status_json(report) for report in reports]}
     else:
         connection = connection_of(
-            given, robot=robot, connect=connect, site=site, mavlink=mavlink, vehicle=vehicle,
-            signing_key=signing_key, state=state, timeout=timeout, insecure=insecure, keys=keys,
+            given, vehicle=vehicle, signing_key=signing_key, state=state, timeout=timeout, insecure=insecure,
+            **told,
         )  # fmt: skip
         with in_time(connection.to_look()) as station:
             reports = (station.status(),)

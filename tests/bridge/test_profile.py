@@ -1,0 +1,127 @@
+"""Presets: an option counts most, then the environment, the folder's file, the user's file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from bridge.commands.connection import with_presets
+from bridge.commands.doctor import robot_checks
+from bridge.profile import NAMES, read_profile
+from mission.__main__ import main
+from mission.errors import InputError
+from tests.bridge.world import Field
+
+NOTHING = {
+    "robot": None,
+    "mavlink": None,
+    "connect": "tcp/127.0.0.1:7447",
+    "site": None,
+    "keys": None,
+    "who": None,
+}
+
+
+@pytest.fixture(autouse=True)
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder, and a user's folder for settings, both empty."""
+    for name in NAMES:
+        monkeypatch.delenv(f"STOPGO_{name.upper()}", raising=False)
+    (tmp_path / "user" / "stopgo").mkdir(parents=True)
+    (tmp_path / "work").mkdir()
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "user"))
+    monkeypatch.chdir(tmp_path / "work")
+    return tmp_path
+
+
+def test_the_nearer_source_counts_for_each_name(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (place / "user" / "stopgo" / "stopgo.toml").write_text('robot = "r1"\nsite = "yard"\nkeys = "mine"\n')
+    (place / "work" / "stopgo.toml").write_text('robot = "r2"\nconnect = "tcp/10.0.0.2:7447"\n')
+    monkeypatch.setenv("STOPGO_ROBOT", "r3")
+    profile = read_profile()
+    assert {name: preset.value for name, preset in profile.items()} == {
+        "robot": "r3",
+        "connect": "tcp/10.0.0.2:7447",
+        "site": "yard",
+        "keys": str(place / "user" / "stopgo" / "mine"),
+    }
+    assert profile["robot"].source == "environment STOPGO_ROBOT"
+    assert profile["connect"].source == "stopgo.toml"
+    told = with_presets(frozenset({"--connect"}), dict(NOTHING))
+    assert told["robot"] == "r3"
+    assert told["connect"] == NOTHING["connect"]  # as it was typed
+    assert told["keys"] == place / "user" / "stopgo" / "mine"
+    (place / "work" / "stopgo.toml").unlink()
+    monkeypatch.delenv("STOPGO_ROBOT")
+    assert read_profile()["robot"].value == "r1"
+
+
+def test_an_option_takes_the_place_of_robot_and_vehicle_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STOPGO_MAVLINK", "udpin:127.0.0.1:14550")
+    assert with_presets(frozenset({"--robot"}), {**NOTHING, "robot": "r1"})["mavlink"] is None
+    Path("stopgo.toml").write_text('robot = "r2"\n')
+    told = with_presets(frozenset(), dict(NOTHING))
+    assert (told["robot"], told["mavlink"]) == (None, "udpin:127.0.0.1:14550")
+    monkeypatch.setenv("STOPGO_ROBOT", "r3")
+    with pytest.raises(InputError, match="robot and mavlink are both preset"):
+        with_presets(frozenset(), dict(NOTHING))
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ('colour = "red"', "unknown key colour; known: robot, mavlink"),
+        ("robot = 3", 'robot = 3: write a text in quotes, such as robot = "r1"'),
+        ('robot = ""', "robot = ''"),
+        ("robot", "not a TOML file"),
+        ("[robot]", "robot = {}"),
+    ],
+)
+def test_a_bad_file_is_told_in_one_line(content: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("stopgo.toml").write_text(content)
+    assert main(["pause"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"stopgo: stopgo.toml: {said}")
+    assert told.count("\n") == 1
+    assert main(["doctor"]) == 1
+    assert "WRONG  profile  stopgo.toml: " in capsys.readouterr().out
+
+
+def test_an_order_needs_no_options(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("stopgo.toml").write_text('robot = "r7"\nconnect = "tcp/127.0.0.1:1"\n')
+    assert main(["pause", "--timeout", "0.1"]) == 2
+    assert "tcp/127.0.0.1:1: robot r7 did not show itself" in capsys.readouterr().err
+
+
+def test_doctor_tells_of_everything_and_ends_with_1_if_something_is_wrong(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["doctor"]) == 0
+    monkeypatch.setenv("STOPGO_ROBOT", "r1")
+    Path("stopgo.toml").write_text('connect = "tcp/127.0.0.1:1"\nkeys = "none"\n')
+    capsys.readouterr()
+    assert main(["doctor", "--timeout", "0.1", "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    wrong = {check["name"]: check["told"] for check in told["checks"] if not check["ok"]}
+    assert not told["ok"]
+    assert set(wrong) == {"keys", "port", "robot"}
+    said = [check["told"] for check in told["checks"] if check["name"] == "profile"]
+    assert "robot = r1, from environment STOPGO_ROBOT" in said
+    assert "connect = tcp/127.0.0.1:1, from stopgo.toml" in said
+
+
+def test_doctor_compares_the_clocks() -> None:
+    info = Field().station().info()
+    right = {check.name: check for check in robot_checks(info, info.clock_ns)}
+    assert all(check.ok for check in right.values())
+    late = {check.name: check for check in robot_checks(info, info.clock_ns + 3_000_000_000)}
+    assert (late["clock"].ok, late["clock"].told) == (False, "the robot's clock is -3.0 s from this one")
+    assert "NTP" in late["clock"].do
+
+
+def test_status_can_ask_all_though_one_is_preset(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("stopgo.toml").write_text('robot = "r7"\nconnect = "tcp/127.0.0.1:1"\n')
+    assert main(["status", "--all", "--robot", "r1"]) == 2
+    assert "--robot has no meaning with --all" in capsys.readouterr().err
