@@ -29,8 +29,19 @@ READERS: tuple[Reader, ...] = (
         module="planner.floors.dxf",
         takes=frozenset({"layers"}),
     ),
+    Reader(
+        kind="building model",
+        suffixes=(".ifc", ".ifczip"),
+        holds=lambda data: b"ISO-10303-21" in data[:1024] or _is_zipped_model(data),
+        module="planner.floors.ifc",
+        takes=frozenset({"storey", "level", "scan_height", "robot_height"}),
+    ),
 )
 """Every kind of file that floors are read from."""
+
+
+def _is_zipped_model(data: bytes) -> bool:
+    return data.startswith(b"PK\x03\x04") and b".ifc" in data[:1024].lower()
 
 
 def read_floor(path: Path, options: FloorOptions | None = None) -> FloorPlan:

@@ -1,0 +1,135 @@
+"""When an IFC file says that its products are built: tasks of both schemas, days and phases in properties."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from typing import Any
+
+import ifcopenshell
+import ifcopenshell.util.element
+
+from planner.floors.ifc.model import Task
+
+REMOVING = {"DEMOLITION", "DISMANTLE", "REMOVAL"}
+DATES = re.compile(
+    r"^(?P<what>.*?)(?P<end>start|begin|finish|end|complet\w*|install\w*|built|date|fertig\w*|einbau\w*)",
+    re.IGNORECASE,
+)
+FINISH_NAMES = re.compile(
+    r"(finish|end|complet|install|built|as.?built|fertig|einbau|gereed).*(date|datum|time)?$|"
+    r"^(construction|installation|build).?date$",
+    re.IGNORECASE,
+)
+START_NAMES = re.compile(r"(start|begin|anfang).*(date|datum|time)?$", re.IGNORECASE)
+PHASE_NAMES = re.compile(
+    r"^(phase|phase created|construction.?phase|bauphase|phase de construction)$", re.IGNORECASE
+)
+DAY = re.compile(r"^\d{4}-\d{2}-\d{2}")
+
+
+def tasks_by_product(model: ifcopenshell.file) -> dict[int, tuple[Task, ...]]:
+    """Tasks of each product by its number in the file; what is assembled of parts hands its tasks to them."""
+    found: dict[int, list[Task]] = defaultdict(list)
+    for entity, task in (*_of_tasks(model), *_of_properties(model)):
+        for part in (entity, *ifcopenshell.util.element.get_decomposition(entity)):
+            found[part.id()].append(task)
+    return {key: tuple(sorted(set(tasks), key=_order)) for key, tasks in found.items()}
+
+
+def _order(task: Task) -> tuple:
+    return (task.finish or "", task.start or "", task.name, task.source)
+
+
+def _of_tasks(model: ifcopenshell.file) -> Iterator[tuple[Any, Task]]:
+    for task in model.by_type("IfcTask"):
+        told = _dated_2x3(task) if model.schema == "IFC2X3" else _dated(task)
+        if told is None:
+            continue
+        for relation in getattr(task, "OperatesOn", None) or ():
+            yield from ((item, told) for item in relation.RelatedObjects if item.is_a("IfcProduct"))
+        for relation in getattr(task, "HasAssignments", None) or ():
+            product = getattr(relation, "RelatingProduct", None)
+            if product is not None and product.is_a("IfcProduct"):
+                yield product, told
+
+
+def _dated(task: Any) -> Task | None:
+    """IfcTaskTime: what was done before what is planned."""
+    time = task.TaskTime
+    if time is None:
+        return None
+    start = _day(time.ActualStart) or _day(time.ScheduleStart) or _day(time.EarlyStart)
+    finish = _day(time.ActualFinish) or _day(time.ScheduleFinish) or _day(time.EarlyFinish)
+    if start is None and finish is None:
+        return None
+    removes = str(task.PredefinedType or "") in REMOVING
+    return Task(task.Name or "", start, finish, removes, "IfcTaskTime")
+
+
+def _dated_2x3(task: Any) -> Task | None:
+    """IfcScheduleTimeControl through IfcRelAssignsTasks."""
+    for relation in getattr(task, "HasAssignments", None) or ():
+        if not relation.is_a("IfcRelAssignsTasks") or relation.TimeForTask is None:
+            continue
+        time = relation.TimeForTask
+        start = _day(time.ActualStart) or _day(time.ScheduleStart)
+        finish = _day(time.ActualFinish) or _day(time.ScheduleFinish)
+        if start or finish:
+            removes = bool(re.search(r"demoli|remov|dismantl", str(task.ObjectType or ""), re.IGNORECASE))
+            return Task(task.Name or "", start, finish, removes, "IfcScheduleTimeControl")
+    return None
+
+
+def _of_properties(model: ifcopenshell.file) -> Iterator[tuple[Any, Task]]:
+    """Products whose own properties hold a day of start or finish."""
+    for relation in model.by_type("IfcRelDefinesByProperties"):
+        properties = relation.RelatingPropertyDefinition
+        if not properties.is_a("IfcPropertySet"):
+            continue
+        start, finish, name = _days_in(properties)
+        if start or finish:
+            for item in relation.RelatedObjects:
+                if item.is_a("IfcProduct"):
+                    yield item, Task(name, start, finish, source=f"property {name}")
+
+
+def _days_in(properties: Any) -> tuple[str | None, str | None, str]:
+    start = finish = None
+    said_by = ""
+    for item in properties.HasProperties or ():
+        if not item.is_a("IfcPropertySingleValue") or item.NominalValue is None:
+            continue
+        day = _day(item.NominalValue.wrappedValue)
+        if day is None:
+            continue
+        if START_NAMES.search(item.Name):
+            start = day
+        elif FINISH_NAMES.search(item.Name):
+            finish = day
+        else:
+            continue
+        said_by = f"{properties.Name}.{item.Name}"
+    return start, finish, said_by
+
+
+def phase_of(entity: Any) -> str | None:
+    """The phase a product's properties name, such as Revit's `Phase Created`; it has no day."""
+    for name, said in ifcopenshell.util.element.get_psets(entity, psets_only=True).items():
+        for key, value in said.items():
+            if PHASE_NAMES.match(key) and isinstance(value, str) and value:
+                return f"{name}.{key} = {value}"
+    return None
+
+
+def _day(value: Any) -> str | None:
+    """The day of an ISO date or of an IFC2x3 date, as YYYY-MM-DD."""
+    if value is None:
+        return None
+    if isinstance(value, str):
+        return value[:10] if DAY.match(value) else None
+    date = getattr(value, "DateComponent", value)
+    if not hasattr(date, "YearComponent"):
+        return None
+    return f"{date.YearComponent:04d}-{date.MonthComponent:02d}-{date.DayComponent:02d}"

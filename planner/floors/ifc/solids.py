@@ -1,0 +1,145 @@
+"""What stands on a floor of a model: the cut at the scanner's height, and what the robot would run into."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import shapely
+
+from planner.floors.ifc.levels import Level
+from planner.floors.ifc.model import Mesh, Model, Product
+from planner.floors.ifc.section import NOTHING, cut, footprint, tidy
+from planner.floors.rings import Region
+
+OFF_LEVEL = 1.37e-3
+"""A cut lies this much above a round height: planes on which things were modelled are not cut along."""
+KERB = 0.1
+"""What is lower than this above the floor is driven over or is the floor's own edge, metres."""
+LAID = 0.01
+"""A beam that hangs less than this below the next floor lies in it, metres."""
+TREADS = (0.15, 2.0)
+"""Heights above the floor between which a stair is in the way."""
+FRAME = 0.1
+"""Gaps up to this width between the parts of a window are closed, metres."""
+LEAST = 4e-4
+"""Square metres below which a piece of a cut is a splinter."""
+AT_SCANNER = {
+    "walls": "walls",
+    "plates": "walls",
+    "coverings": "walls",
+    "footings": "walls",
+    "roofs": "walls",
+    "slabs": "walls",
+    "columns": "columns",
+    "beams": "columns",
+    "members": "columns",
+    "windows": "windows",
+    "other": "other",
+}
+"""The kind of what the scanner's plane cuts, by role."""
+GLASS = ("walls", "plates", "coverings", "other")
+"""Roles that let the laser through where they are drawn transparent."""
+
+
+@dataclass(frozen=True)
+class Heights:
+    """The two maps of a floor: at the scanner, and up to the robot's height."""
+
+    scan: float = 1.3
+    robot: float | None = None
+    """As high as the scanner where it is not told."""
+
+    @property
+    def top(self) -> float:
+        return self.scan if self.robot is None else self.robot
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A product's plan on a floor."""
+
+    product: Product
+    kind: str
+    region: Region
+
+
+def solids_on(level: Level, model: Model, heights: Heights) -> list[Solid]:
+    """Every element of a floor, in the order of the GlobalIds."""
+    plane = level.z + heights.scan + OFF_LEVEL
+    found: list[Solid] = []
+    for product, mesh in model.of_role(*AT_SCANNER, "stairs", "railings"):
+        if product.role == "stairs":
+            found += _stairs(product, mesh, level)
+        elif product.role == "railings":
+            found += _low(product, mesh, level, heights)
+        elif mesh.z[0] < plane < mesh.z[1]:
+            found += _cut(product, mesh, plane)
+        elif product.role in ("beams", "members") and plane <= mesh.z[0] < level.ceiling - LAID:
+            found += _solid(product, "beams", footprint(mesh, *mesh.z))
+        else:
+            found += _low(product, mesh, level, heights)
+    return [*found, *_below_the_cut(found, model, level, heights)]
+
+
+def _solid(product: Product, kind: str, region: Region) -> list[Solid]:
+    parts = [_without_pores(part) for part in shapely.get_parts(region) if part.area > LEAST]
+    return [Solid(product, kind, shapely.MultiPolygon(parts))] if parts else []
+
+
+def _without_pores(part: shapely.Polygon) -> shapely.Polygon:
+    """Without holes that are splinters."""
+    holes = [hole for hole in part.interiors if shapely.Polygon(hole).area > LEAST]
+    return shapely.Polygon(part.exterior, holes)
+
+
+def _cut(product: Product, mesh: Mesh, plane: float) -> list[Solid]:
+    kind = AT_SCANNER[product.role]
+    if product.transparent and product.role in GLASS:
+        kind = "windows"
+    region = cut(mesh, plane)
+    return _solid(product, kind, _filled(region) if kind == "windows" else region)
+
+
+def _filled(region: Region) -> Region:
+    """A window with the gaps between its frames and panes closed."""
+    closed = region.buffer(FRAME / 2, join_style="mitre").buffer(-FRAME / 2, join_style="mitre")
+    return _on_grid(shapely.union_all([region, closed]))
+
+
+def _stairs(product: Product, mesh: Mesh, level: Level) -> list[Solid]:
+    low, high = level.z + TREADS[0], level.z + TREADS[1]
+    if mesh.z[1] <= low or mesh.z[0] >= high:
+        return []
+    return _solid(product, "stairs", footprint(mesh, low, high))
+
+
+def _low(product: Product, mesh: Mesh, level: Level, heights: Heights) -> list[Solid]:
+    """What the scanner looks over, and the robot runs into."""
+    top = max(heights.top, TREADS[1]) if product.role == "railings" else heights.top
+    low, high = level.z + KERB, level.z + top
+    if product.role == "roofs" or mesh.z[1] <= low or mesh.z[0] >= high:
+        return []
+    kind = product.role if product.role in ("windows", "other") else "railings"
+    return _solid(product, kind, footprint(mesh, low, high))
+
+
+def _below_the_cut(found: list[Solid], model: Model, level: Level, heights: Heights) -> Iterator[Solid]:
+    """What of walls stands below the scanner's plane and not in it: the parapet under a window."""
+    standing = [item for item in found if item.kind != "beams"]
+    regions = [item.region for item in standing]
+    tree = shapely.STRtree(regions)
+    steps = [level.z + KERB + OFF_LEVEL, level.z + heights.top / 2, level.z + heights.top - OFF_LEVEL]
+    upright = [item for item in found if item.kind in ("walls", "columns")]
+    for item in (item for item in upright if item.product.role != "slabs"):
+        mesh = model.meshes[item.product.global_id]
+        below = shapely.union_all([cut(mesh, height) for height in steps if mesh.z[0] < height < mesh.z[1]])
+        if below.is_empty:
+            continue
+        near = shapely.union_all([regions[k] for k in tree.query(below)])
+        rest = below.difference(near).buffer(-0.01, join_style="mitre").buffer(0.01, join_style="mitre")
+        yield from _solid(item.product, "railings", _on_grid(rest))
+
+
+def _on_grid(region: Region) -> Region:
+    return tidy(shapely.set_precision(region, 1e-4)) if not region.is_empty else NOTHING
