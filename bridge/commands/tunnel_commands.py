@@ -74,7 +74,8 @@ def tunnel_robot(
     from bridge.link.zenoh_link import Guard, joining, listening
     from bridge.mavlink.line.url import read_url
     from bridge.mavlink.tunnel.message_filter import MessageFilter
-    from bridge.mavlink.tunnel.tunnel import open_tunnel
+    from bridge.mavlink.tunnel.tunnel import answer_greetings, open_tunnel
+    from bridge.robot.controller import new_boot_id
     from bridge.robot.program import robots_keys
 
     if connect is not None:
@@ -84,7 +85,7 @@ def tunnel_robot(
     judge, refusals = MessageFilter(), Refusals()
     # One that joins is reached by nobody but the robot's own end, which decides who may what.
     access = None if held is None or connect else access_control(own)
-    guard = Guard(held, insecure, access)
+    guard = Guard(held, insecure, access, new_boot_id())
     transport = _transport(mavlink, insecure)
     opened = joining(connect, guard) if connect else listening(listen, guard)
     with opened as link, open_tunnel(
@@ -92,6 +93,7 @@ def tunnel_robot(
         passes=(lambda message: True) if raw_orders else judge.lets_through, refused=refusals.told,
         knocks=read_url(mavlink).kind == "udpout",
     ) as tunnel:  # fmt: skip
+        answer_greetings(link, own.mavlink("hello"))
         link.announce(own.mavlink("alive"))
         say(f"ready {name} {'joins ' + connect if connect else 'listens on ' + listen}, vehicle at {mavlink}")
         _work(tunnel)
@@ -115,20 +117,20 @@ def tunnel_station(
     from bridge.link.keys import now_utc, read_keys
     from bridge.link.protocol import KeyExpressions
     from bridge.link.zenoh_link import Guard, connecting
-    from bridge.mavlink.tunnel.tunnel import open_tunnel
+    from bridge.mavlink.tunnel.tunnel import greeting, open_tunnel
 
     _leave_on_sigterm()
     own, held = KeyExpressions(robot, site), None if keys is None else read_keys(keys, now=now_utc())
     speaks = held is None or held.holder.role == "station"
     transport = _transport(mavlink, insecure)
+    end = f"the tunnel's end at {robot}"
     with connecting(connect, Guard(held, insecure)) as link, open_tunnel(
         link, transport, tells=own.mavlink("up") if speaks else None, hears=own.mavlink("down"),
         wrote=RefusalsHeard(robot).hears,
-    ) as tunnel:  # fmt: skip
-        end = f"the tunnel's end at {robot}"
-        link.watch_presence(
-            own.mavlink("alive"), lambda key, alive: say(f"{end} is {'there' if alive else 'gone'}")
-        )
+    ) as tunnel, greeting(
+        link, own.mavlink("hello"), own.mavlink("alive"),
+        lambda key, alive: say(f"{end} is {'there' if alive else 'gone'}"),
+    ):  # fmt: skip
         say(f"ready {robot} at {connect}, ground program at {mavlink}")
         _work(tunnel)
 

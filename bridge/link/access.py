@@ -61,8 +61,10 @@ def _commanding(keys: KeyExpressions) -> list[dict[str, Any]]:
 
 def _overhearing(keys: KeyExpressions) -> list[dict[str, Any]]:
     """Frames from the vehicle."""
-    down, alive = [keys.mavlink("down")], [keys.mavlink("alive")]
+    down, alive, hello = [keys.mavlink("down")], [keys.mavlink("alive")], [keys.mavlink("hello")]
     return [
+        _rule("mavlink_greet", ["query"], "ingress", hello),
+        _rule("mavlink_greeted", ["reply", "declare_queryable"], "egress", hello),
         _rule("mavlink_told", ["put"], "egress", down),
         _rule("mavlink_listen", ["declare_subscriber"], "ingress", down),
         _rule("mavlink_alive", ["liveliness_token"], "egress", alive),
@@ -82,7 +84,10 @@ def _steering(keys: KeyExpressions) -> list[dict[str, Any]]:
 def _tunnelling(keys: KeyExpressions) -> list[dict[str, Any]]:
     """The tunnel's end at the robot, if it is a process of its own that joins the robot's."""
     down, up, alive = [keys.mavlink("down")], [keys.mavlink("up")], [keys.mavlink("alive")]
+    hello = [keys.mavlink("hello")]
     return [
+        _rule("tunnel_greeted", ["query"], "egress", hello),
+        _rule("tunnel_greets", ["reply", "declare_queryable"], "ingress", hello),
         _rule("tunnel_tell", ["put"], "ingress", down),
         _rule("tunnel_wanted", ["declare_subscriber"], "egress", down),
         _rule("tunnel_told", ["put"], "egress", up),

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -20,7 +22,7 @@ from mission.errors import InputError
 
 if TYPE_CHECKING:
     from cryptography import x509
-    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 
 HolderRole = Literal["station", "viewer", "robot"]
 ROLES: Final[tuple[HolderRole, ...]] = ("station", "viewer", "robot")
@@ -58,14 +60,6 @@ class Holder(msgspec.Struct, frozen=True, kw_only=True):
     not_after: datetime
 
 
-class Signature(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Goes beside a message: who signed it, and the Ed25519 signature over key and payload."""
-
-    certificate: bytes
-    """DER."""
-    signature: bytes
-
-
 @dataclass(frozen=True)
 class HeldKeys:
     """Keys that have been read and found to fit together."""
@@ -76,50 +70,58 @@ class HeldKeys:
     certificate: x509.Certificate
     key: Ed25519PrivateKey
 
-    def sign(self, key: str, payload: bytes) -> bytes:
-        """The signature that goes beside `payload` when it is sent on `key`."""
+    @cached_property
+    def der(self) -> bytes:
+        """The certificate, as it goes beside messages."""
         from cryptography.hazmat.primitives.serialization import Encoding
 
-        certificate = self.certificate.public_bytes(Encoding.DER)
-        return msgspec.json.encode(
-            Signature(certificate=certificate, signature=self.key.sign(_signed(key, payload)))
-        )
+        return self.certificate.public_bytes(Encoding.DER)
 
 
 class Untrusted(Exception):
     """A signature that does not hold; the message says why."""
 
 
-def verified_holder(
-    authority: x509.Certificate, key: str, payload: bytes, signature: bytes, *, now: datetime
-) -> Holder:
-    """Who signed `payload` for `key`.
+class Certificates:
+    """Tells who holds a certificate, if the authority of one's own keys has issued it and it is valid now."""
 
-    Raises
-    ------
-    Untrusted
-        If it is not signed, the certificate is not the authority's or not valid now, or it was changed.
-    """
-    from cryptography import x509
-    from cryptography.exceptions import InvalidSignature
-    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+    def __init__(self, held: HeldKeys, now: Callable[[], datetime]) -> None:
+        self._held = held
+        self._now = now
+        self._read = lru_cache(maxsize=64)(self._issued)
 
-    try:
-        given = msgspec.json.decode(signature, type=Signature)
-        certificate = x509.load_der_x509_certificate(given.certificate)
-        certificate.verify_directly_issued_by(authority)
-        public = certificate.public_key()
+    def holder(self, der: bytes) -> tuple[Holder, Ed25519PublicKey]:
+        """Who holds a certificate, and the public key that proves it.
+
+        Raises
+        ------
+        Untrusted
+            If it is not the authority's, is none of ours, or is not valid now.
+        """
+        holder, public = self._read(der)
+        if not holder.not_before <= self._now() <= holder.not_after:
+            raise Untrusted(f"the certificate of {holder.name} ends {holder.not_after:%Y-%m-%d %H:%M} UTC")
+        return holder, public
+
+    def _issued(self, der: bytes) -> tuple[Holder, Ed25519PublicKey]:
+        from cryptography import x509
+        from cryptography.exceptions import InvalidSignature
+        from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+        try:
+            certificate = x509.load_der_x509_certificate(der)
+        except ValueError:
+            raise Untrusted("it has no certificate that can be read") from None
+        try:
+            certificate.verify_directly_issued_by(self._held.authority)
+            public, holder = certificate.public_key(), holder_of(certificate)
+        except (InvalidSignature, ValueError, TypeError):
+            raise Untrusted("the certificate is of another authority") from None
+        except InputError as error:
+            raise Untrusted(str(error)) from None
         if not isinstance(public, Ed25519PublicKey):
             raise Untrusted("the certificate's key is not Ed25519")
-        public.verify(given.signature, _signed(key, payload))
-    except (msgspec.DecodeError, ValueError, TypeError) as error:
-        raise Untrusted(f"no signature that can be read ({error})") from None
-    except InvalidSignature:
-        raise Untrusted("the signature is not right, or the certificate is of another authority") from None
-    holder = holder_of(certificate)
-    if not holder.not_before <= now <= holder.not_after:
-        raise Untrusted(f"the certificate of {holder.name} ends {holder.not_after:%Y-%m-%d %H:%M} UTC")
-    return holder
+        return holder, public
 
 
 def init_site(folder: Path, *, now: datetime) -> None:
@@ -218,10 +220,6 @@ def holders(folder: Path) -> tuple[Holder, ...]:
     if not KeyFiles(folder / AUTHORITY).certificate.exists():
         raise InputError(f"{folder}: no authority there; make one with stopgo keys init {folder}")
     return tuple(holder_of(_read_certificate(KeyFiles(path).certificate)) for path in found)
-
-
-def _signed(key: str, payload: bytes) -> bytes:
-    return key.encode() + b"\n" + payload
 
 
 def _name(role: str, name: str) -> x509.Name:

@@ -97,7 +97,7 @@ class KeyExpressions:
         return f"{self.root}/mission/{mission_id}/{step}"
 
     def mavlink(self, what: str) -> str:
-        """Raw frames: `down` from the vehicle, `up` to it; `alive`: token of the tunnel at the robot."""
+        """Raw frames: `down` from the vehicle, `up` to it; `alive`, `hello`: the tunnel's end there."""
         return f"{self.root}/mavlink/{what}"
 
     def robot_of(self, key: str) -> str:
@@ -221,6 +221,11 @@ Reply = Info | Ready | ChunkHeld | Accepted | Rejected | Answer | LogPage | Pose
 """Everything a robot answers with."""
 
 M = TypeVar("M")
+
+
+def untrusted(error: Exception) -> Rejected:
+    """What is answered to those who are not believed, or may not do what they ask."""
+    return Rejected(reason="untrusted", messages=(str(error),))
 
 
 def encode(message: Any) -> bytes:

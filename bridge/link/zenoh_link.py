@@ -21,6 +21,7 @@ import zenoh
 
 from bridge.link.keys import HeldKeys, now_utc
 from bridge.link.link import Answering, Hearing, Presence, Publish, Request
+from bridge.link.seals import NO_SEALS, KeySeals, Seals
 from mission.errors import InputError
 
 LEASE_MS = 2000
@@ -63,6 +64,13 @@ class Guard:
     insecure: bool = False
     access: dict[str, Any] | None = None
     """zenoh's access control, at the end that is asked."""
+    boot_id: str = ""
+    """Of a robot, for its seals."""
+
+    @property
+    def seals(self) -> Seals:
+        """What goes beside messages on a link that is so guarded."""
+        return NO_SEALS if self.keys is None else KeySeals(self.keys, boot_id=self.boot_id)
 
 
 UNGUARDED = Guard()
@@ -134,7 +142,7 @@ def _opened(settings: dict[str, Any], endpoint: str, guard: Guard) -> Iterator[Z
     except zenoh.ZError as error:
         raise InputError(f"{endpoint}: cannot be opened ({_short(error)}); is the address free?") from None
     with session:
-        link = ZenohLink(session)
+        link = ZenohLink(session, guard.seals)
         try:
             with _silent_after(link, guard.keys):
                 yield link
@@ -161,13 +169,18 @@ def _silent_after(link: ZenohLink, keys: HeldKeys | None) -> Iterator[None]:
 class ZenohLink:
     """One open zenoh session."""
 
-    def __init__(self, session: zenoh.Session) -> None:
+    def __init__(self, session: zenoh.Session, seals: Seals = NO_SEALS) -> None:
         self._session = session
+        self._seals = seals
         # A token or subscriber that nobody refers to is collected, and gone.
         self._declared: list[Any] = []
         self._publishers: list[zenoh.Publisher] = []
         self._lock = threading.Lock()
         self._silent = False
+
+    @property
+    def distrusted(self) -> str:
+        return self._seals.distrusted
 
     def fall_silent(self) -> None:
         """Be gone for the others, while the session stays open."""
@@ -177,14 +190,15 @@ class ZenohLink:
 
     def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
         priority = BULK if bulk else PROMPT
+        sealed = self._seals.answering(answer)
 
         def answered(query: zenoh.Query) -> None:
             with query:
                 payload = b"" if query.payload is None else query.payload.to_bytes()
-                signature = b"" if query.attachment is None else query.attachment.to_bytes()
-                request = Request(str(query.key_expr), payload, _parameters(query.parameters), signature)
+                parameters = _parameters(query.parameters)
+                reply, seal = sealed(Request(str(query.key_expr), payload, parameters, _seal_of(query)))
                 query.reply(
-                    query.key_expr, answer(request), encoding=JSON,
+                    query.key_expr, reply, encoding=JSON, attachment=seal or None,
                     priority=priority, congestion_control=zenoh.CongestionControl.BLOCK,
                 )  # fmt: skip
 
@@ -199,7 +213,7 @@ class ZenohLink:
 
         def publish(payload: bytes) -> None:
             if not self._silent:
-                publisher.put(payload)
+                publisher.put(payload, attachment=self._seals.telling(key, payload) or None)
 
         return publish
 
@@ -214,41 +228,42 @@ class ZenohLink:
         timeout_s: float,
         parameters: Mapping[str, str] | None = None,
         bulk: bool = False,
-        signature: bytes = b"",
     ) -> bytes | None:
+        return next(self._answers(key, payload, timeout_s, parameters or {}, bulk=bulk), None)
+
+    def ask_all(self, key: str, payload: bytes = b"", *, timeout_s: float) -> list[bytes]:
+        return list(self._answers(key, payload, timeout_s, {}, bulk=False))
+
+    def _answers(
+        self, key: str, payload: bytes, timeout_s: float, parameters: Mapping[str, str], *, bulk: bool
+    ) -> Iterator[bytes]:
+        """Answers that are to be believed, as they come."""
         if self._silent:
-            return None
-        selector = zenoh.Selector(key, dict(parameters or {}))
-        priority = zenoh.Priority.BACKGROUND if bulk else zenoh.Priority.INTERACTIVE_HIGH
+            return
+        question = self._seals.question(key, payload, parameters)
         replies = self._session.get(
-            selector,
+            zenoh.Selector(key, dict(parameters)),
             payload=payload,
-            attachment=signature or None,
+            attachment=question.seal or None,
             encoding=JSON,
             target=zenoh.QueryTarget.ALL_COMPLETE,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=timeout_s,
-            priority=priority,
+            priority=zenoh.Priority.BACKGROUND if bulk else zenoh.Priority.INTERACTIVE_HIGH,
             congestion_control=zenoh.CongestionControl.BLOCK,
             express=not bulk,
         )
         for reply in replies:
             if reply.ok is not None:
-                return reply.ok.payload.to_bytes()
-        return None
-
-    def ask_all(self, key: str, *, timeout_s: float) -> list[bytes]:
-        replies = self._session.get(
-            key,
-            target=zenoh.QueryTarget.ALL,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            timeout=timeout_s,
-        )
-        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+                opened = self._seals.opened(question, reply.ok.payload.to_bytes(), _seal_of(reply.ok))
+                if opened is not None:
+                    yield opened
 
     def hear(self, key: str, heard: Hearing) -> None:
+        judged = self._seals.hearing(heard)
+
         def sampled(sample: zenoh.Sample) -> None:
-            heard(str(sample.key_expr), sample.payload.to_bytes())
+            judged(str(sample.key_expr), sample.payload.to_bytes(), _seal_of(sample))
 
         self._declared.append(self._session.declare_subscriber(key, sampled))
 
@@ -305,6 +320,10 @@ def is_loopback(host: str) -> bool:
 def _parameters(parameters: zenoh.Parameters) -> dict[str, str]:
     pairs = (pair.partition("=") for pair in str(parameters).split(";") if pair)
     return {name: value for name, _, value in pairs}
+
+
+def _seal_of(message: zenoh.Query | zenoh.Sample) -> bytes:
+    return b"" if message.attachment is None else message.attachment.to_bytes()
 
 
 def _short(error: zenoh.ZError) -> str:

@@ -10,13 +10,12 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from datetime import datetime
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import msgspec
 
 from bridge.link.clock import Clock
-from bridge.link.keys import Untrusted, verified_holder
+from bridge.link.keys import Untrusted
 from bridge.link.link import Link, Request
 from bridge.link.protocol import (
     CHUNK_BYTES,
@@ -26,23 +25,20 @@ from bridge.link.protocol import (
     Info,
     KeyExpressions,
     Malformed,
-    Rejected,
     Reply,
     decode,
     encode,
+    untrusted,
 )
 from bridge.robot.base import Base, Scanner
 from bridge.robot.controller import Controller
 from bridge.robot.inbox import Inbox
 from bridge.robot.journal import Journal
-from bridge.robot.pages import POSES_KEPT, events_page, poses_page
+from bridge.robot.pages import POSES_KEPT, address_of, events_page, poses_page
 from mission import __version__
 from mission.document import Transform
 from mission.events import PoseReport
 from mission.run.orders import Order
-
-if TYPE_CHECKING:
-    from cryptography import x509
 
 STATE_EVERY_S = 1.0
 POSE_EVERY_S = 0.05
@@ -51,21 +47,23 @@ LEAST_POSE_PAUSE_S = 0.02
 
 
 Signed = TypeVar("Signed", Order, Commit)
-Trust = Callable[[Request, str], None]
-"""Raises `Untrusted` unless the request was signed by the commander whose name it bears."""
 
 
-def trusting(authority: x509.Certificate, now: Callable[[], datetime]) -> Trust:
-    """Trust in stations that the site's authority has issued keys to."""
+def check_ordering(request: Request, commander: str | None = None) -> None:
+    """Let only stations give orders, and each in its own name; without keys everybody may.
 
-    def trust(request: Request, commander: str) -> None:
-        holder = verified_holder(authority, request.key, request.payload, request.signature, now=now())
-        if holder.role != "station":
-            raise Untrusted(f"{holder.name} is a {holder.role}; only stations give orders")
-        if holder.name != commander:
-            raise Untrusted(f"signed by {holder.name}, not by {commander}")
-
-    return trust
+    Raises
+    ------
+    Untrusted
+        Naming who asks.
+    """
+    holder = request.holder
+    if holder is None:
+        return
+    if holder.role != "station":
+        raise Untrusted(f"{holder.name} is a {holder.role}; only stations give orders")
+    if commander not in (None, holder.name):
+        raise Untrusted(f"signed by {holder.name}, not by {commander}")
 
 
 class Agent:
@@ -83,7 +81,6 @@ class Agent:
         clock: Clock,
         command_clock: Clock,
         speed_up: float = 1.0,
-        trust: Trust | None = None,
         to_map: Transform | None = None,
     ) -> None:
         self._keys = keys
@@ -96,7 +93,6 @@ class Agent:
         self._profiles = scanner.profiles
         self._pose_pause_s = max(POSE_EVERY_S / speed_up, LEAST_POSE_PAUSE_S)
         self._inbox = Inbox(journal, controller, scanner.profiles)
-        self._trust = trust
         self._to_map = to_map
         self._closing = threading.Event()
         self._news = threading.Event()
@@ -171,8 +167,14 @@ class Agent:
 
     def _mission(self, request: Request) -> bytes:
         self._contact()
-        if request.key.endswith("/commit"):
+        _, step = address_of(request.key)
+        if step[:1] == ["commit"]:
             return self._ordered(request, Commit, self._commit)
+        try:
+            if step[:1] != ["part"]:
+                check_ordering(request)
+        except Untrusted as error:
+            return encode(untrusted(error))
         return encode(self._inbox.receive(request))
 
     def _commit(self, request: Request, commit: Commit) -> Reply:
@@ -184,12 +186,11 @@ class Agent:
         """Carry out what only a commander may order, if it is from the one it says it is from."""
         try:
             order = decode(request.payload, kind)
-            if self._trust is not None:
-                self._trust(request, order.commander)
+            check_ordering(request, order.commander)
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             return encode(Malformed(message=f"{kind.__name__}: {error}"))
         except Untrusted as error:
-            return encode(Rejected(reason="untrusted", messages=(str(error),)))
+            return encode(untrusted(error))
         return encode(carry_out(request, order))
 
     def _info(self, request: Request) -> bytes:

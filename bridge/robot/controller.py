@@ -35,6 +35,11 @@ SETTLE_LIMIT_S = 30.0
 """How much longer than `settle_s` a robot may take to stand still."""
 
 
+def new_boot_id() -> str:
+    """What tells one start of a robot's program from every other."""
+    return uuid.uuid4().hex[:12]
+
+
 class Controller:
     """The robot's run, its journal, and the base and scanner that carry it out.
 
@@ -53,9 +58,10 @@ class Controller:
         command_clock: Clock | None = None,
         mission_taken: Callable[[Mission], None] = lambda mission: None,
         revisions: RevisionPolicy = "next-stop",
+        boot_id: str | None = None,
     ) -> None:
         self.robot = robot
-        self.boot_id = uuid.uuid4().hex[:12]
+        self.boot_id = boot_id or new_boot_id()
         self.changed: Callable[[], None] = lambda: None
         """Called after every stored change."""
         self._journal = journal

@@ -15,9 +15,9 @@ from bridge.link.access import access_control
 from bridge.link.clock import Clock, WallClock
 from bridge.link.link import Link
 from bridge.link.protocol import KeyExpressions
-from bridge.robot.agent import Agent, on_link, trusting
+from bridge.robot.agent import Agent, on_link
 from bridge.robot.bodies import OpenBody
-from bridge.robot.controller import Controller
+from bridge.robot.controller import Controller, new_boot_id
 from bridge.robot.journal import Journal, open_journal
 from bridge.robot.simulator import NO_FAULTS, Faults
 from mission.document import Transform
@@ -56,18 +56,19 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     signal.signal(signal.SIGTERM, _leave)
     keys = KeyExpressions(options.name, options.site)
     held = None if options.keys is None else robots_keys(options.keys, options.name)
-    guard = Guard(held, options.insecure, None if held is None else access_control(keys))
+    boot_id = new_boot_id()
+    guard = Guard(held, options.insecure, None if held is None else access_control(keys), boot_id)
     opened = joining(options.connect, guard) if options.connect else listening(options.listen, guard)
-    with opened as link, robot_on(link, keys, options, held) as agent:
+    with opened as link, robot_on(link, keys, options, boot_id) as agent:
         ready()
         agent.wait()
 
 
 @contextmanager
 def robot_on(
-    link: Link, keys: KeyExpressions, options: RobotOptions, held: key_files.HeldKeys | None = None
+    link: Link, keys: KeyExpressions, options: RobotOptions, boot_id: str | None = None
 ) -> Iterator[Agent]:
-    """A robot on `link`; with keys of its own it obeys only what stations have signed."""
+    """A robot on `link`, which is sealed with the robot's keys if it has any."""
     with open_journal(options.state, options.name) as journal:
         clock, wall = clocks(journal, speed_up=options.speed_up)
         journal.edge = crashing(options.faults)
@@ -75,12 +76,12 @@ def robot_on(
             controller = Controller(
                 robot=options.name, journal=journal, base=body.base, scanner=body.scanner, clock=clock,
                 command_clock=wall, mission_taken=body.take, revisions=options.revisions,
+                boot_id=boot_id,
             )  # fmt: skip
             agent = Agent(
                 keys=keys, link=link, journal=journal, controller=controller, base=body.base,
                 scanner=body.scanner, clock=clock, command_clock=wall, speed_up=options.speed_up,
                 to_map=options.to_map,
-                trust=None if held is None else trusting(held.authority, key_files.now_utc),
             )  # fmt: skip
             with on_link(agent):
                 yield agent

@@ -13,6 +13,7 @@ import threading
 import time
 import uuid
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,6 @@ from bridge.link.protocol import (
     Ready,
     Rejected,
     Reply,
-    decode,
     encode,
 )
 from bridge.station import follow
@@ -58,6 +58,8 @@ PAUSE_S = 0.05
 """Between tries: a query just after a reconnect may come back empty at once."""
 GATHER_S = 0.3
 """Once one robot of a fleet has shown itself, the others get this long."""
+MOST_ASKED = 16
+"""Robots of a fleet that are asked at the same time."""
 COMMIT_VALID_S = 60.0
 PATIENCE_S = 20.0
 """How long a push goes on without an answer: on a line that loses much, the link may be opened anew."""
@@ -123,10 +125,23 @@ def fleet(
     held = None if keys is None else read_keys(keys, now=now_utc())
     with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
         station = Station(link, KeyExpressions.of_every_robot(site), commander=whoami(), timeout_s=timeout_s)
+        seen: set[str] = set()
+        link.watch_presence(
+            station.keys.alive, lambda key, alive: seen.add(station.keys.robot_of(key)) if alive else None
+        )
         station.reach(endpoint)
         time.sleep(GATHER_S)
-        infos = [decode(reply, Info) for reply in link.ask_all(station.keys.info, timeout_s=TRY_S)]
-    return tuple(sorted((info.state for info in infos), key=lambda state: state.robot))
+        names = sorted(seen)
+        with ThreadPoolExecutor(max_workers=MOST_ASKED) as pool:
+            states = pool.map(lambda name: _state_of(link, KeyExpressions(name, site), timeout_s), names)
+            return tuple(state for state in states if state is not None)
+
+
+def _state_of(link: Link, keys: KeyExpressions, timeout_s: float) -> StateReport | None:
+    try:
+        return Station(link, keys, commander=whoami(), timeout_s=timeout_s).status()
+    except OutcomeUnknown:
+        return None
 
 
 def whoami() -> str:
@@ -172,7 +187,9 @@ class Station:
         within_s = self.timeout_s if within_s is None else within_s
         reply = self._insist(self.keys.info, b"", within_s)
         if reply is None:
-            raise OutcomeUnknown(f"{self.keys.robot} did not tell its state within {within_s:.1f} s")
+            raise OutcomeUnknown(
+                f"{self.keys.robot} did not tell its state within {within_s:.1f} s{self._distrusted()}"
+            )
         info = self._answered(reply, Info, "info")
         if info.protocol != VERSION:
             raise InputError(
@@ -352,20 +369,17 @@ class Station:
     ) -> bytes | None:
         """Ask the same thing until it is answered or the time is up."""
         deadline = time.monotonic() + within_s
-        signature = b"" if self.held is None or bulk else self.held.sign(key, payload)
         while (left := deadline - time.monotonic()) > 0:
-            reply = self.link.ask(
-                key,
-                payload,
-                timeout_s=min(try_s, left),
-                parameters=parameters,
-                bulk=bulk,
-                signature=signature,
-            )
+            reply = self.link.ask(key, payload, timeout_s=min(try_s, left), parameters=parameters, bulk=bulk)
             if reply is not None:
                 return reply
             time.sleep(min(PAUSE_S, left))
         return None
+
+    def _distrusted(self) -> str:
+        """Why an answer that came was not taken for the robot's; empty if none came."""
+        why = self.link.distrusted
+        return f" (an answer came that is not {self.keys.robot}'s: {why})" if why else ""
 
     def _answered(self, reply: bytes | None, kind: type[Any], what: str) -> Any:
         """The reply if it is of `kind`; every other is an error that says what it means."""
@@ -373,7 +387,7 @@ class Station:
         if reply is None:
             raise OutcomeUnknown(
                 f"{robot} did not answer {what} in time: whether it was carried out is unknown;"
-                " see stopgo status"
+                f" see stopgo status{self._distrusted()}"
             )
         try:
             message: Reply = msgspec.json.decode(reply, type=Reply)

@@ -12,8 +12,9 @@ from typing import Any
 import msgspec
 
 from bridge.link.clock import SimulatedClock
-from bridge.link.link import MemoryLink, Switchboard
+from bridge.link.memory_link import Switchboard
 from bridge.link.protocol import Commit, KeyExpressions, Manifest
+from bridge.link.seals import NO_SEALS, Seals
 from bridge.robot.agent import Agent
 from bridge.robot.bodies import pose_of
 from bridge.robot.controller import Controller
@@ -85,6 +86,7 @@ class Field:
 
     def __post_init__(self) -> None:
         self.board = Switchboard()
+        self.link = self.board.link()
         self.keys = KeyExpressions("r1")
         self.base = SimulatedBase(clock=self.clock, wear=self.wear, keep=self.keep, faults=self.faults)
         self.scanner = SimulatedScanner(clock=self.clock, faults=self.faults, record=self.record)
@@ -99,15 +101,20 @@ class Field:
         )  # fmt: skip
         self.inbox = Inbox(self.journal, self.controller, self.scanner.profiles)
 
-    def station(self) -> Station:
+    def station(self, **options: Any) -> Station:
         """A station on a memory link to this robot's agent, which serves but does not work by itself."""
-        link = MemoryLink(self.board)
+        self.serve()
+        return Station(self.board.link(), self.keys, **({"commander": "test", "timeout_s": 0.3} | options))
+
+    def serve(self, seals: Seals = NO_SEALS) -> None:
+        """Answer for the robot as it is since its last boot."""
+        self.link.close()
+        self.link = self.board.link(seals)
         agent = Agent(
-            keys=self.keys, link=link, journal=self.journal, controller=self.controller, base=self.base,
+            keys=self.keys, link=self.link, journal=self.journal, controller=self.controller, base=self.base,
             scanner=self.scanner, clock=self.clock, command_clock=self.clock,
         )  # fmt: skip
         agent.serve()
-        return Station(self.board.link(), self.keys, commander="test", timeout_s=0.3)
 
     def commit(self, manifest: Manifest) -> Commit:
         not_after_ns = self.clock.now_ns() + 10**15

@@ -16,11 +16,12 @@ import pytest
 
 from bridge.link import keys as site_keys
 from bridge.link.clock import WallClock
-from bridge.link.keys import init_site, issue, now_utc, read_keys
-from bridge.link.link import Switchboard
+from bridge.link.keys import now_utc, read_keys
+from bridge.link.memory_link import Switchboard
 from bridge.link.protocol import KeyExpressions, Rejected
+from bridge.link.seals import KeySeals
 from bridge.robot import agent as agents
-from bridge.robot.agent import Agent, trusting
+from bridge.robot.agent import Agent
 from bridge.robot.bodies import pose_of
 from bridge.robot.controller import Controller
 from bridge.robot.journal import memory_journal
@@ -31,6 +32,7 @@ from mission.errors import AnswerIsNo, InputError
 from mission.events import AnyEvent, Finished, PoseReport, Scanned, StateReport
 from mission.run.lease import lasting_ns
 from mission.run.orders import Answer, Verb
+from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.robot.test_push import manifest_of
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
@@ -170,18 +172,13 @@ def test_a_lease_from_a_date_far_ahead_ends_within_its_minute_once_the_date_is_r
 
 def test_a_robot_whose_date_is_beyond_a_certificates_end_obeys_it_no_more_and_runs_on(tmp_path: Path) -> None:
     """And a station whose date is beyond it sends nothing."""
-    init_site(tmp_path, now=now_utc())
-    folder = issue(tmp_path, "station", "alice", now=now_utc()).folder
-    held = read_keys(folder, now=now_utc())
-    date = now_utc()
-    field = Field()
-    agent = Agent(
-        keys=field.keys, link=field.board.link(), journal=field.journal, controller=field.controller,
-        base=field.base, scanner=field.scanner, clock=field.clock, command_clock=field.clock,
-        trust=trusting(held.authority, lambda: date),
-    )  # fmt: skip
-    agent.serve()
-    station = Station(field.board.link(), field.keys, commander="alice", held=held)
+    site = keys_of_site(tmp_path / "site")
+    field, date = GuardedField(site), now_utc()
+    robot = read_keys(site / "r1", now=date)
+    field.serve(
+        KeySeals(robot, boot_id=field.controller.boot_id, now=lambda: date, clock_ns=field.clock.now_ns)
+    )
+    station = field.guarded_station()
     station.push(corridor())
     assert station.command("start").outcome == "ok"
     date += timedelta(days=91)
@@ -190,4 +187,4 @@ def test_a_robot_whose_date_is_beyond_a_certificates_end_obeys_it_no_more_and_ru
     field.work()
     assert field.controller.run.state == "FINISHED"
     with pytest.raises(InputError, match="issue new keys for alice"):
-        read_keys(folder, now=date)
+        read_keys(site / "alice", now=date)

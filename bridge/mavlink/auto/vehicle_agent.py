@@ -18,7 +18,8 @@ from pathlib import Path
 import msgspec
 
 from bridge.link.clock import Clock, WallClock
-from bridge.link.link import MemoryLink, Request, Switchboard
+from bridge.link.link import Request
+from bridge.link.memory_link import MemoryLink, Switchboard
 from bridge.link.protocol import (
     CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,

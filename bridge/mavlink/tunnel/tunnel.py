@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from bridge.link.link import Link
+from bridge.link.link import Link, Presence
 from bridge.mavlink.line.frames import Frames, dialect
 from bridge.mavlink.line.messages import on_board_beat
 from bridge.mavlink.line.transport import Transport
@@ -29,6 +29,8 @@ OLDEST_S = 2.0
 SAMPLE_BYTES = 1200
 """Frames go together up to this: fewer samples on a slow link, and no datagram that must be cut."""
 READ_S = 0.1
+GREET_S = 0.5
+GREET_EVERY_S = 5.0
 ECHOES = 512
 """Frames that were written lately; one that comes back at once is an echo."""
 KNOCKING = (252, Component.UDP_BRIDGE)
@@ -207,6 +209,40 @@ class Tunnel:
     def _say_back(self, frame: bytes) -> None:
         if frame:
             self._out.put(frame)
+
+
+def answer_greetings(link: Link, key: str) -> None:
+    """Let stations know this start of the tunnel's end at the robot: what it says is believed after that."""
+    link.serve(key, lambda request: b"{}")
+
+
+@contextmanager
+def greeting(link: Link, key: str, alive: str, changed: Presence) -> Iterator[None]:
+    """Know the tunnel's end at the robot, anew whenever it comes, until the block ends.
+
+    Where ends hold keys, each believes only what is said of late, and counts from the last greeting.
+    """
+    ended, due = threading.Event(), threading.Event()
+
+    def noticed(token: str, there: bool) -> None:
+        due.set()
+        changed(token, there)
+
+    def greet() -> None:
+        while not ended.is_set():
+            due.clear()
+            answered = link.ask(key, timeout_s=GREET_S) is not None
+            due.wait(GREET_EVERY_S if answered else GREET_S)
+
+    link.watch_presence(alive, noticed)
+    thread = threading.Thread(target=greet, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        due.set()
+        thread.join()
 
 
 @contextmanager

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from bridge.link.link import Request, Switchboard
+from bridge.link.link import Request
+from bridge.link.memory_link import Switchboard
 from bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, encode
 from bridge.station.follow import PoseHistory
 from mission.events import Pose, PoseReport

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from bridge.link.link import MemoryLink, Switchboard
+from bridge.link.memory_link import MemoryLink, Switchboard
 from bridge.station import station as stations
 from bridge.station.station import LEAST_S, PATIENCE_S, Station
 from mission.errors import OutcomeUnknown, RobotUnreachable
@@ -43,7 +43,6 @@ class DeafLink(MemoryLink):
         timeout_s: float,
         parameters: Mapping[str, str] | None = None,
         bulk: bool = False,
-        signature: bytes = b"",
     ) -> bytes | None:
         self.asked.append(key)
         if self.deaf in key:

@@ -14,7 +14,7 @@ import pytest
 from bridge.commands import watch_commands
 from bridge.console import say, tell
 from bridge.link.clock import WallClock
-from bridge.link.link import Switchboard
+from bridge.link.memory_link import Switchboard
 from bridge.link.protocol import KeyExpressions
 from bridge.robot import agent as agents
 from bridge.robot.agent import Agent
@@ -167,7 +167,7 @@ def test_a_forged_publication_is_left_out() -> None:
 def test_an_answer_in_unknown_words_is_unknown() -> None:
     field = Field()
     station = field.station()
-    field.board.serving[field.keys.info] = lambda request: b'{"is": "Info", "protocol": 9}'
+    field.board.link().serve(field.keys.info, lambda request: b'{"is": "Info", "protocol": 9}')
     with pytest.raises(OutcomeUnknown, match="words this stopgo does not know"):
         station.status()
 

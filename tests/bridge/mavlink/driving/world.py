@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from bridge.link.link import Switchboard
+from bridge.link.memory_link import Switchboard
 from bridge.link.protocol import KeyExpressions
 from bridge.mavlink.driving.autopilot_body import AutopilotBody
 from bridge.mavlink.line.frames import dialect

@@ -14,7 +14,7 @@ import pytest
 from bridge.commands.spawn import end_robot, free_port, robot_process, start
 from bridge.commands.tunnel_commands import Refusals, RefusalsHeard
 from bridge.link.keys import init_site, issue, now_utc, read_keys
-from bridge.link.link import MemoryLink, Switchboard
+from bridge.link.memory_link import MemoryLink, Switchboard
 from bridge.link.protocol import KeyExpressions
 from bridge.link.zenoh_link import Guard, connecting
 from bridge.mavlink.line.frames import Frames, dialect
@@ -309,6 +309,9 @@ def test_viewers_hear_the_vehicle_and_cannot_speak_to_it(tmp_path: Path) -> None
 
         viewer, commander = link_of("vera"), link_of("alice")
         viewer.hear(KEYS.mavlink("down"), hear)
+        for link in (viewer, commander):
+            while link.ask(KEYS.mavlink("hello"), timeout_s=0.5) is None:
+                continue
         up = KEYS.mavlink("up")
         viewers, stations = viewer.publisher(up), commander.publisher(up)
         answers = 0

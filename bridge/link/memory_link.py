@@ -1,0 +1,125 @@
+"""A link in memory: for tests, and between a station and what answers for a vehicle in its own process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from bridge.link.link import Answering, Hearing, Presence, Publish, Request, matches
+from bridge.link.seals import NO_SEALS, SealedAnswering, SealedHearing, Seals
+
+
+@dataclass(frozen=True)
+class Packet:
+    """A message as whoever carries it sees it."""
+
+    kind: Literal["question", "answer", "told"]
+    key: str
+    payload: bytes
+    seal: bytes
+    parameters: Mapping[str, str] = field(default_factory=dict)
+
+
+class Switchboard:
+    """Joins links in memory: what one end publishes the others hear, at once and in the caller's thread."""
+
+    def __init__(self) -> None:
+        self.serving: list[tuple[MemoryLink, str, SealedAnswering]] = []
+        self.hearing: list[tuple[str, SealedHearing]] = []
+        self.watching: list[tuple[str, Presence]] = []
+        self.alive: set[str] = set()
+        self.cut = False
+        """While true nothing passes."""
+
+    def link(self, seals: Seals = NO_SEALS) -> MemoryLink:
+        return MemoryLink(self, seals)
+
+    def carried(self, packet: Packet) -> Iterable[Packet]:
+        """What becomes of a message on its way: it arrives, unless the line is cut."""
+        return () if self.cut else (packet,)
+
+    def answers(self, question: Packet) -> list[Packet]:
+        """What all who serve its key answer to a question, as it arrives where it was asked."""
+        arrived: list[Packet] = []
+        for asked in self.carried(question):
+            request = Request(asked.key, asked.payload, asked.parameters, asked.seal)
+            for answer in [answer for _, key, answer in self.serving if matches(key, asked.key)]:
+                payload, seal = answer(request)
+                arrived += self.carried(Packet("answer", asked.key, payload, seal))
+        return arrived
+
+    def tell(self, packet: Packet) -> None:
+        """Let everybody hear what was published, as it arrives there."""
+        for arrived in self.carried(packet):
+            for pattern, heard in list(self.hearing):
+                if matches(pattern, arrived.key):
+                    heard(arrived.key, arrived.payload, arrived.seal)
+
+
+class MemoryLink:
+    """One end of a switchboard."""
+
+    def __init__(self, board: Switchboard, seals: Seals = NO_SEALS) -> None:
+        self._board = board
+        self._seals = seals
+        self._announced: list[str] = []
+
+    @property
+    def distrusted(self) -> str:
+        return self._seals.distrusted
+
+    def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
+        # Whoever serves a key last answers first.
+        self._board.serving.insert(0, (self, key, self._seals.answering(answer)))
+
+    def publisher(self, key: str, *, bulk: bool = False) -> Publish:
+        return lambda payload: self._board.tell(
+            Packet("told", key, payload, self._seals.telling(key, payload))
+        )
+
+    def announce(self, key: str) -> None:
+        self._announced.append(key)
+        self._board.alive.add(key)
+        self._tell_presence(key, True)
+
+    def ask(
+        self,
+        key: str,
+        payload: bytes = b"",
+        *,
+        timeout_s: float,
+        parameters: Mapping[str, str] | None = None,
+        bulk: bool = False,
+    ) -> bytes | None:
+        answers = self._answers(key, payload, parameters or {})
+        return answers[0] if answers else None
+
+    def ask_all(self, key: str, payload: bytes = b"", *, timeout_s: float) -> list[bytes]:
+        return self._answers(key, payload, {})
+
+    def _answers(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> list[bytes]:
+        question = self._seals.question(key, payload, parameters)
+        arrived = self._board.answers(Packet("question", key, payload, question.seal, parameters))
+        opened = (self._seals.opened(question, packet.payload, packet.seal) for packet in arrived)
+        return [payload for payload in opened if payload is not None]
+
+    def hear(self, key: str, heard: Hearing) -> None:
+        self._board.hearing.append((key, self._seals.hearing(heard)))
+
+    def watch_presence(self, key: str, changed: Presence) -> None:
+        for alive in sorted(self._board.alive):
+            if matches(key, alive):
+                changed(alive, True)
+        self._board.watching.append((key, changed))
+
+    def close(self) -> None:
+        self._board.serving = [served for served in self._board.serving if served[0] is not self]
+        for key in self._announced:
+            self._board.alive.discard(key)
+            self._tell_presence(key, False)
+
+    def _tell_presence(self, key: str, alive: bool) -> None:
+        for pattern, changed in list(self._board.watching):
+            if matches(pattern, key):
+                changed(key, alive)

@@ -1,0 +1,65 @@
+"""A site whose ends hold keys, in memory, and a router between them that need not be honest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from bridge.link.keys import HolderRole, init_site, issue, now_utc, read_keys
+from bridge.link.memory_link import Packet, Switchboard
+from bridge.link.seals import KeySeals
+from bridge.station.station import Station
+from tests.bridge.world import Field
+
+HOLDERS: tuple[tuple[HolderRole, str], ...] = (
+    ("robot", "r1"), ("robot", "r2"), ("station", "alice"), ("station", "bob"), ("viewer", "vera"),
+)  # fmt: skip
+
+
+def keys_of_site(folder: Path) -> Path:
+    """A folder with keys for two robots, two stations and a viewer."""
+    now = now_utc()
+    init_site(folder, now=now)
+    for role, name in HOLDERS:
+        issue(folder, role, name, now=now)
+    return folder
+
+
+class Router(Switchboard):
+    """Carries every message, unless `meddle` makes something else of it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.seen: list[Packet] = []
+        self.meddle: Callable[[Packet], Iterable[Packet]] = lambda packet: (packet,)
+
+    def carried(self, packet: Packet) -> Iterable[Packet]:
+        self.seen.append(packet)
+        return self.meddle(packet)
+
+
+class GuardedField(Field):
+    """A robot with keys, behind a router."""
+
+    def __init__(self, site: Path, **details: Any) -> None:
+        super().__init__(**details)
+        self.site = site
+        self.board = self.router = Router()
+        self.link = self.board.link()
+        self.answer_as("r1")
+
+    def seals(self, name: str, *, boot_id: str = "") -> KeySeals:
+        """What `name` seals with, on the field's clock."""
+        held = read_keys(self.site / name, now=now_utc())
+        return KeySeals(held, boot_id=boot_id, clock_ns=self.clock.now_ns)
+
+    def answer_as(self, name: str) -> None:
+        """Answer for the robot, with the keys of `name`."""
+        self.serve(self.seals(name, boot_id=self.controller.boot_id))
+
+    def guarded_station(self, name: str = "alice") -> Station:
+        """A station with the keys of `name`; the robot goes on answering as it does."""
+        held = read_keys(self.site / name, now=now_utc())
+        link = self.board.link(self.seals(name))
+        return Station(link, self.keys, commander=name, timeout_s=0.1, patience_s=0.1, held=held)
