@@ -165,6 +165,8 @@ class Commit(Tagged, frozen=True):
     nonce: ShortText
     """Taken once: the same commit may be sent again, but not to undo a later one."""
     not_after_ns: int
+    boot_id: ShortText | None = None
+    """The start of the robot's program that `not_after_ns` counts in; another refuses what it has not."""
     fence: Count | None = None
     take_over: bool = False
 

@@ -164,6 +164,7 @@ class Controller:
             battery=self._base.battery(),
             endurance_s=self._base.endurance_s(),
             not_ready=self._base.not_ready(),
+            boot_id=self.boot_id,
         )
 
     def _answer(self, order: Order, decision: Decision | Refused) -> Answer:
@@ -215,6 +216,8 @@ class Controller:
         """Why a commit comes too late, or once more."""
         if self._command_clock.now_ns() > commit.not_after_ns:
             return Refused("expired", "the commit is older than it allows; push again")
+        if not known and commit.boot_id not in (None, self.boot_id):
+            return Refused("expired", "the robot has been started anew since the commit; push again")
         if not known and self._journal.nonce(commit.nonce) is not None:
             return Refused("replayed", "this commit was taken before, and another mission since; push again")
         return None

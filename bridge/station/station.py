@@ -60,7 +60,8 @@ GATHER_S = 0.3
 """Once one robot of a fleet has shown itself, the others get this long."""
 MOST_ASKED = 16
 """Robots of a fleet that are asked at the same time."""
-COMMIT_VALID_S = 60.0
+COMMITS = 3
+"""How often a commit is written, if the robot is started anew each time."""
 PATIENCE_S = 20.0
 """How long a push goes on without an answer: on a line that loses much, the link may be opened anew."""
 
@@ -226,15 +227,30 @@ class Station:
         )  # fmt: skip
         begun = self._step(manifest, "begin", encode(manifest), Ready)
         self._send_chunks(manifest, document, set(begun.held), progress)
-        info = self.info(within_s=self.patience_s)
-        commit = Commit(
-            manifest=manifest, commander=self.commander, take_over=take_over, nonce=uuid.uuid4().hex,
-            not_after_ns=info.clock_ns + round(max(COMMIT_VALID_S, self.patience_s) * 1e9),
-            fence=info.lease.fence if info.lease else None,
-        )  # fmt: skip
-        accepted = self._step(manifest, "commit", encode(commit), Accepted)
+        accepted = self._commit(manifest, take_over=take_over)
         self._read_back(manifest)
         return accepted
+
+    def _commit(self, manifest: Manifest, *, take_over: bool) -> Accepted:
+        """Have what was sent taken; written anew if the robot was started anew meanwhile."""
+        for tries_left in reversed(range(COMMITS)):
+            info = self.info(within_s=self.patience_s)
+            commit = Commit(
+                manifest=manifest, commander=self.commander, take_over=take_over, nonce=uuid.uuid4().hex,
+                # What has not been taken by the time this station gives up will never be.
+                not_after_ns=info.clock_ns + round(self._commit_s(manifest) * 1e9),
+                boot_id=info.boot_id, fence=info.lease.fence if info.lease else None,
+            )  # fmt: skip
+            try:
+                return self._step(manifest, "commit", encode(commit), Accepted)
+            except AnswerIsNo as no:
+                if no.reason != "expired" or not tries_left:
+                    raise
+        raise AssertionError
+
+    def _commit_s(self, manifest: Manifest) -> float:
+        """How long a commit is insisted on: the robot reads and stores a large document before it answers."""
+        return self.patience_s + 2 * manifest.size / COMMIT_BYTES_PER_S
 
     def _send_chunks(self, manifest: Manifest, document: bytes, held: set[int], progress: Progress) -> None:
         for number in range(manifest.chunks):
@@ -286,7 +302,11 @@ class Station:
             order = self.order(verb, **details)
         except OutcomeUnknown as error:
             raise RobotUnreachable(f"{error}; {verb} was not sent") from None
-        return self.give(order, within_s=max(LEAST_S, deadline - time.monotonic()))
+        within_s = max(LEAST_S, deadline - time.monotonic())
+        if "valid_for_s" not in details:
+            # The robot's clock was read before now: when this station gives up, the order has run out.
+            order = msgspec.structs.replace(order, valid_for_s=min(within_s, LONGEST_VALID_S))
+        return self.give(order, within_s=within_s)
 
     def _may_order(self, what: str) -> None:
         """Viewers are told here; the robot would not even answer them."""
@@ -298,6 +318,11 @@ class Station:
         """Give an order that was written before; given again it is still carried out once."""
         within_s = self.timeout_s if within_s is None else within_s
         reply = self._insist(self.keys.command(order.verb), encode(order), within_s)
+        if reply is None and order.verb not in FREE_VERBS and within_s >= order.valid_for_s:
+            raise OutcomeUnknown(
+                f"{self.keys.robot} did not answer {order.verb} in time: whether it was carried out is"
+                f" unknown; see stopgo status. It has expired: later it will not be{self._distrusted()}"
+            )
         answer = self._answered(reply, Answer, order.verb)
         if answer.outcome == "refused":
             why = f"{answer.reason}: {answer.message}"
@@ -316,6 +341,7 @@ class Station:
             # A pause is meant for the run, also if it has just gone on by a new revision.
             "revision": state.revision if cautious else None,
             "expect_state": (state.state,) if cautious else None,
+            "boot_id": info.boot_id if cautious else None,
             "fence": info.lease.fence if info.lease and cautious else None,
             "stop": state.stop if verb in ("skip", "retry") else None,
         }
@@ -351,9 +377,7 @@ class Station:
         bulk = step.startswith("chunk")
         try_s, within_s = BULK_TRY_S if bulk else TRY_S, self.patience_s
         if step == "commit":
-            # The robot reads and stores a large document before it answers.
-            reading_s = manifest.size / COMMIT_BYTES_PER_S
-            try_s, within_s = try_s + reading_s, within_s + 2 * reading_s
+            try_s, within_s = try_s + manifest.size / COMMIT_BYTES_PER_S, self._commit_s(manifest)
         reply = self._insist(key, payload, within_s, try_s=try_s, bulk=bulk, **parameters)
         return self._answered(reply, kind, f"push ({step})")
 

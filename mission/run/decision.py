@@ -48,6 +48,8 @@ class Situation:
     endurance_s: float | None
     not_ready: str = ""
     """Why the robot's base cannot drive at present."""
+    boot_id: str = ""
+    """Which start of the robot's program this is; `command_ns` may go back from one to the next."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +93,12 @@ def _too_late(order: Order, situation: Situation) -> Refused | None:
         return Refused(
             "expired", f"valid for {order.valid_for_s:g} s; at most {LONGEST_VALID_S:g} s are taken"
         )
+    if order.boot_id not in (None, situation.boot_id):
+        return Refused(
+            "expired", f"the robot has been started anew since {order.verb} was ordered; order it again"
+        )
     age = (situation.command_ns - order.issued_ns) / 1e9
-    if not -order.valid_for_s <= age <= order.valid_for_s:
+    if not 0 <= age <= order.valid_for_s:
         return Refused(
             "expired", f"{order.verb} is {age:.1f} s old and was valid for {order.valid_for_s:g} s"
         )

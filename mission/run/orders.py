@@ -42,6 +42,8 @@ class Order(
     commander: ShortText
     issued_ns: int
     valid_for_s: float
+    boot_id: ShortText | None = None
+    """The start of the robot's program that `issued_ns` was told by; another refuses the order."""
     fence: Count | None = None
     """The lease number that the commander knew."""
     take_over: bool = False

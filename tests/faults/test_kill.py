@@ -128,8 +128,14 @@ def give(station: Station, order: Order, outcome: Outcome) -> bool:
 
 def drive(station: Station, chance: random.Random, outcome: Outcome) -> int:
     """Start, pause and resume until the run is finished; how many pauses were carried out."""
-    give(station, stubbornly(lambda: station.order("start", valid_for_s=60.0), outcome), outcome)
+    begin(station, outcome)
     return see_through(station, chance, outcome, pauses=0.15)
+
+
+def begin(station: Station, outcome: Outcome) -> None:
+    """Order the start; anew if the robot was started anew in between, which refuses the old order."""
+    while not give(station, stubbornly(lambda: station.order("start", valid_for_s=60.0), outcome), outcome):
+        assert stubbornly(station.status, outcome).state == "READY"
 
 
 def see_through(station: Station, chance: random.Random, outcome: Outcome, *, pauses: float) -> int:
@@ -203,7 +209,7 @@ def trial_of_a_revision(seed: int, folder: Path) -> Outcome:
         connect(supervisor.endpoint, robot="r1", commander="trial", timeout_s=3.0) as station,
     ):
         stubbornly(lambda: station.push(mission()), outcome)
-        give(station, stubbornly(lambda: station.order("start", valid_for_s=60.0), outcome), outcome)
+        begin(station, outcome)
         accepted = stubbornly(lambda: station.push(revised), outcome)
         if not at_an_entry:
             assert accepted.waits

@@ -157,7 +157,7 @@ class VehicleOrders:
             has_run=journal.has_run(mission.id, mission.revision),
             pose=pose, now_ns=self._book.clock.now_ns(), command_ns=self._wall.now_ns(),
             new_run_id=uuid.uuid4().hex[:12], lease=journal.fact("lease", Lease),
-            battery=self._observer.battery, endurance_s=None,
+            battery=self._observer.battery, endurance_s=None, boot_id=self._book.boot_id,
         )  # fmt: skip
 
     # What each verb does

@@ -198,3 +198,54 @@ def test_a_seal_is_small() -> None:
     """Beside a pose of some 250 bytes, fifty times a second."""
     seal = Seal(signature=b"x" * 64, boot_id="0123456789ab", number=10**6, at_ns=10**15)
     assert len(msgspec.json.encode(seal)) < 200
+
+
+def held_back(field: GuardedField) -> list[Packet]:
+    """From now on every order is withheld, and kept."""
+    kept: list[Packet] = []
+
+    def withhold(packet: Packet) -> Iterable[Packet]:
+        if "/cmd/" in packet.key:
+            kept.append(packet)
+            return ()
+        return (packet,)
+
+    field.router.meddle = withhold
+    return kept
+
+
+@pytest.mark.parametrize("later_s", [0.6, 41.0])
+def test_an_order_that_a_station_has_given_up_is_never_carried_out(site: Path, later_s: float) -> None:
+    """Not a moment later, not after a reboot, and whatever the date is then."""
+    field = ready(site)
+    kept = held_back(field)
+    with pytest.raises(OutcomeUnknown, match="later it will not be"):
+        field.guarded_station().command("start")
+    field.router.meddle = lambda packet: (packet,)
+    field.clock.wait(later_s)
+    assert b'"expired"' in field.board.answers(kept[0])[0].payload
+    field.clock.jump(-later_s)
+    field.boot()
+    field.answer_as("r1")
+    assert b'"expired"' in field.board.answers(kept[1])[0].payload
+    assert field.controller.run.state == "READY"
+
+
+def test_a_commit_that_was_held_back_over_a_reboot_is_never_taken(site: Path) -> None:
+    field = ready(site)
+    kept: list[Packet] = []
+
+    def withhold(packet: Packet) -> Iterable[Packet]:
+        if packet.key.endswith("/commit"):
+            kept.append(packet)
+            return ()
+        return (packet,)
+
+    field.router.meddle = withhold
+    with pytest.raises(OutcomeUnknown):
+        field.guarded_station().push(corridor(revision=2))
+    field.router.meddle = lambda packet: (packet,)
+    field.boot()
+    field.answer_as("r1")
+    assert b'"expired"' in field.board.answers(kept[0])[0].payload
+    assert field.controller.run.revision == 1
