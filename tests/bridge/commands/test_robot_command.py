@@ -17,7 +17,10 @@ DRIVEN = [*ROBOT, "--controller", "mavlink:udpin:127.0.0.1:14550"]
         (["--name", "r1"], "--state"),
         ([*ROBOT, "--profile", "px4"], "--profile"),
         ([*ROBOT, "--origin", "47,8,400"], "--origin"),
-        ([*ROBOT, "--controller", "vehicle"], "--controller vehicle: no such controller; known: sim, mavlink:URL"),
+        (
+            [*ROBOT, "--controller", "vehicle"],
+            "--controller vehicle: no such controller; known: sim, mavlink:URL",
+        ),
         # Given is given, whatever the value: the default too.
         ([*ROBOT, "--trigger", "camera"], "--trigger has no meaning with a simulated robot"),
         ([*ROBOT, "--signing-key", "k"], "--signing-key has no meaning with a simulated robot"),
