@@ -6,7 +6,7 @@ Times are nanoseconds on the robot's clock (`robot_ns`, since 1970) and seconds 
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal, get_args
 
 import msgspec
 
@@ -145,6 +145,12 @@ class Aborted(Event, frozen=True, kw_only=True):
     reason: str
 
 
+class UnknownKind(Event, frozen=True, kw_only=True):
+    """An event of a kind that a newer stopgo tells of, and this one does not know."""
+
+    kind: str
+
+
 AnyEvent = (
     Started
     | Arrived
@@ -164,7 +170,30 @@ AnyEvent = (
     | RevisionDropped
     | Finished
     | Aborted
+    | UnknownKind
 )
+KINDS: tuple[str, ...] = tuple(kind.__name__ for kind in get_args(AnyEvent))
+
+
+def event_of(body: bytes) -> AnyEvent:
+    """The event in a line of JSON; what a newer stopgo adds to it is passed over.
+
+    Raises
+    ------
+    msgspec.ValidationError
+        If it is not an event.
+    """
+    try:
+        return _EVENTS.decode(body)
+    except msgspec.ValidationError:
+        told = _ENVELOPE.decode(body)
+        if told.get("event") in KINDS:
+            raise
+        return msgspec.convert({**told, "event": "UnknownKind", "kind": told.get("event")}, UnknownKind)
+
+
+_EVENTS = msgspec.json.Decoder(AnyEvent)
+_ENVELOPE = msgspec.json.Decoder(dict[str, Any])
 
 
 class StateReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -174,12 +203,13 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     boot_id: str
     seq: int
     robot_ns: int
-    state: State
+    state: str
+    """One of `State`, or what a newer robot calls it."""
     run_id: str | None
     mission_id: str | None
     revision: int | None
     stop: str | None
-    stop_state: StopState | None
+    stop_state: str | None
     done: tuple[str, ...]
     skipped: tuple[str, ...]
     battery: float

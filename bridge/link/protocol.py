@@ -1,6 +1,6 @@
 """What station and robot say to one another: every key and every message, known to this module alone.
 
-Messages are JSON, read strictly; docs/protocol.md tells them to people. Times that end in `_ns` are
+Messages are JSON; docs/protocol.md tells them to people. Times that end in `_ns` are
 nanoseconds on the robot's clock.
 """
 
@@ -14,7 +14,7 @@ import msgspec
 
 from mission.document import Transform
 from mission.errors import InputError
-from mission.events import AnyEvent, PoseReport, StateReport
+from mission.events import AnyEvent, PoseReport, StateReport, event_of
 from mission.run.lease import Lease
 from mission.run.orders import Answer, Count, Reason, ShortText
 
@@ -105,8 +105,8 @@ class KeyExpressions:
         return key.removeprefix(self.root.removesuffix(self.robot)).partition("/")[0]
 
 
-class Tagged(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is", forbid_unknown_fields=True):
-    """Base of most messages: frozen, says what it is, and is strict about unknown keys."""
+class Tagged(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is"):
+    """Base of most messages: frozen, and says what it is. What a newer peer adds to one is passed over."""
 
 
 class Info(Tagged, frozen=True):
@@ -207,8 +207,13 @@ class Malformed(Tagged, frozen=True):
 class LogPage(Tagged, frozen=True):
     """Events by number from the journal; `newest` tells whether there are more."""
 
-    events: tuple[AnyEvent, ...]
+    bodies: tuple[msgspec.Raw, ...] = msgspec.field(name="events")
+    """As the journal has them, also those of kinds that this stopgo does not know."""
     newest: int
+
+    @property
+    def events(self) -> tuple[AnyEvent, ...]:
+        return tuple(event_of(bytes(body)) for body in self.bodies)
 
 
 class PosePage(Tagged, frozen=True):

@@ -192,6 +192,9 @@ class Controller:
                 self._journal.store_nonce(commit.nonce, mission.digest)
                 self._store_lease(lease)
                 run = self._write(Change(change.run, (*handed_over(before, lease), *change.events)))
+                self._journal.retire_missions(
+                    *((run.mission_id, wanted) for wanted in (run.revision, run.next_revision))
+                )
             if not known and run.over:
                 self._hold(mission)
             if not known:

@@ -72,6 +72,9 @@ class Inbox:
             return refusal
         if self._holds(manifest):
             return Ready(held=tuple(range(manifest.chunks)))
+        shortage = self._journal.room_for(2 * manifest.size)  # in pieces, and then whole
+        if shortage:
+            return _no("storage", shortage)
         if self._journal.transfer(mission_id) != manifest:
             self._journal.begin_transfer(manifest)
         return Ready(held=self._journal.chunks_held(manifest.sha256))
@@ -85,8 +88,13 @@ class Inbox:
             return _no(
                 "too_large", f"chunks of {manifest.chunk_bytes} bytes; 1024 to {MAX_CHUNK_BYTES} are taken"
             )
+        return self._outdated(mission_id, manifest)
+
+    def _outdated(self, mission_id: str, manifest: Manifest) -> Rejected | None:
         held = self._journal.newest_revision(mission_id)
-        if held is None or held.revision < manifest.revision or self._holds(manifest):
+        if held is None or held.revision < manifest.revision:
+            return None
+        if (held.revision, held.digest) == (manifest.revision, manifest.digest) or self._holds(manifest):
             return None
         if held.revision > manifest.revision:
             return _no(
@@ -113,6 +121,9 @@ class Inbox:
         expected = last if number == manifest.chunks - 1 else manifest.chunk_bytes
         if len(request.payload) != expected:
             return _no("incomplete", f"chunk {number} has {len(request.payload)} bytes, not {expected}")
+        shortage = self._journal.room_for(len(request.payload))
+        if shortage:
+            return _no("storage", shortage)
         self._journal.store_chunk(manifest.sha256, number, request.payload)
         return ChunkHeld(index=number, sha256=hashlib.sha256(request.payload).hexdigest())
 

@@ -1,6 +1,7 @@
 """The robot's memory: what happened, what was ordered and answered, what it holds and where it stands.
 
 One SQLite file. What belongs together is written in one transaction and is on disk before anybody is told.
+What is read is what was written, or the robot does not come up: see sealed_rows.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import os
 import sqlite3
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import IO, TypeVar
@@ -17,27 +18,36 @@ from typing import IO, TypeVar
 import msgspec
 
 from bridge.link.protocol import Manifest
+from bridge.robot.reserve import Reserve
+from bridge.robot.sealed_rows import Damaged, Newest, bring_up_to_date, put, sealed, verify
 from mission.errors import InputError
-from mission.events import AnyEvent
+from mission.events import AnyEvent, event_of
 from mission.run.orders import Answer
 
 TABLES = """
-CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS events (
     number INTEGER PRIMARY KEY AUTOINCREMENT, kind TEXT NOT NULL, run_id TEXT NOT NULL,
-    mission_id TEXT NOT NULL, revision INTEGER NOT NULL, robot_ns INTEGER NOT NULL, body BLOB NOT NULL);
+    mission_id TEXT NOT NULL, revision INTEGER NOT NULL, robot_ns INTEGER NOT NULL, body BLOB NOT NULL,
+    seal BLOB NOT NULL);
 CREATE INDEX IF NOT EXISTS events_of_run ON events (run_id, number);
-CREATE TABLE IF NOT EXISTS answers (cmd_id TEXT PRIMARY KEY, order_sha TEXT NOT NULL, body BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS answers (
+    cmd_id TEXT PRIMARY KEY, order_sha TEXT NOT NULL, body BLOB NOT NULL, seal BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS missions (
     mission_id TEXT NOT NULL, revision INTEGER NOT NULL, manifest BLOB NOT NULL, document BLOB NOT NULL,
-    PRIMARY KEY (mission_id, revision));
-CREATE TABLE IF NOT EXISTS nonces (nonce TEXT PRIMARY KEY, digest TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS transfers (mission_id TEXT PRIMARY KEY, manifest BLOB NOT NULL);
+    seal BLOB NOT NULL, PRIMARY KEY (mission_id, revision));
+CREATE TABLE IF NOT EXISTS nonces (nonce TEXT PRIMARY KEY, digest TEXT NOT NULL, seal BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS transfers (
+    mission_id TEXT PRIMARY KEY, manifest BLOB NOT NULL, seal BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS chunks (
-    sha256 TEXT NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL, PRIMARY KEY (sha256, number));
+    sha256 TEXT NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL, seal BLOB NOT NULL,
+    PRIMARY KEY (sha256, number));
 """
 
 ANSWERS_KEPT = 10_000
+NONCES_KEPT = 10_000
+MISSIONS_KEPT = 4
+"""Of those that are not needed; of older ones their names."""
 
 S = TypeVar("S", bound=msgspec.Struct)
 
@@ -45,12 +55,31 @@ S = TypeVar("S", bound=msgspec.Struct)
 class Journal:
     """An open journal; every method may be called from any thread."""
 
-    def __init__(self, connection: sqlite3.Connection) -> None:
+    def __init__(
+        self, connection: sqlite3.Connection, newest: Newest | None = None, reserve: Reserve | None = None
+    ) -> None:
         self._connection = connection
+        self._newest = newest
+        self._reserve = reserve
         self._lock = threading.RLock()
         self.edge: Callable[[str], None] = lambda moment: None
         """Called just before and just after every commit; where tests let the power or the disk fail."""
         connection.executescript(TABLES)
+
+    def verify(self) -> None:
+        """Read everything once, and bring what an older stopgo wrote up to date.
+
+        Raises
+        ------
+        Damaged
+            If anything is not what was written, or a newer stopgo wrote it.
+        """
+        stored = 0 if self._newest is None else self._newest.read()
+        with self.transaction():
+            bring_up_to_date(self._connection)
+            verify(self._connection)
+            if stored > self._changes():
+                raise Damaged("its last entries are missing")
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -59,9 +88,13 @@ class Journal:
             if self._connection.in_transaction:
                 yield
                 return
+            if self._reserve is not None:
+                self._reserve.release_if_needed()
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield
+                number = self._changes() + 1
+                self._put("facts", "changes", number)
                 self.edge("commit")
                 self._connection.execute("COMMIT")
             except BaseException:
@@ -69,36 +102,48 @@ class Journal:
                     self._connection.execute("ROLLBACK")
                 raise
             self.edge("committed")
+            if self._newest is not None:
+                self._newest.store(number)
+
+    def _changes(self) -> int:
+        """Number of the newest transaction."""
+        rows = self._sealed("facts", "WHERE name = 'changes'")
+        return int(rows[0][1]) if rows else 0
+
+    def room_for(self, size: int) -> str:
+        """Why `size` more bytes are too many beside what is kept free for stops; empty if they are not."""
+        return "" if self._reserve is None else self._reserve.shortage(size)
 
     def fact(self, name: str, kind: type[S]) -> S | None:
-        rows = self._rows("SELECT value FROM facts WHERE name = ?", name)
-        return msgspec.json.decode(rows[0][0], type=kind) if rows else None
+        rows = self._sealed("facts", "WHERE name = ?", name)
+        return msgspec.json.decode(rows[0][1], type=kind) if rows else None
 
     def store_fact(self, name: str, value: msgspec.Struct) -> None:
-        self._write("INSERT OR REPLACE INTO facts VALUES (?, ?)", name, msgspec.json.encode(value))
+        self._write("facts", name, msgspec.json.encode(value))
 
     def append(self, event: AnyEvent) -> AnyEvent:
         """The event with its number, which is the next one."""
         with self.transaction():
-            number = self.newest + 1
-            numbered = msgspec.structs.replace(event, number=number)
+            numbered = msgspec.structs.replace(event, number=self.newest + 1)
             self._write(
-                "INSERT INTO events VALUES (?, ?, ?, ?, ?, ?, ?)",
-                *(number, type(event).__name__, event.run_id, event.mission_id, event.revision),
-                *(event.robot_ns, msgspec.json.encode(numbered)),
-            )
+                "events", numbered.number, type(event).__name__, event.run_id, event.mission_id,
+                event.revision, event.robot_ns, msgspec.json.encode(numbered),
+            )  # fmt: skip
         return numbered
 
     def events(
         self, *, since: int = 0, run_id: str | None = None, limit: int = 10**9
     ) -> tuple[AnyEvent, ...]:
         """Events with a number above `since`, in order."""
-        rows = self._rows(
-            "SELECT body FROM events WHERE number > ? AND (? IS NULL OR run_id = ?) ORDER BY number LIMIT ?",
-            *(since, run_id, run_id, limit),
-        )
-        decoder = msgspec.json.Decoder(AnyEvent)
-        return tuple(decoder.decode(body) for (body,) in rows)
+        return tuple(map(event_of, self.bodies(since=since, run_id=run_id, limit=limit)))
+
+    def bodies(self, *, since: int = 0, run_id: str | None = None, limit: int = 10**9) -> tuple[bytes, ...]:
+        """The same as they were written, in JSON."""
+        rows = self._sealed(
+            "events", "WHERE number > ? AND (? IS NULL OR run_id = ?) ORDER BY number LIMIT ?",
+            since, run_id, run_id, limit,
+        )  # fmt: skip
+        return tuple(row[-1] for row in rows)
 
     @property
     def newest(self) -> int:
@@ -122,104 +167,123 @@ class Journal:
 
     def last_event(self, run_id: str, kind: str) -> AnyEvent | None:
         """The newest event of a kind in a run."""
-        statement = "SELECT body FROM events WHERE run_id = ? AND kind = ? ORDER BY number DESC LIMIT 1"
-        rows = self._rows(statement, run_id, kind)
-        return msgspec.json.decode(rows[0][0], type=AnyEvent) if rows else None
+        rows = self._sealed(
+            "events", "WHERE run_id = ? AND kind = ? ORDER BY number DESC LIMIT 1", run_id, kind
+        )
+        return event_of(rows[0][-1]) if rows else None
 
     def forget_fact(self, name: str) -> None:
-        self._write("DELETE FROM facts WHERE name = ?", name)
+        self._delete("facts", "name = ?", name)
 
     def answer(self, cmd_id: str) -> tuple[str, Answer] | None:
         """The stored answer of a command, and the hash of the order it belongs to."""
-        rows = self._rows("SELECT order_sha, body FROM answers WHERE cmd_id = ?", cmd_id)
-        return (rows[0][0], msgspec.json.decode(rows[0][1], type=Answer)) if rows else None
+        rows = self._sealed("answers", "WHERE cmd_id = ?", cmd_id)
+        return (rows[0][1], msgspec.json.decode(rows[0][2], type=Answer)) if rows else None
 
     def store_answer(self, order_sha: str, answer: Answer) -> None:
-        self._write(
-            "INSERT INTO answers VALUES (?, ?, ?)", answer.cmd_id, order_sha, msgspec.json.encode(answer)
-        )
+        self._write("answers", answer.cmd_id, order_sha, msgspec.json.encode(answer))
 
     def forget_answers(self, *, keep: int) -> None:
         """Drop all but the newest answers; orders that old have long expired and are refused anyway."""
-        self._write("DELETE FROM answers WHERE rowid <= (SELECT MAX(rowid) FROM answers) - ?", keep)
+        self._delete("answers", "rowid <= (SELECT MAX(rowid) FROM answers) - ?", keep)
 
     def mission(self, mission_id: str, revision: int) -> tuple[Manifest, bytes] | None:
-        rows = self._rows(
-            "SELECT manifest, document FROM missions WHERE mission_id = ? AND revision = ?",
-            *(mission_id, revision),
-        )
-        return (msgspec.json.decode(rows[0][0], type=Manifest), bytes(rows[0][1])) if rows else None
+        """A stored mission, unless only its name has been kept."""
+        rows = self._sealed("missions", "WHERE mission_id = ? AND revision = ?", mission_id, revision)
+        if not rows or not rows[0][3]:
+            return None
+        return msgspec.json.decode(rows[0][2], type=Manifest), bytes(rows[0][3])
 
     def store_mission(self, manifest: Manifest, document: bytes) -> None:
         """Keep a mission that came by another way than in pieces."""
-        key = (manifest.mission_id, manifest.revision)
         encoded = msgspec.json.encode(manifest)
-        self._write("INSERT OR REPLACE INTO missions VALUES (?, ?, ?, ?)", *key, encoded, document)
+        self._write("missions", manifest.mission_id, manifest.revision, encoded, document)
 
     def newest_revision(self, mission_id: str) -> Manifest | None:
-        rows = self._rows(
-            "SELECT manifest FROM missions WHERE mission_id = ? ORDER BY revision DESC LIMIT 1", mission_id
-        )
+        """What was stored of a mission last, also when only its name has been kept."""
+        statement = "SELECT manifest FROM missions WHERE mission_id = ? ORDER BY revision DESC LIMIT 1"
+        rows = self._rows(statement, mission_id)
         return msgspec.json.decode(rows[0][0], type=Manifest) if rows else None
 
     def keep_transfer(self, manifest: Manifest) -> None:
         """What has arrived becomes a stored mission, unless it is one already; the transfer is over."""
         with self.transaction():
             if self.mission(manifest.mission_id, manifest.revision) is None:
-                self._write(
-                    "INSERT INTO missions VALUES (?, ?, ?, ?)",
-                    *(manifest.mission_id, manifest.revision, msgspec.json.encode(manifest)),
-                    self.chunks(manifest.sha256),
-                )
+                self.store_mission(manifest, self.chunks(manifest.sha256))
             self.end_transfer(manifest)
+
+    def retire_missions(self, *needed: tuple[str | None, int | None]) -> None:
+        """Of missions that are not `needed` (id, revision) keep the newest few; of the others only the name.
+
+        The name still tells that a revision was stored here, and with which digest.
+        """
+        with self.transaction():
+            whole = self._rows(
+                "SELECT mission_id, revision, manifest FROM missions WHERE document != x'' ORDER BY rowid"
+            )
+            old = [row for row in whole if row[:2] not in needed]
+            for mission_id, revision, manifest in old[:-MISSIONS_KEPT]:
+                self._write("missions", mission_id, revision, manifest, b"")
 
     def nonce(self, nonce: str) -> str | None:
         """The digest of the mission that was committed with it before."""
-        rows = self._rows("SELECT digest FROM nonces WHERE nonce = ?", nonce)
-        return str(rows[0][0]) if rows else None
+        rows = self._sealed("nonces", "WHERE nonce = ?", nonce)
+        return str(rows[0][1]) if rows else None
 
     def store_nonce(self, nonce: str, digest: str) -> None:
-        self._write("INSERT OR IGNORE INTO nonces VALUES (?, ?)", nonce, digest)
+        with self.transaction():
+            if self.nonce(nonce) is None:
+                self._write("nonces", nonce, digest)
+            self._delete("nonces", "rowid <= (SELECT MAX(rowid) FROM nonces) - ?", NONCES_KEPT)
 
     def transfer(self, mission_id: str) -> Manifest | None:
         """What is being received of this mission."""
-        rows = self._rows("SELECT manifest FROM transfers WHERE mission_id = ?", mission_id)
-        return msgspec.json.decode(rows[0][0], type=Manifest) if rows else None
+        rows = self._sealed("transfers", "WHERE mission_id = ?", mission_id)
+        return msgspec.json.decode(rows[0][1], type=Manifest) if rows else None
 
     def begin_transfer(self, manifest: Manifest) -> None:
         """Receive this and forget what was being received, but for pieces of the same document and size."""
         with self.transaction():
             before = self.transfer(manifest.mission_id)
-            self._write("DELETE FROM transfers")
+            self._delete("transfers", "TRUE")
             if before is None or _cut(before) != _cut(manifest):
-                self._write("DELETE FROM chunks")
-            self._write(
-                "INSERT INTO transfers VALUES (?, ?)", manifest.mission_id, msgspec.json.encode(manifest)
-            )
+                self._delete("chunks", "TRUE")
+            self._write("transfers", manifest.mission_id, msgspec.json.encode(manifest))
 
     def end_transfer(self, manifest: Manifest) -> None:
         with self.transaction():
-            self._write("DELETE FROM transfers WHERE mission_id = ?", manifest.mission_id)
-            self._write("DELETE FROM chunks WHERE sha256 = ?", manifest.sha256)
+            self._delete("transfers", "mission_id = ?", manifest.mission_id)
+            self._delete("chunks", "sha256 = ?", manifest.sha256)
 
     def store_chunk(self, sha256: str, number: int, data: bytes) -> None:
-        self._write("INSERT OR REPLACE INTO chunks VALUES (?, ?, ?)", sha256, number, data)
+        self._write("chunks", sha256, number, data)
 
     def chunks_held(self, sha256: str) -> tuple[int, ...]:
         rows = self._rows("SELECT number FROM chunks WHERE sha256 = ? ORDER BY number", sha256)
         return tuple(number for (number,) in rows)
 
     def chunks(self, sha256: str) -> bytes:
-        rows = self._rows("SELECT data FROM chunks WHERE sha256 = ? ORDER BY number", sha256)
-        return b"".join(data for (data,) in rows)
+        rows = self._sealed("chunks", "WHERE sha256 = ? ORDER BY number", sha256)
+        return b"".join(data for _, _, data in rows)
 
     def _rows(self, statement: str, *values: object) -> list[tuple]:
         with self._lock:
             return self._connection.execute(statement, values).fetchall()
 
-    def _write(self, statement: str, *values: object) -> None:
+    def _sealed(self, table: str, clause: str, *values: object) -> list[tuple]:
+        with self._lock:
+            return sealed(self._connection, table, clause, *values)
+
+    def _put(self, table: str, *values: object) -> None:
+        put(self._connection, table, *values)
+
+    def _write(self, table: str, *values: object) -> None:
         with self.transaction():
-            self._connection.execute(statement, values)
+            self._put(table, *values)
+
+    def _delete(self, table: str, which: str, *values: object) -> None:
+        with self.transaction():
+            self._connection.execute(f"DELETE FROM {table} WHERE {which}", values)
 
 
 def _cut(manifest: Manifest) -> tuple[str, int]:
@@ -277,15 +341,47 @@ def _lock_file(directory: Path, name: str) -> IO[str]:
 @contextmanager
 def _opened(directory: Path, robot: str) -> Iterator[Journal]:
     path = directory / "journal.sqlite"
-    connection = _connect(path)
+    reserve = Reserve(directory / "reserve")
+    reserve.release_if_needed()
+    with ExitStack() as stack:
+        newest = stack.enter_context(closing(_newest(directory)))
+        connection = stack.enter_context(closing(_connect(path)))
+        journal = _verified(path, robot, connection, newest, reserve)
+        reserve.make()
+        try:
+            yield journal
+        except sqlite3.DatabaseError as error:
+            raise InputError(f"{path}: {_line(error)}; is the disk full, read-only or damaged?") from None
+
+
+def _verified(
+    path: Path, robot: str, connection: sqlite3.Connection, newest: Newest, reserve: Reserve
+) -> Journal:
     try:
-        journal = Journal(connection)
-        _claim(journal, directory, robot)
-        yield journal
+        journal = Journal(connection, newest, reserve)
+        journal.verify()
+        _claim(journal, path.parent, robot)
+    except (Damaged, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{path}: {_line(error)}; nothing in it can be trusted: move the folder away to begin anew,"
+            " and bring the robot to its start yourself"
+        ) from None
     except sqlite3.DatabaseError as error:
-        raise InputError(f"{path}: {error}; is the disk full, read-only or damaged?") from None
-    finally:
-        connection.close()
+        raise InputError(f"{path}: {_line(error)}; is the disk full, read-only or damaged?") from None
+    except (msgspec.ValidationError, msgspec.DecodeError) as error:
+        raise InputError(f"{path}: {_line(error)}; a newer stopgo wrote it: update stopgo") from None
+    return journal
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def _newest(directory: Path) -> Newest:
+    try:
+        return Newest(directory / "newest")
+    except OSError as error:
+        raise InputError(f"--state {directory}: cannot be used ({error.strerror})") from None
 
 
 def memory_journal() -> Journal:
@@ -298,8 +394,9 @@ def _connect(path: Path) -> sqlite3.Connection:
         connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
-    except sqlite3.DatabaseError as error:
-        raise InputError(f"{path}: {error}; move it away to begin anew") from None
+        connection.execute("PRAGMA wal_autocheckpoint = 200")  # pages: the log stays far below the reserve
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: {_line(error)}; move it away to begin anew") from None
     return connection
 
 

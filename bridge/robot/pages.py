@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import islice
 
+import msgspec
+
 from bridge.link.link import Request
 from bridge.link.protocol import (
     CHUNK_BYTES,
@@ -31,8 +33,8 @@ def events_page(journal: Journal, request: Request) -> Reply:
         since = count_of(request.parameters.get("since", "0"))
     except ValueError as error:
         return Malformed(message=f"since: {error}")
-    run_id = request.parameters.get("run")
-    return LogPage(events=journal.events(since=since, run_id=run_id, limit=LOG_PAGE), newest=journal.newest)
+    bodies = journal.bodies(since=since, run_id=request.parameters.get("run"), limit=LOG_PAGE)
+    return LogPage(bodies=tuple(map(msgspec.Raw, bodies)), newest=journal.newest)
 
 
 def poses_page(poses: Iterable[PoseReport], boot_id: str, request: Request) -> Reply:

@@ -5,15 +5,14 @@ from __future__ import annotations
 import queue
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
-from typing import Any
 
 import msgspec
 
 from bridge.link.link import Link
 from bridge.link.protocol import POSE_PAGE, Info, KeyExpressions, LogPage, PosePage, decode
-from mission.events import Aborted, AnyEvent, Finished, PoseReport, Report, StateReport
+from mission.events import Aborted, AnyEvent, Finished, PoseReport, Report, StateReport, event_of
 
 SILENCE_S = 1.0
 """After this long without a word the robot is asked."""
@@ -171,9 +170,9 @@ def log_page(
 def _listen(link: Link, keys: KeyExpressions) -> queue.SimpleQueue[Report]:
     """A queue that fills with what the robot tells; listening comes before asking, so no gap is left."""
     heard: queue.SimpleQueue[Report] = queue.SimpleQueue()
-    link.hear(keys.event, lambda key, payload: _put(heard, payload, AnyEvent))
-    link.hear(keys.pose, lambda key, payload: _put(heard, payload, PoseReport))
-    link.hear(keys.state, lambda key, payload: _put(heard, payload, StateReport))
+    link.hear(keys.event, lambda key, payload: _put(heard, payload, event_of))
+    link.hear(keys.pose, lambda key, payload: _put(heard, payload, _POSE))
+    link.hear(keys.state, lambda key, payload: _put(heard, payload, _STATE))
     state = _asked_state(link, keys)
     if state is not None:
         heard.put(state)
@@ -187,10 +186,14 @@ def _next(heard: queue.SimpleQueue[Report], wait_s: float) -> Report | None:
         return None
 
 
-def _put(heard: queue.SimpleQueue[Report], payload: bytes, kind: Any) -> None:
+def _put(heard: queue.SimpleQueue[Report], payload: bytes, read: Callable[[bytes], Report]) -> None:
     """Take what can be read; anything else on these keys is not the robot's."""
     with suppress(msgspec.DecodeError):
-        heard.put(msgspec.json.decode(payload, type=kind))
+        heard.put(read(payload))
+
+
+_POSE = msgspec.json.Decoder(PoseReport).decode
+_STATE = msgspec.json.Decoder(StateReport).decode
 
 
 def _asked_state(link: Link, keys: KeyExpressions) -> StateReport | None:

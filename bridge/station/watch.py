@@ -21,6 +21,7 @@ from mission.events import (
     RevisionWaits,
     Scanned,
     StateReport,
+    UnknownKind,
 )
 from mission.heard_run import RunTaker
 from mission.schedule import schedule
@@ -211,6 +212,8 @@ def event_line(event: AnyEvent) -> str:
         detail = f"revision {event.waiting}"
     if isinstance(event, RevisionTaken):
         detail = f"revision {event.revision} after {event.before}"
+    if isinstance(event, UnknownKind):
+        detail = f"{event.kind}: this stopgo does not know it"
     if isinstance(event, Arrived):
         detail = f"{event.deviation_m * 1000:.0f} mm beside"
     if isinstance(event, Scanned):

@@ -16,7 +16,7 @@ LEASE_S: Final = 60.0
 """How long a commander keeps the robot after the last order."""
 
 
-class Lease(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Lease(msgspec.Struct, frozen=True, kw_only=True):
     """Who commands a robot."""
 
     commander: str

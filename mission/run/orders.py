@@ -32,9 +32,7 @@ Reason = Literal[
 """Why a robot refuses an order, or a mission."""
 
 
-class Order(
-    msgspec.Struct, frozen=True, kw_only=True, tag="Command", tag_field="is", forbid_unknown_fields=True
-):
+class Order(msgspec.Struct, frozen=True, kw_only=True, tag="Command", tag_field="is"):
     """An order; sent again with the same `cmd_id` it is carried out once."""
 
     cmd_id: ShortText
@@ -58,7 +56,7 @@ class Order(
     from_here: bool = False
 
 
-class Answer(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is", forbid_unknown_fields=True):
+class Answer(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is"):
     """What became of an order, stored before it is sent."""
 
     cmd_id: str

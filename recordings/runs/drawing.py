@@ -259,7 +259,7 @@ _LIMITED = {entities.METRIC_DEVIATION: (1,), entities.METRIC_CROSS_TRACK: (-1, 1
 
 def _about(event: AnyEvent) -> str:
     """The event's particulars in a few words."""
-    words = [getattr(event, name, "") for name in ("stop", "reason", "commander")]
+    words = [getattr(event, name, "") for name in ("stop", "reason", "commander", "kind")]
     if isinstance(event, Arrived):
         words.append(f"{event.deviation_m * 1000:.0f} mm beside")
     if isinstance(event, Scanned):
