@@ -6,11 +6,12 @@ to, `commands` what each order does. This module is where they meet the robot, t
 
 from __future__ import annotations
 
+import contextlib
 import math
 import sqlite3
 import threading
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import msgspec
 
@@ -19,14 +20,15 @@ from bridge.link.protocol import Commit, Rejected
 from bridge.robot.answers import answer_to, answered, remember_answer
 from bridge.robot.base import Base, Rest, Scanner
 from bridge.robot.journal import Journal
+from bridge.robot.owed import Owed
 from mission.document import Mission
-from mission.events import Pose, StateReport
+from mission.events import AnyEvent, Pose, StateReport
 from mission.run import revision, way
 from mission.run import states as runs
 from mission.run.battery import what_is_missing
 from mission.run.decision import Decision, Situation, decide, handed_over
 from mission.run.lease import Lease, claimed, lasting_ns
-from mission.run.orders import Answer, Order, Refused
+from mission.run.orders import FREE_VERBS, Answer, Order, Refused
 from mission.run.revision import RevisionPolicy
 from mission.run.states import Change, Run
 
@@ -79,6 +81,7 @@ class Controller:
         self._seq = 0
         self._mission: Mission | None = None
         self._run = Run()
+        self._owed = Owed()
         self._recover()
 
     @property
@@ -124,7 +127,7 @@ class Controller:
     def obey(self, order: Order) -> Answer:
         """Carry out an order once, however often it comes, and remember what was answered."""
         with self._lock:
-            before = answered(self._journal, order, self._run)
+            before = self._owed.answered(order) or answered(self._journal, order, self._run)
             if before is not None:
                 return before
             decision = decide(order, self._situation())
@@ -132,7 +135,7 @@ class Controller:
             try:
                 run = self._store_decision(order, decision, answer)
             except sqlite3.OperationalError as error:
-                return self._answer(order, self._halt_unstored(error))
+                return self._obeyed_unstored(order, decision, error)
             if isinstance(decision, Decision):
                 self._adopt(run, ordered=True)
             return answer
@@ -255,6 +258,7 @@ class Controller:
         """Told how long no station has been heard; the mission's policy may want something of it."""
         with self._lock:
             self._silent_s = silent_s
+            self._store_owed()
             run, mission = self._run, self._mission
             if mission is None or not self._link_is_lost(mission) or run.state != "RUNNING":
                 return
@@ -398,6 +402,7 @@ class Controller:
         change = revision.dropped(change)
         run = change.run
         with self._journal.transaction():
+            self._owed.store(self._journal)
             self._put(change)
             if run.next_revision is None or run.at <= self._run.at:
                 return run
@@ -408,14 +413,21 @@ class Controller:
         return revised.run
 
     def _put(self, change: Change) -> None:
-        now_ns = self._clock.now_ns()
         with self._journal.transaction():
             self._journal.store_fact("run", change.run)
-            for event in runs.told_of(change, robot=self.robot, boot_id=self.boot_id, now_ns=now_ns):
+            for event in self._told_of(change):
                 self._journal.append(event)
+
+    def _told_of(self, change: Change) -> Iterator[AnyEvent]:
+        now_ns = self._clock.now_ns()
+        return runs.told_of(change, robot=self.robot, boot_id=self.boot_id, now_ns=now_ns)
 
     def _adopt(self, run: Run, *, ordered: bool = False) -> None:
         """What is stored is now what is; an order interrupts the work, except a scan that may end."""
+        self._owed.clear()
+        self._become(run, ordered=ordered)
+
+    def _become(self, run: Run, *, ordered: bool) -> None:
         self._run = run
         held = self._mission
         if (run.mission_id, run.revision) != (held and held.id, held and held.revision):
@@ -431,8 +443,28 @@ class Controller:
         with self._lock:
             self._base.stop()
             if not self._run.over:
-                self._adopt(runs.held(self._run, reason).run, ordered=True)
+                held = runs.held(self._run, reason)
+                self._owed.add(self._told_of(held))
+                self._become(held.run, ordered=True)
         return Refused("storage", reason)
+
+    def _obeyed_unstored(
+        self, order: Order, decision: Decision | Refused, error: sqlite3.OperationalError
+    ) -> Answer:
+        """A stop is carried out whatever the disk says, and stored later; any other order is refused."""
+        if isinstance(decision, Refused) or order.verb not in FREE_VERBS:
+            return self._answer(order, self._halt_unstored(error))
+        answer = self._answer(order, decision)
+        answer = msgspec.structs.replace(answer, message=f"done; the journal cannot be written yet: {error}")
+        self._owed.add(self._told_of(decision.change), order, answer)
+        self._become(decision.change.run, ordered=True)
+        return answer
+
+    def _store_owed(self) -> None:
+        """Once there is room again; until then the robot stands as it was told to."""
+        if self._owed:
+            with contextlib.suppress(sqlite3.OperationalError):
+                self._keep(Change(self._run))
 
     # What others may know
 

@@ -115,8 +115,20 @@ class Journal:
         return "" if self._reserve is None else self._reserve.shortage(size)
 
     def fact(self, name: str, kind: type[S]) -> S | None:
+        """What was stored last under this name.
+
+        Raises
+        ------
+        InputError
+            If it is not of this kind: a newer stopgo wrote it.
+        """
         rows = self._sealed("facts", "WHERE name = ?", name)
-        return msgspec.json.decode(rows[0][1], type=kind) if rows else None
+        try:
+            return msgspec.json.decode(rows[0][1], type=kind) if rows else None
+        except msgspec.ValidationError as error:
+            raise InputError(
+                f"the journal's {name}: {error}; a newer stopgo wrote it: update stopgo"
+            ) from None
 
     def store_fact(self, name: str, value: msgspec.Struct) -> None:
         self._write("facts", name, msgspec.json.encode(value))
@@ -368,8 +380,6 @@ def _verified(
         ) from None
     except sqlite3.DatabaseError as error:
         raise InputError(f"{path}: {_line(error)}; is the disk full, read-only or damaged?") from None
-    except (msgspec.ValidationError, msgspec.DecodeError) as error:
-        raise InputError(f"{path}: {_line(error)}; a newer stopgo wrote it: update stopgo") from None
     return journal
 
 

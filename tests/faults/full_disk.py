@@ -12,7 +12,7 @@ from tests.bridge.world import Field, corridor
 
 def main(folder: Path) -> None:
     if subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)], check=False
+        ["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", str(folder)], check=False
     ).returncode:
         sys.exit("cannot mount")
     with open_journal(folder, "r1") as journal:

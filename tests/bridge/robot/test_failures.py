@@ -12,6 +12,7 @@ from bridge.robot.simulator import Fault, Faults, read_fault
 from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError
 from mission.events import Pose
+from mission.run.orders import Verb
 from tests.bridge.world import Field, corridor
 
 
@@ -226,7 +227,7 @@ def test_a_full_disk_refuses_orders_and_stops_the_robot_until_there_is_room() ->
 
     def fill() -> None:
         field.journal.edge = full_disk
-        assert field.order("pause").reason == "storage"
+        assert field.order("skip").reason == "storage"
 
     field.clock.at(3.0, fill)
     field.work()
@@ -236,6 +237,26 @@ def test_a_full_disk_refuses_orders_and_stops_the_robot_until_there_is_room() ->
     assert field.order("retry").outcome == "ok"
     field.work()
     assert field.controller.run.done == ("s1", "s2", "s3")
+
+
+@pytest.mark.parametrize(
+    ("verb", "state", "event"), [("pause", "PAUSED", "Paused"), ("abort", "ABORTED", "Aborted")]
+)
+def test_a_full_disk_keeps_no_stop_from_arriving(verb: Verb, state: str, event: str) -> None:
+    field = started(corridor())
+    field.journal.edge = full_disk
+    order = field.command(verb)
+    answer = field.controller.obey(order)
+    assert (answer.outcome, field.controller.run.state, field.base.speed()) == ("ok", state, 0.0)
+    assert field.controller.obey(order) == answer
+    field.controller.hear_of_link(0.0)
+    assert field.told()[-1] == "Started"
+    field.journal.edge = lambda moment: None
+    field.controller.hear_of_link(0.0)
+    assert field.told()[-1] == event
+    assert field.controller.obey(order) == answer
+    field.boot()
+    assert (field.controller.run.state, field.told()[-1]) == (state, event)
 
 
 def test_a_full_disk_rejects_a_mission() -> None:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import re
+import sqlite3
 from pathlib import Path
 
+import msgspec
 import pytest
 
-from bridge.robot.journal import Owner, memory_journal, open_journal
-from mission.errors import InputError
-from mission.events import Started
+from bridge.robot.journal import MISSIONS_KEPT, TABLES, Owner, memory_journal, open_journal
+from bridge.robot.reserve import Reserve
+from bridge.robot.sealed_rows import FORMAT, SEALED
+from bridge.station.watch import event_line
+from mission.errors import AnswerIsNo, InputError
+from mission.events import Started, UnknownKind, event_of
+from tests.bridge.world import Field, corridor
 
 
 def started() -> Started:
@@ -59,3 +66,88 @@ def test_a_state_path_that_is_a_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "state").write_text("")
     with pytest.raises(InputError, match="cannot be used"), open_journal(tmp_path / "state", "r1"):
         pass
+
+
+def journal_of_the_first_format(folder: Path) -> None:
+    """A journal as it was before rows had seals."""
+    with open_journal(folder, "r1") as journal:
+        field = Field(journal=journal)
+        field.station().push(corridor())
+    connection = sqlite3.connect(folder / "journal.sqlite")
+    connection.execute("DROP INDEX events_of_run")
+    for table in SEALED:
+        connection.execute(f"ALTER TABLE {table} RENAME TO new_{table}")
+    connection.executescript(re.sub(r",\s*seal BLOB NOT NULL", "", TABLES))
+    for table in SEALED:
+        columns = ", ".join(name for _, name, *_ in connection.execute(f"PRAGMA table_info({table})"))
+        connection.execute(f"INSERT INTO {table} SELECT {columns} FROM new_{table}")
+        connection.execute(f"DROP TABLE new_{table}")
+    connection.execute("DELETE FROM facts WHERE name = 'changes'")
+    connection.execute("PRAGMA user_version = 0")
+    connection.commit()
+    connection.close()
+    (folder / "newest").unlink()
+
+
+def test_a_journal_of_the_first_format_is_brought_up_to_date(tmp_path: Path) -> None:
+    journal_of_the_first_format(tmp_path)
+    for state in ("READY", "PAUSED"):
+        with open_journal(tmp_path, "r1") as journal:
+            field = Field(journal=journal)
+            assert field.controller.run.state == state
+            assert field.order("start" if state == "READY" else "resume").outcome == "ok"
+
+
+def test_a_journal_of_a_newer_stopgo_is_refused(tmp_path: Path) -> None:
+    with open_journal(tmp_path, "r1"):
+        pass
+    connection = sqlite3.connect(tmp_path / "journal.sqlite")
+    connection.execute(f"PRAGMA user_version = {FORMAT + 1}")
+    connection.close()
+    with pytest.raises(InputError, match="a newer stopgo wrote it"), open_journal(tmp_path, "r1"):
+        pass
+
+
+def test_a_state_that_only_a_newer_stopgo_knows_is_refused_in_one_line(tmp_path: Path) -> None:
+    with open_journal(tmp_path, "r1") as journal:
+        journal.store_fact("run", NewerRun(state="CHARGING"))
+    with pytest.raises(InputError, match="update stopgo"), open_journal(tmp_path, "r1") as journal:
+        Field(journal=journal)
+
+
+def test_an_event_of_a_newer_stopgo_is_told_by_its_kind() -> None:
+    journal = memory_journal()
+    journal.append(started())
+    body = journal.bodies()[0].replace(b'"Started"', b'"Recharged"')
+    event = event_of(body)
+    assert isinstance(event, UnknownKind)
+    assert (event.kind, event.number, event.run_id) == ("Recharged", 1, "run")
+    assert "Recharged: this stopgo does not know it" in event_line(event)
+
+
+def test_missions_that_no_run_needs_are_retired_and_their_names_kept() -> None:
+    field = Field()
+    station = field.station()
+    for revision in range(1, MISSIONS_KEPT + 4):
+        station.push(corridor(revision=revision))
+    kept = [field.journal.mission(corridor().id, revision) is not None for revision in range(1, 8)]
+    assert kept == [False, False, *[True] * (MISSIONS_KEPT + 1)]
+    newest = field.journal.newest_revision(corridor().id)
+    assert newest is not None
+    assert newest.revision == MISSIONS_KEPT + 3
+    with pytest.raises(AnswerIsNo, match="older_revision"):
+        station.push(corridor(revision=1))
+
+
+def test_a_push_that_would_take_the_space_kept_for_stops_is_rejected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_journal(tmp_path, "r1") as journal:
+        field = Field(journal=journal)
+        monkeypatch.setattr(Reserve, "_free", lambda self: 1024)
+        with pytest.raises(AnswerIsNo, match="make room"):
+            field.station().push(corridor())
+
+
+class NewerRun(msgspec.Struct):
+    state: str
