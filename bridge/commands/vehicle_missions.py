@@ -17,8 +17,8 @@ from bridge.mavlink.line.origin import check_origin
 from bridge.mavlink.line.peer import Peer, reached
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import read_line
+from bridge.mavlink.transfer.after_failure import own_items
 from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.left import own_items
 from bridge.mavlink.transfer.upload import NOTHING_SENT, Uploaded, check_standing, clear, if_stopped, upload
 from mission.document import Mission, SiteOrigin
 from mission.errors import InputError

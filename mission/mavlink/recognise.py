@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from mission.document import Mission
 from mission.errors import InputError
 from mission.mavlink.items import Command, Item, ItemRole, MavFrame, Placed
-from mission.mavlink.numbers import stop_numbered
+from mission.mavlink.stop_numbers import stop_numbered
 
 PLACES = frozenset({Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME})
 """Commands that say where to drive, param1 being seconds to stay."""

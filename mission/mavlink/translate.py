@@ -14,8 +14,8 @@ from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.corners import corners
 from mission.mavlink.items import Command, Item, ItemList, Placed
 from mission.mavlink.notes import notes_of
-from mission.mavlink.numbers import numbers_of
 from mission.mavlink.refusals import check, check_count, check_fields, origin_of
+from mission.mavlink.stop_numbers import numbers_of
 from mission.mavlink.translation_options import ScanWait, Settle, TranslationOptions, Trigger
 from mission.mavlink.writing import (
     capture,

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 
 from bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
-from bridge.mavlink.auto.logbook import Logbook, Ordered, Owed
+from bridge.mavlink.auto.logbook import Logbook, Ordered, PendingCommand
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.transfer.download import download
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
@@ -38,7 +38,7 @@ AT_STOP = ("SETTLING", "SCANNING", "VERIFYING")
 
 
 class AutoFollower:
-    """Looks at each message with what is known by then; `act` tells the vehicle what is owed to it.
+    """Looks at each message with what is known by then; `act` sends the vehicle the command that is pending.
 
     One that only looks keeps to itself what it sees, and tells the vehicle nothing.
     """
@@ -106,7 +106,7 @@ class AutoFollower:
         elif happened:
             self._write_down(listed, observed, before)
         self._lead_past(listed, observed)
-        return self.run.at > before.at and self._book.owed is None
+        return self.run.at > before.at and self._book.pending is None
 
     def _write_down(self, listed: ListedMission, observed: Observation, before: Run) -> None:
         """Store what has happened, with what it wants of the vehicle, and the scan that counts no more."""
@@ -114,7 +114,7 @@ class AutoFollower:
         with self._book.journal.transaction():
             self.run = self._book.move(
                 lambda run: () if run != before else self._happened(run, listed, observed),
-                partial(self._owing, listed),
+                partial(self._pending_after, listed),
             )
             waiting = self.run.at == before.at and self.run.stop_state in EARLY
             if capture is not None and self.run != before and not waiting:
@@ -140,10 +140,10 @@ class AutoFollower:
 
     def _busy(self) -> bool:
         """Whether the vehicle is being told something: what it does until then is neither here nor there."""
-        ordered, owed = self._book.ordered, self._book.owed
-        if owed is not None:
+        ordered, pending = self._book.ordered, self._book.pending
+        if pending is not None:
             self._due.set()
-        return owed is not None or (ordered is not None and ordered.until_ns > self._book.clock.now_ns())
+        return pending is not None or (ordered is not None and ordered.until_ns > self._book.clock.now_ns())
 
     def _look_at_clock(self) -> None:
         """A vehicle that was started anew stands, and has forgotten its mode, origin and item."""
@@ -210,15 +210,15 @@ class AutoFollower:
 
     # What the vehicle is told
 
-    def _owing(self, listed: ListedMission, before: Run, after: Run) -> Owed | None:
+    def _pending_after(self, listed: ListedMission, before: Run, after: Run) -> PendingCommand | None:
         """What a step of the run wants of the vehicle; of a run that somebody else has halted, nothing."""
         since_ns = self._book.clock.now_ns()
         if tried_again(before, after):
-            return Owed(deed="jump", place=listed.stops[after.at].at, since_ns=since_ns)
+            return PendingCommand(command="jump", place=listed.stops[after.at].at, since_ns=since_ns)
         early = after.state == "FINISHED" and (self._observer.sequence or 0) < listed.sequence(listed.end - 1)
         stops = before.state == "RUNNING" and (after.state in ("HELD", "ABORTED") or early)
         if stops and self._observer.mode == AUTO and self._strange_list(before, listed) is None:
-            return Owed(deed="hold", place=0, since_ns=since_ns)
+            return PendingCommand(command="hold", place=0, since_ns=since_ns)
         return None
 
     def _lead_past(self, listed: ListedMission, observed: Observation) -> None:
@@ -227,36 +227,36 @@ class AutoFollower:
             return
         place = progress.passed_by(self.run, listed, observed)
         if place is not None:
-            owed = Owed(deed="jump", place=place, since_ns=self._book.clock.now_ns())
-            self._book.journal.store_fact("owed", owed)
+            pending = PendingCommand(command="jump", place=place, since_ns=self._book.clock.now_ns())
+            self._book.journal.store_fact("pending", pending)
             self._due.set()
 
     def act(self) -> None:
-        """Tell the vehicle what is owed to it, until closed, and then what is owed still."""
+        """Send the vehicle what is pending, until closed, and then what is pending still."""
         while not self._closing.is_set():
             self._due.wait()
             self._due.clear()
             if self._compare_due:
                 self._compare_due = False
                 self.compare()
-            owed, listed = self._book.owed, self._book.listed
-            if owed is None or listed is None or self._looks_only:
+            pending, listed = self._book.pending, self._book.listed
+            if pending is None or listed is None or self._looks_only:
                 continue
             try:
-                self._pay(owed, listed)
+                self._send(pending, listed)
             except (OutcomeUnknown, RobotUnreachable):
-                self._closing.wait(AGAIN_S)  # it is asked for again as long as it is owed
+                self._closing.wait(AGAIN_S)  # it is asked for again as long as it is pending
 
-    def _pay(self, owed: Owed, listed: ListedMission) -> None:
+    def _send(self, pending: PendingCommand, listed: ListedMission) -> None:
         try:
-            if owed.deed == "hold":
+            if pending.command == "hold":
                 self._commands.hold()
             else:
-                self._commands.jump(listed.sequence(owed.place))
+                self._commands.jump(listed.sequence(pending.place))
         except Denied as denied:
             reason = denied.refused.message
             self._book.move(lambda run: () if run.state != "RUNNING" else (runs.held(run, reason),))
-        self._book.paid(owed)
+        self._book.clear_pending(pending)
 
     def compare(self) -> None:
         """Find out whether the vehicle holds what it was sent, item by item; unless it will not tell now."""

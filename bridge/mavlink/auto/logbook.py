@@ -69,10 +69,10 @@ class Ordered(msgspec.Struct, frozen=True, kw_only=True):
     """Then nobody is carrying it out any more."""
 
 
-class Owed(msgspec.Struct, frozen=True, kw_only=True):
+class PendingCommand(msgspec.Struct, frozen=True, kw_only=True):
     """What the vehicle must be told because of what the run has come to."""
 
-    deed: Literal["hold", "jump"]
+    command: Literal["hold", "jump"]
     place: int
     since_ns: int
 
@@ -141,10 +141,10 @@ class Logbook:
             self.journal.store_fact("boot", Boot(boot_id=boot_id, began_ns=began_ns))
         return anew and boot is not None
 
-    def move(self, moved: Callable[[Run], tuple[Change, ...]], owed: Owing | None = None) -> Run:
+    def move(self, moved: Callable[[Run], tuple[Change, ...]], pending: PendingAfter | None = None) -> Run:
         """Store all that has happened to the run; `moved` says what, from the run as it is stored.
 
-        `owed` tells what each change wants of the vehicle; it is stored with it.
+        `pending` tells what each change wants of the vehicle; it is stored with it.
         """
         if not moved(self.run):
             return self.run
@@ -152,9 +152,9 @@ class Logbook:
             run = self.run
             for change in moved(run):
                 self._put(change)
-                deed = owed(run, change.run) if owed else None
-                if deed is not None:
-                    self.journal.store_fact("owed", deed)
+                command = pending(run, change.run) if pending else None
+                if command is not None:
+                    self.journal.store_fact("pending", command)
                 run = change.run
         return run
 
@@ -190,17 +190,17 @@ class Logbook:
         return self.journal.fact("ordered", Ordered)
 
     @property
-    def owed(self) -> Owed | None:
-        return self.journal.fact("owed", Owed)
+    def pending(self) -> PendingCommand | None:
+        return self.journal.fact("pending", PendingCommand)
 
-    def paid(self, owed: Owed) -> None:
-        """The vehicle was told; unless it already owes something else."""
+    def clear_pending(self, pending: PendingCommand) -> None:
+        """The vehicle was told; unless something else is pending already."""
         with self.journal.transaction():
-            if self.owed == owed:
-                self.journal.forget_fact("owed")
+            if self.pending == pending:
+                self.journal.forget_fact("pending")
 
 
-Owing = Callable[[Run, Run], Owed | None]
+PendingAfter = Callable[[Run, Run], PendingCommand | None]
 
 
 def remember(book: Logbook, mission: Mission, sent: ItemList) -> None:
@@ -219,7 +219,7 @@ def remember(book: Logbook, mission: Mission, sent: ItemList) -> None:
         book.journal.store_fact("run", runs.installed(book.run, mission))
         book.journal.store_fact("sent", told)
         book.journal.store_fact("items", PackedItems(packed))
-        book.journal.forget_fact("owed")
+        book.journal.forget_fact("pending")
 
 
 def forget(book: Logbook) -> None:
@@ -227,7 +227,7 @@ def forget(book: Logbook) -> None:
     with book.journal.transaction():
         book.move(lambda run: () if run.over else (_replaced(run, "the vehicle's mission was cleared"),))
         book.journal.store_fact("run", Run())
-        for name in ("sent", "items", "owed"):
+        for name in ("sent", "items", "pending"):
             book.journal.forget_fact(name)
 
 

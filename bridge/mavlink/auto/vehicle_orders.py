@@ -291,7 +291,7 @@ class VehicleOrders:
         with journal.transaction():
             if isinstance(outcome, Change):
                 self._book.move(lambda run: (outcome,) if run != outcome.run else ())
-                journal.forget_fact("owed")
+                journal.forget_fact("pending")
             if lease is not None:
                 journal.store_fact("lease", lease)
             answer = answer_to(order, refused, self._book.run)

@@ -18,7 +18,7 @@ from mission.errors import OutcomeUnknown, RobotUnreachable
 from mission.mavlink.captures import Picture, picture_of, result_of
 from mission.mavlink.enums import CommandResult, MessageId
 from mission.mavlink.items import Command
-from mission.mavlink.numbers import numbers_of
+from mission.mavlink.stop_numbers import numbers_of
 from mission.mavlink.telemetry import Message
 from mission.mavlink.writing import SCAN_MESSAGE
 from mission.run.scans import ScanFailed, ScanResult

@@ -17,7 +17,7 @@ from bridge.mavlink.line.messages import (
     result_name,
 )
 from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.transfer.pace import Pace, TransferTimeout, window_for
+from bridge.mavlink.transfer.flow_control import Pace, TransferTimeout, window_for
 from mission.errors import AnswerIsNo, RobotUnreachable
 from mission.mavlink.enums import MissionResult
 from mission.mavlink.items import Item

@@ -15,7 +15,7 @@ from typing import Literal
 from bridge.console import Progress
 from bridge.mavlink.line.messages import ack_message, count_message, item_message, list_request, of_mission
 from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.transfer.pace import Pace, TransferTimeout
+from bridge.mavlink.transfer.flow_control import Pace, TransferTimeout
 from mission.mavlink.enums import MissionResult
 from mission.mavlink.items import Item
 from mission.mavlink.telemetry import Message

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from bridge.console import Progress
 from bridge.mavlink.line.messages import result_name
 from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.transfer.after_failure import cancel, emptied, left_on, own_items, unknown
 from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.left import cancel, emptied, left_on, own_items, unknown
-from bridge.mavlink.transfer.pace import window_for
+from bridge.mavlink.transfer.flow_control import window_for
 from bridge.mavlink.transfer.sending import TransferEnd, send_items
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from mission.mavlink.autopilots import autopilot_named

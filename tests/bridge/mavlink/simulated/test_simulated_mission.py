@@ -9,8 +9,8 @@ import pytest
 
 from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
 from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.numbers import stop_numbered
 from mission.mavlink.read_back import differences, upload_of
+from mission.mavlink.stop_numbers import stop_numbered
 from mission.mavlink.translate import translate
 from tests.bridge.mavlink.simulated.bench import ACCEPTED, Bench, item_of
 from tests.mission.worlds import square_tour

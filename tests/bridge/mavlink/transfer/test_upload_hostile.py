@@ -12,8 +12,8 @@ from bridge.mavlink.line.url import Url
 from bridge.mavlink.simulated.profiles import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
 from bridge.mavlink.simulated.vehicle_process import vehicle_on
+from bridge.mavlink.transfer.after_failure import own_items
 from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.left import own_items
 from bridge.mavlink.transfer.upload import clear, upload
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.lists import stops

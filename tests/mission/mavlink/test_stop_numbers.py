@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from mission.document import Mission
-from mission.mavlink.numbers import numbers_of, stop_numbered
+from mission.mavlink.stop_numbers import numbers_of, stop_numbered
 from tests.mission.worlds import mission_of, stop
 
 

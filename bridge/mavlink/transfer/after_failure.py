@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from bridge.mavlink.line.messages import ack_message, clear_all
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.pace import window_for
+from bridge.mavlink.transfer.flow_control import window_for
 from bridge.mavlink.transfer.sending import send_items
 from mission.errors import AnswerIsNo, RobotUnreachable
 from mission.mavlink.enums import MissionResult
