@@ -220,8 +220,8 @@ def reached(connection: Connection) -> AbstractContextManager[Station]:
 
 
 def _vehicle(connection: Connection, mavlink: Mavlink) -> AbstractContextManager[Station]:
-    from bridge.mavlink.auto.vehicle_agent import Options, connect
     from bridge.mavlink.auto.vehicle_orders import Consent
+    from bridge.mavlink.auto.vehicle_station import Options, connect
     from bridge.mavlink.line.wire import read_line
 
     url, key = read_line(mavlink.url, mavlink.signing_key, insecure=connection.insecure)

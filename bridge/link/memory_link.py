@@ -31,6 +31,11 @@ class Switchboard:
         self.alive: set[str] = set()
         self.cut = False
         """While true nothing passes."""
+        self.failure: Exception | None = None
+        """What has ended the work of the end that answers; raised to whoever asks."""
+
+    def fail(self, error: Exception) -> None:
+        self.failure = error
 
     def link(self, seals: Seals = NO_SEALS) -> MemoryLink:
         return MemoryLink(self, seals)
@@ -41,6 +46,8 @@ class Switchboard:
 
     def answers(self, question: Packet) -> list[Packet]:
         """What all who serve its key answer to a question, as it arrives where it was asked."""
+        if self.failure is not None:
+            raise self.failure
         arrived: list[Packet] = []
         for asked in self.carried(question):
             request = Request(asked.key, asked.payload, asked.parameters, asked.seal)

@@ -30,14 +30,14 @@ from bridge.link.protocol import (
     encode,
     untrusted,
 )
-from bridge.robot.base import Base, Scanner
-from bridge.robot.controller import Controller
 from bridge.robot.inbox import Inbox
 from bridge.robot.journal import Journal
-from bridge.robot.pages import POSES_KEPT, address_of, events_page, poses_page
+from bridge.robot.pages import POSES_KEPT, address_of, events_page, part_page, poses_page
+from bridge.robot.runner import Position, Runner, state_report
 from mission import __version__
 from mission.document import Transform
-from mission.events import PoseReport
+from mission.events import PoseReport, StateReport
+from mission.run.lease import Lease
 from mission.run.orders import Order
 
 STATE_EVERY_S = 1.0
@@ -75,32 +75,35 @@ class Agent:
         keys: KeyExpressions,
         link: Link,
         journal: Journal,
-        controller: Controller,
-        base: Base,
-        scanner: Scanner,
+        runner: Runner,
         clock: Clock,
         command_clock: Clock,
+        inbox: Inbox | None = None,
         speed_up: float = 1.0,
         to_map: Transform | None = None,
+        failed: Callable[[Exception], None] = lambda error: None,
     ) -> None:
+        """`inbox` takes missions, if the robot does; `failed` is told what ended one of its works."""
         self._keys = keys
         self._link = link
         self._journal = journal
-        self._controller = controller
-        self._base = base
+        self._runner = runner
         self._clock = clock
         self._command_clock = command_clock
-        self._profiles = scanner.profiles
         self._pose_pause_s = max(POSE_EVERY_S / speed_up, LEAST_POSE_PAUSE_S)
-        self._inbox = Inbox(journal, controller, scanner.profiles)
+        self._inbox = inbox
         self._to_map = to_map
         self._closing = threading.Event()
         self._news = threading.Event()
         self._failed = threading.Event()
         self._error: Exception | None = None
+        self._tell_failure = failed
         self._threads: list[threading.Thread] = []
         self._watchers: set[str] = set()
         self._poses: deque[PoseReport] = deque(maxlen=POSES_KEPT)
+        self._poses_boot = runner.boot_id
+        self._pose_seq = self._state_seq = 0
+        self._stating = threading.Lock()
         self._heard_ns = command_clock.now_ns()
 
     def serve(self) -> None:
@@ -109,7 +112,7 @@ class Agent:
         link.serve(keys.info, self._info)
         link.serve(keys.log, self._log)
         link.serve(keys.poses, self._past_poses, bulk=True)
-        link.serve(keys.mission("*", "**"), self._mission, bulk=True)
+        link.serve(keys.mission("*", "**" if self._inbox else "part/*"), self._mission, bulk=True)
         link.serve(keys.command("*"), self._command)
         link.watch_presence(keys.watcher("*"), self._watcher)
 
@@ -120,8 +123,8 @@ class Agent:
         self._tell_state = link.publisher(keys.state)
         self._tell_event = link.publisher(keys.event)
         self._tell_pose = link.publisher(keys.pose, bulk=True)
-        self._controller.changed = self._news.set
-        for work in (self._controller.serve, self._tell_news, self._tell_poses):
+        self._runner.changed = self._news.set
+        for work in (*self._runner.works, self._tell_news, self._tell_poses):
             thread = threading.Thread(target=self._watched, args=(work,), name=work.__name__, daemon=True)
             self._threads.append(thread)
             thread.start()
@@ -143,14 +146,14 @@ class Agent:
         except Exception as error:  # noqa: BLE001 (the end of a thread)
             self._error = error
             self._failed.set()
+            self._tell_failure(error)
 
     def close(self) -> None:
-        self._controller.close()
+        self._runner.close()
         self._closing.set()
         self._news.set()
         for thread in self._threads:
             thread.join()
-        self._base.stop()
 
     def _watcher(self, key: str, alive: bool) -> None:
         self._contact()
@@ -175,10 +178,13 @@ class Agent:
                 check_ordering(request)
         except Untrusted as error:
             return encode(untrusted(error))
-        return encode(self._inbox.receive(request))
+        return encode(self._mission_step(request))
 
     def _commit(self, request: Request, commit: Commit) -> Reply:
-        return self._inbox.receive(request)
+        return self._mission_step(request)
+
+    def _mission_step(self, request: Request) -> Reply:
+        return part_page(self._journal, request) if self._inbox is None else self._inbox.receive(request)
 
     def _ordered(
         self, request: Request, kind: type[Signed], carry_out: Callable[[Request, Signed], Reply]
@@ -199,13 +205,13 @@ class Agent:
             protocol=VERSION,
             stopgo=__version__,
             robot=self._keys.robot,
-            boot_id=self._controller.boot_id,
+            boot_id=self._runner.boot_id,
             clock_ns=self._command_clock.now_ns(),
-            state=self._controller.report(),
-            lease=self._controller.lease,
+            state=self._state(),
+            lease=self._journal.fact("lease", Lease),
             chunk_bytes=CHUNK_BYTES,
             document_bytes=MAX_DOCUMENT_BYTES,
-            profiles=self._profiles,
+            profiles=None if self._inbox is None else self._inbox.profiles,
             to_map=self._to_map,
         )
         return encode(info)
@@ -217,7 +223,7 @@ class Agent:
     def _obey(self, request: Request, order: Order) -> Reply:
         if not request.key.endswith(f"/cmd/{order.verb}"):
             return Malformed(message=f"command {order.verb} on {request.key}")
-        return self._controller.obey(order)
+        return self._runner.obey(order)
 
     def _log(self, request: Request) -> bytes:
         self._contact()
@@ -226,7 +232,7 @@ class Agent:
     def _past_poses(self, request: Request) -> bytes:
         self._contact()
         # A copy: meanwhile the robot goes on writing.
-        return encode(poses_page(self._poses.copy(), self._controller.boot_id, request))
+        return encode(poses_page(self._poses.copy(), self._poses_boot, request))
 
     def _tell_news(self) -> None:
         """State on every change and every second; each event once, in order."""
@@ -234,27 +240,39 @@ class Agent:
         while not self._closing.is_set():
             self._news.wait(STATE_EVERY_S)
             self._news.clear()
-            self._controller.hear_of_link(self._silent_s())
+            self._runner.hear_of_link(self._silent_s())
             for event in self._journal.events(since=told):
                 self._tell_event(encode(event))
                 told = event.number
-            self._tell_state(encode(self._controller.report()))
+            self._tell_state(encode(self._state()))
+
+    def _state(self) -> StateReport:
+        with self._stating:
+            self._state_seq += 1
+            return state_report(
+                self._runner, robot=self._keys.robot, seq=self._state_seq, ns=self._clock.now_ns(),
+                newest=self._journal.newest,
+            )  # fmt: skip
 
     def _tell_poses(self) -> None:
-        seq = 0
         while not self._closing.wait(self._pose_pause_s):
-            seq += 1
-            report = self._pose_report(seq)
-            self._poses.append(report)
-            self._tell_pose(encode(report))
+            position = self._runner.position()
+            if position is not None:
+                report = self._pose_report(position)
+                self._poses.append(report)
+                self._tell_pose(encode(report))
 
-    def _pose_report(self, seq: int) -> PoseReport:
-        run, now_ns = self._controller.run, self._clock.now_ns()
+    def _pose_report(self, position: Position) -> PoseReport:
+        (run, _), boot_id = self._runner.snapshot(), self._runner.boot_id
+        if boot_id != self._poses_boot:  # each boot counts its poses anew
+            self._poses_boot, self._pose_seq = boot_id, 0
+            self._poses.clear()
+        self._pose_seq += 1
         return PoseReport(
-            robot=self._keys.robot, boot_id=self._controller.boot_id, seq=seq, robot_ns=now_ns,
+            robot=self._keys.robot, boot_id=boot_id, seq=self._pose_seq, robot_ns=position.ns,
             run_id=run.run_id,
-            mission_time_s=(now_ns - run.started_ns) / 1e9 if run.run_id else None,
-            pose=self._base.pose(), speed=self._base.speed(),
+            mission_time_s=(position.ns - run.started_ns) / 1e9 if run.run_id else None,
+            pose=position.pose, speed=position.speed,
         )  # fmt: skip
 
 

@@ -1,11 +1,16 @@
-"""What was answered to each order: one that comes again gets its answer again, and is carried out once."""
+"""What an order is decided by, and what was answered: one that comes again is carried out once."""
 
 from __future__ import annotations
 
 import hashlib
+import uuid
+from typing import Any
 
 from bridge.link.protocol import encode
 from bridge.robot.journal import ANSWERS_KEPT, Journal
+from mission.document import Mission
+from mission.run.decision import Situation
+from mission.run.lease import Lease
 from mission.run.orders import Answer, Order, Refused
 from mission.run.states import Run
 
@@ -36,6 +41,13 @@ def remember_answer(journal: Journal, order: Order, answer: Answer, *, keep: int
     with journal.transaction():
         journal.store_answer(_sha256(order), answer)
         journal.forget_answers(keep=keep)
+
+
+def situation_of(journal: Journal, mission: Mission | None, **seen: Any) -> Situation:
+    """All that an order is decided by: what is seen now, and what the journal knows of it."""
+    has_run = mission is not None and journal.has_run(mission.id, mission.revision)
+    lease, new_run_id = journal.fact("lease", Lease), uuid.uuid4().hex[:12]
+    return Situation(mission=mission, has_run=has_run, lease=lease, new_run_id=new_run_id, **seen)
 
 
 def _sha256(order: Order) -> str:

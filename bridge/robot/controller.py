@@ -17,12 +17,13 @@ import msgspec
 
 from bridge.link.clock import Clock
 from bridge.link.protocol import Commit, Rejected
-from bridge.robot.answers import answer_to, answered, remember_answer
+from bridge.robot.answers import answer_to, answered, remember_answer, situation_of
 from bridge.robot.base import Base, Rest, Scanner
 from bridge.robot.journal import Journal
 from bridge.robot.owed import Owed
+from bridge.robot.runner import Position
 from mission.document import Mission
-from mission.events import AnyEvent, Pose, StateReport
+from mission.events import AnyEvent, Pose
 from mission.run import revision, way
 from mission.run import states as runs
 from mission.run.battery import what_is_missing
@@ -66,6 +67,7 @@ class Controller:
         self.boot_id = boot_id or new_boot_id()
         self.changed: Callable[[], None] = lambda: None
         """Called after every stored change."""
+        self.works: tuple[Callable[[], None], ...] = (self.serve,)
         self._journal = journal
         self._base = base
         self._scanner = scanner
@@ -78,7 +80,6 @@ class Controller:
         self._wake = threading.Event()
         self._closing = False
         self._silent_s = 0.0
-        self._seq = 0
         self._mission: Mission | None = None
         self._run = Run()
         self._owed = Owed()
@@ -154,21 +155,11 @@ class Controller:
             self._journal.store_fact("lease", lease)
 
     def _situation(self) -> Situation:
-        mission = self._mission
-        return Situation(
-            run=self._run,
-            mission=mission,
-            has_run=mission is not None and self._journal.has_run(mission.id, mission.revision),
-            pose=self._base.pose(),
-            now_ns=self._clock.now_ns(),
-            command_ns=self._command_clock.now_ns(),
-            new_run_id=uuid.uuid4().hex[:12],
-            lease=self.lease,
-            battery=self._base.battery(),
-            endurance_s=self._base.endurance_s(),
-            not_ready=self._base.not_ready(),
-            boot_id=self.boot_id,
-        )
+        return situation_of(
+            self._journal, self._mission, run=self._run, pose=self._base.pose(), now_ns=self._clock.now_ns(),
+            command_ns=self._command_clock.now_ns(), battery=self._base.battery(),
+            endurance_s=self._base.endurance_s(), not_ready=self._base.not_ready(), boot_id=self.boot_id,
+        )  # fmt: skip
 
     def _answer(self, order: Order, decision: Decision | Refused) -> Answer:
         refused = decision if isinstance(decision, Refused) else None
@@ -275,16 +266,22 @@ class Controller:
     # The work, in the controller's own thread
 
     def serve(self) -> None:
-        """Work until closed."""
-        while not self._closing:
-            self._wake.clear()
-            try:
-                worked = self.step()
-            except sqlite3.OperationalError as error:
-                self._halt_unstored(error)
-                worked = False
-            if not worked:
-                self._wake.wait()
+        """Work until closed, and then stand still."""
+        try:
+            while not self._closing:
+                self._wake.clear()
+                if not self._stepped():
+                    self._wake.wait()
+        finally:
+            self._base.stop()
+
+    def _stepped(self) -> bool:
+        """Whether there was something to do, and it could be stored."""
+        try:
+            return self.step()
+        except sqlite3.OperationalError as error:
+            self._halt_unstored(error)
+            return False
 
     def close(self) -> None:
         """Stop where the robot is; the next boot finds the run as it was."""
@@ -413,10 +410,9 @@ class Controller:
         return revised.run
 
     def _put(self, change: Change) -> None:
-        with self._journal.transaction():
-            self._journal.store_fact("run", change.run)
-            for event in self._told_of(change):
-                self._journal.append(event)
+        self._journal.store_change(
+            change, robot=self.robot, boot_id=self.boot_id, now_ns=self._clock.now_ns()
+        )
 
     def _told_of(self, change: Change) -> Iterator[AnyEvent]:
         now_ns = self._clock.now_ns()
@@ -468,17 +464,16 @@ class Controller:
 
     # What others may know
 
-    def report(self) -> StateReport:
+    def snapshot(self) -> tuple[Run, Mission | None]:
         with self._lock:
-            self._seq += 1
-            run, stop = self._run, runs.stop_of(self._run, self._mission)
-            return StateReport(
-                robot=self.robot, boot_id=self.boot_id, seq=self._seq, robot_ns=self._clock.now_ns(),
-                state=run.state, run_id=run.run_id, mission_id=run.mission_id, revision=run.revision,
-                stop=stop.id if stop else None, stop_state=run.stop_state if stop else None,
-                done=run.done, skipped=run.skipped, battery=self._base.battery(),
-                last_event=self._journal.newest, next_revision=run.next_revision,
-            )  # fmt: skip
+            return self._run, self._mission
+
+    def position(self) -> Position:
+        ns = self._clock.now_ns()
+        return Position(self._base.pose(), self._base.speed(), ns)
+
+    def battery(self) -> float:
+        return self._base.battery()
 
 
 WORK: dict[str, Callable[[Controller, Run, Mission], None]] = {

@@ -26,7 +26,7 @@ from bridge.link.protocol import (
 )
 from bridge.robot.controller import Controller
 from bridge.robot.journal import Journal
-from bridge.robot.pages import address_of, mission_part
+from bridge.robot.pages import address_of, part_page
 from mission.document import Mission, digest_of
 from mission.problems import problems_of
 from mission.run.orders import Reason
@@ -41,7 +41,7 @@ class Inbox:
     def __init__(self, journal: Journal, controller: Controller, profiles: tuple[str, ...] | None) -> None:
         self._journal = journal
         self._controller = controller
-        self._profiles = profiles
+        self.profiles = profiles
 
     def receive(self, request: Request) -> Reply:
         """Answer one question on `…/mission/<id>/<step>`."""
@@ -61,9 +61,8 @@ class Inbox:
                 return self._chunk(mission_id, count_of(number), request)
             case ["commit"]:
                 return self._commit(mission_id, decode(request.payload, Commit))
-            case ["part", number]:
-                revision = count_of(request.parameters.get("revision", ""))
-                return mission_part(self._journal, mission_id, count_of(number), revision)
+            case ["part", _]:
+                return part_page(self._journal, request)
         return Malformed(message=f"no such step: {'/'.join(step)}")
 
     def _begin(self, mission_id: str, manifest: Manifest) -> Reply:
@@ -172,7 +171,7 @@ class Inbox:
             manifest.mission_id, manifest.revision, manifest.digest,
         ):  # fmt: skip
             return _no("digest", "the document's id, revision or digest is not the manifest's")
-        wrong = tuple(islice(what_is_wrong(mission, self._profiles), MOST_REASONS))
+        wrong = tuple(islice(what_is_wrong(mission, self.profiles), MOST_REASONS))
         return Rejected(reason="infeasible", messages=wrong) if wrong else mission
 
 

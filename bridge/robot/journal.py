@@ -23,6 +23,7 @@ from bridge.robot.sealed_rows import Damaged, Newest, bring_up_to_date, put, sea
 from mission.errors import InputError
 from mission.events import AnyEvent, event_of
 from mission.run.orders import Answer
+from mission.run.states import Change, told_of
 
 TABLES = """
 CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL);
@@ -132,6 +133,13 @@ class Journal:
 
     def store_fact(self, name: str, value: msgspec.Struct) -> None:
         self._write("facts", name, msgspec.json.encode(value))
+
+    def store_change(self, change: Change, *, robot: str, boot_id: str, now_ns: int) -> None:
+        """A step of the run, and the events that tell of it."""
+        with self.transaction():
+            self.store_fact("run", change.run)
+            for event in told_of(change, robot=robot, boot_id=boot_id, now_ns=now_ns):
+                self.append(event)
 
     def append(self, event: AnyEvent) -> AnyEvent:
         """The event with its number, which is the next one."""

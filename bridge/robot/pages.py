@@ -48,8 +48,13 @@ def poses_page(poses: Iterable[PoseReport], boot_id: str, request: Request) -> R
     return PosePage(boot_id=boot_id, poses=tuple(islice(later, POSE_PAGE)))
 
 
-def mission_part(journal: Journal, mission_id: str, number: int, revision: int) -> Reply:
-    """A piece of a stored mission."""
+def part_page(journal: Journal, request: Request) -> Reply:
+    """A piece of a stored mission, asked for on `…/mission/<id>/part/<number>`."""
+    mission_id, step = address_of(request.key)
+    try:
+        number, revision = count_of(step[1]), count_of(request.parameters.get("revision", ""))
+    except ValueError as error:
+        return Malformed(message=f"{'/'.join(step)}: {error}")
     stored = journal.mission(mission_id, revision)
     if stored is None:
         message = f"mission {mission_id} revision {revision} is not on this robot"

@@ -18,6 +18,7 @@ from bridge.link.protocol import KeyExpressions
 from bridge.robot.agent import Agent, on_link
 from bridge.robot.bodies import OpenBody
 from bridge.robot.controller import Controller, new_boot_id
+from bridge.robot.inbox import Inbox
 from bridge.robot.journal import Journal, open_journal
 from bridge.robot.simulator import NO_FAULTS, Faults
 from mission.document import Transform
@@ -79,8 +80,8 @@ def robot_on(
                 boot_id=boot_id,
             )  # fmt: skip
             agent = Agent(
-                keys=keys, link=link, journal=journal, controller=controller, base=body.base,
-                scanner=body.scanner, clock=clock, command_clock=wall, speed_up=options.speed_up,
+                keys=keys, link=link, journal=journal, runner=controller, clock=clock, command_clock=wall,
+                inbox=Inbox(journal, controller, body.scanner.profiles), speed_up=options.speed_up,
                 to_map=options.to_map,
             )  # fmt: skip
             with on_link(agent):

@@ -20,6 +20,7 @@ from bridge.robot.bodies import pose_of
 from bridge.robot.controller import Controller
 from bridge.robot.inbox import Inbox
 from bridge.robot.journal import Journal, memory_journal
+from bridge.robot.runner import state_report
 from bridge.robot.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
 from bridge.station.station import Station
 from mission.document import (
@@ -36,6 +37,7 @@ from mission.document import (
     Stop,
     sealed,
 )
+from mission.events import StateReport
 from mission.run.orders import Answer, Order, Verb
 from mission.run.revision import RevisionPolicy
 from mission.run.states import Run
@@ -111,10 +113,15 @@ class Field:
         self.link.close()
         self.link = self.board.link(seals)
         agent = Agent(
-            keys=self.keys, link=self.link, journal=self.journal, controller=self.controller, base=self.base,
-            scanner=self.scanner, clock=self.clock, command_clock=self.clock,
+            keys=self.keys, link=self.link, journal=self.journal, runner=self.controller, inbox=self.inbox,
+            clock=self.clock, command_clock=self.clock,
         )  # fmt: skip
         agent.serve()
+
+    def report(self) -> StateReport:
+        """What the robot tells of itself."""
+        newest = self.journal.newest
+        return state_report(self.controller, robot="r1", seq=1, ns=self.clock.now_ns(), newest=newest)
 
     def commit(self, manifest: Manifest) -> Commit:
         not_after_ns = self.clock.now_ns() + 10**15

@@ -24,6 +24,7 @@ from bridge.robot import agent as agents
 from bridge.robot.agent import Agent
 from bridge.robot.bodies import pose_of
 from bridge.robot.controller import Controller
+from bridge.robot.inbox import Inbox
 from bridge.robot.journal import memory_journal
 from bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from bridge.station.station import Station
@@ -62,8 +63,9 @@ def test_a_date_that_is_set_forward_at_both_ends_during_a_run_moves_nothing(
         mission_taken=lambda mission: base.stand_at_start(pose_of(mission.start)),
     )  # fmt: skip
     agent = Agent(
-        keys=KeyExpressions("r1"), link=board.link(), journal=journal, controller=controller, base=base,
-        scanner=scanner, clock=clock, command_clock=WallClock(), speed_up=50,
+        keys=KeyExpressions("r1"), link=board.link(), journal=journal, runner=controller,
+        inbox=Inbox(journal, controller, scanner.profiles), clock=clock, command_clock=WallClock(),
+        speed_up=50,
     )  # fmt: skip
     with agents.on_link(agent):
         alice, bob = (Station(board.link(), KeyExpressions("r1"), commander=who) for who in ("alice", "bob"))

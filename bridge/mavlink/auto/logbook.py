@@ -160,13 +160,11 @@ class Logbook:
 
     def _put(self, change: Change) -> None:
         now_ns, run, before = self.clock.now_ns(), change.run, self.run
-        self.journal.store_fact("run", run)
+        self.journal.store_change(change, robot=self.robot, boot_id=self.boot_id, now_ns=now_ns)
         if run.run_id != before.run_id:
             self.use(-1, self.boot_ms)
         if run.state != before.state:
             self.journal.store_fact("changed", Moment(now_ns))
-        for event in runs.told_of(change, robot=self.robot, boot_id=self.boot_id, now_ns=now_ns):
-            self.journal.append(event)
 
     @property
     def used(self) -> tuple[int, int]:

@@ -7,7 +7,6 @@ whoever watches does not take for somebody else's what the vehicle does meanwhil
 from __future__ import annotations
 
 import math
-import uuid
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -18,8 +17,7 @@ from bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
 from bridge.mavlink.auto.logbook import Logbook, Ordered
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.transfer.download import download
-from bridge.robot.answers import answer_to, answered, remember_answer
-from mission.document import Mission
+from bridge.robot.answers import answer_to, answered, remember_answer, situation_of
 from mission.events import Pose
 from mission.mavlink.autopilots.kind import AUTO, HOLD, why_no_rover
 from mission.mavlink.following import steps as progress
@@ -30,7 +28,7 @@ from mission.mavlink.following.steps import Observation
 from mission.mavlink.local_frame import apart
 from mission.mavlink.read_back import differences
 from mission.run import states as runs
-from mission.run.decision import Decision, Situation, decide, handed_over
+from mission.run.decision import Decision, decide, handed_over
 from mission.run.lease import Lease
 from mission.run.orders import DRIVING, FREE_VERBS, Answer, Order, Refused
 from mission.run.states import Change, Run
@@ -148,17 +146,12 @@ class VehicleOrders:
             return Refused("no_position", "the vehicle does not tell where it is; does its navigation run?")
         if here is not None and order.verb != "start":
             here = on_way(run, listed, here)
-        return decide(order, self._situation(run, listed.mission, here or NOWHERE))
-
-    def _situation(self, run: Run, mission: Mission, pose: Pose) -> Situation:
-        journal = self._book.journal
-        return Situation(
-            run=run, mission=mission,
-            has_run=journal.has_run(mission.id, mission.revision),
-            pose=pose, now_ns=self._book.clock.now_ns(), command_ns=self._wall.now_ns(),
-            new_run_id=uuid.uuid4().hex[:12], lease=journal.fact("lease", Lease),
+        situation = situation_of(
+            self._book.journal, listed.mission, run=run, pose=here or NOWHERE,
+            now_ns=self._book.clock.now_ns(), command_ns=self._wall.now_ns(),
             battery=self._observer.battery, endurance_s=None, boot_id=self._book.boot_id,
         )  # fmt: skip
+        return decide(order, situation)
 
     # What each verb does
 

@@ -20,6 +20,7 @@ from bridge.robot import agent as agents
 from bridge.robot.agent import Agent
 from bridge.robot.bodies import pose_of
 from bridge.robot.controller import Controller
+from bridge.robot.inbox import Inbox
 from bridge.robot.journal import memory_journal
 from bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from bridge.station.follow import Report, Silence
@@ -38,7 +39,7 @@ def test_the_time_left_at_the_start_is_the_plan() -> None:
     field = Field()
     field.station().push(corridor())
     field.order("start")
-    left = remaining_s(corridor(), field.controller.report(), (), 0.0)
+    left = remaining_s(corridor(), field.report(), (), 0.0)
     assert left == schedule(corridor()).total_s
 
 
@@ -49,7 +50,7 @@ def test_the_time_left_counts_down_and_ends_at_zero() -> None:
     left = []
     while field.controller.step():
         events = field.journal.events()
-        left.append(remaining_s(corridor(), field.controller.report(), events, events[-1].mission_time_s))
+        left.append(remaining_s(corridor(), field.report(), events, events[-1].mission_time_s))
     assert left == sorted(left, reverse=True)
     assert left[-1] < 0.1
 
@@ -60,7 +61,7 @@ def test_the_table_names_stop_state_battery_link_and_time() -> None:
     field.order("start")
     for _ in range(3):
         field.controller.step()
-    lines = "\n".join(table_lines(corridor(), field.controller.report(), None, field.journal.events(), 4.0))
+    lines = "\n".join(table_lines(corridor(), field.report(), None, field.journal.events(), 4.0))
     for said in (
         "RUNNING  s1 SCANNING",
         "0 done, 0 skipped of 3",
@@ -76,7 +77,7 @@ def test_the_table_is_drawn_in_place() -> None:
     table = Table(written.append)
     field = Field()
     for _ in range(2):
-        table.show(field.controller.report())
+        table.show(field.report())
     height = written[0].count("\n")
     assert written[1].startswith(f"\x1b[{height}A")
     assert written[1].count("\n") == height
@@ -89,7 +90,7 @@ def test_lines_tell_events_and_silence_but_not_every_pose() -> None:
     field.station().push(corridor())
     field.order("start")
     field.work()
-    for report in (field.controller.report(), *field.journal.events(), Silence(seconds=3.0)):
+    for report in (field.report(), *field.journal.events(), Silence(seconds=3.0)):
         lines.show(report)
     assert len(said) == len(field.journal.events()) + 1
     assert said[-1] == "no word for 3 s"
@@ -102,7 +103,7 @@ def test_a_robot_cannot_colour_the_terminal(capsys: pytest.CaptureFixture[str]) 
     )  # fmt: skip
     written: list[str] = []
     table = Table(written.append)
-    table.show(Field().controller.report())
+    table.show(Field().report())
     table.show(held)
     Lines(say).show(held)
     tell(f"one\n{RED}")
@@ -126,8 +127,9 @@ def test_events_missed_while_the_link_was_cut_are_told_once_and_in_order() -> No
         mission_taken=lambda mission: base.stand_at_start(pose_of(mission.start)),
     )  # fmt: skip
     agent = Agent(
-        keys=KeyExpressions("r1"), link=board.link(), journal=journal, controller=controller, base=base,
-        scanner=scanner, clock=wall, command_clock=WallClock(), speed_up=200,
+        keys=KeyExpressions("r1"), link=board.link(), journal=journal, runner=controller,
+        inbox=Inbox(journal, controller, scanner.profiles), clock=wall, command_clock=WallClock(),
+        speed_up=200,
     )  # fmt: skip
     with agents.on_link(agent):
         station = Station(board.link(), KeyExpressions("r1"), commander="test")
@@ -177,8 +179,7 @@ def test_a_robot_whose_work_has_failed_does_not_look_alive() -> None:
     field.station().push(corridor())
     agent = Agent(
         keys=KeyExpressions("r1"), link=Switchboard().link(), journal=field.journal,
-        controller=field.controller, base=field.base, scanner=field.scanner, clock=field.clock,
-        command_clock=WallClock(),
+        runner=field.controller, clock=field.clock, command_clock=WallClock(),
     )  # fmt: skip
 
     def broken(*arguments: object, **options: object) -> None:

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from bridge.mavlink.auto.logbook import Logbook, logbook, remember
-from bridge.mavlink.auto.vehicle_agent import Options, connect
 from bridge.mavlink.auto.vehicle_orders import Consent
+from bridge.mavlink.auto.vehicle_station import Options, connect
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.simulated.profiles import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting

@@ -1,0 +1,142 @@
+"""A run that an autopilot drives by itself in AUTO, for an agent to serve.
+
+What the vehicle tells moves the run on in the logbook; orders are done by its autopilot.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from bridge.link.clock import Clock
+from bridge.link.memory_link import Switchboard
+from bridge.mavlink.auto.auto_follower import AutoFollower
+from bridge.mavlink.auto.confirmed_commands import ConfirmedCommands
+from bridge.mavlink.auto.logbook import Logbook
+from bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.wire import MessageQueue
+from bridge.robot.runner import Position
+from mission.document import Mission
+from mission.errors import RobotUnreachable
+from mission.mavlink.enums import MessageId
+from mission.mavlink.following.observer import TOLD, Observer
+from mission.mavlink.following.steps import held_by_vehicle
+from mission.mavlink.telemetry import is_lost
+from mission.run.orders import Answer, Order
+from mission.run.states import Run
+
+TICK_S = 0.2
+ASK_AGAIN_S = 2.0
+
+
+class AutoRunner:
+    """The run of one vehicle's mission; `board` is cut while the vehicle is silent."""
+
+    def __init__(
+        self,
+        peer: Peer,
+        book: Logbook,
+        wall: Clock,
+        consent: Consent,
+        board: Switchboard,
+        *,
+        looks_only: bool = False,
+    ) -> None:
+        self.changed: Callable[[], None] = lambda: None
+        self._peer = peer
+        self._book = book
+        self._board = board
+        self._looks_only = looks_only
+        self._observer = Observer(peer.autopilot)
+        self._commands = ConfirmedCommands(peer, self._observer, book.clock)
+        self._orders = VehicleOrders(book, peer, self._observer, self._commands, wall, consent)
+        self._follower = AutoFollower(book, peer, self._observer, self._commands, looks_only=looks_only)
+        self.works: tuple[Callable[[], None], ...] = (self._look, self._act)
+        self._told_ns = 0
+        self._closing = threading.Event()
+        self._observer.take(peer.heartbeat, book.listed, book.clock.now_ns())
+
+    @property
+    def boot_id(self) -> str:
+        return self._book.boot_id
+
+    def snapshot(self) -> tuple[Run, Mission | None]:
+        """The run as seen, if this process only looks; else as stored, by whichever process."""
+        listed, run = self._book.listed, self._follower.run if self._looks_only else self._book.run
+        return held_by_vehicle(run, self._observer.items), None if listed is None else listed.mission
+
+    def position(self) -> Position | None:
+        fix = self._observer.fix
+        if fix is None or fix.ns <= self._told_ns:
+            return None
+        self._told_ns = fix.ns
+        return Position(fix.pose, fix.speed, fix.ns)
+
+    def battery(self) -> float:
+        return self._observer.battery
+
+    def obey(self, order: Order) -> Answer:
+        """Raises `OutcomeUnknown` if the vehicle was told and does not show what it does."""
+        answer = self._orders.obey(order)
+        self._follower.run = self._book.run
+        self.changed()
+        return answer
+
+    def hear_of_link(self, silent_s: float) -> None:
+        """The vehicle goes on without a station, as its own failsafes say."""
+
+    def close(self) -> None:
+        self._follower.close()
+
+    def await_news(self, timeout_s: float, *, compares: bool = False) -> None:
+        """Wait until it is known what the vehicle does; where it stands, as long as that may take.
+
+        Raises
+        ------
+        RobotUnreachable
+            If it does not tell.
+        """
+        with self._commands.news:
+            listed = self._book.listed
+            self._commands.news.wait_for(lambda: self._observer.complete(listed), timeout_s)
+        if self._observer.sequence is None and self._book.listed is not None:
+            raise RobotUnreachable(
+                f"{self._peer} does not tell which item it works on (MISSION_CURRENT) within {timeout_s:g} s;"
+                " nothing was sent"
+            )
+        if compares:
+            self._follower.compare()
+        if not self._follower.run.over:  # what was missed: the scan that was made last
+            self._peer.ask(MessageId.CAMERA_IMAGE_CAPTURED)
+        self._follower.begin()
+
+    def _act(self) -> None:
+        """What the end of a run wants of the vehicle is still told, and seen."""
+        try:
+            self._follower.act()
+        finally:
+            self._closing.set()
+
+    def _look(self) -> None:
+        asked_ns = 0
+        with self._peer.waiting(*TOLD) as waiting:
+            while not self._closing.is_set():
+                now_ns = self._book.clock.now_ns()
+                if now_ns > asked_ns + ASK_AGAIN_S * 1e9 and not self._observer.fresh(ASK_AGAIN_S, now_ns):
+                    asked_ns = now_ns
+                    self._commands.ask_for_telemetry()
+                self._take_next(waiting)
+
+    def _take_next(self, waiting: MessageQueue) -> None:
+        message = waiting.get(TICK_S)
+        self._board.cut = is_lost(self._peer.silent_s)  # then it is not answered for
+        if message is None:
+            return
+        with self._commands.news:
+            name = self._observer.take(message, self._book.listed, self._book.clock.now_ns())
+            self._commands.news.notify_all()
+        before = self._follower.run
+        self._follower.look(name)
+        if name == "HEARTBEAT" or self._follower.run != before:
+            self.changed()
