@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
 
 from bridge.commands.spawn import free_port
 from mission.files import mission_json
@@ -11,39 +15,44 @@ from recordings.read import check
 from tests.journeys.readme import PRINTED, blocks, commands, robot, run, with_output, workplace
 
 
-def test_a_robot_that_was_unplugged_finishes_its_run() -> None:
+@pytest.fixture(scope="module")
+def folder() -> Iterator[Path]:
+    """Where the README's commands have planned, shown and exported, and printed what it says."""
+    found = blocks()
+    with workplace() as made:
+        for name in PRINTED:
+            assert with_output(found[name], made, "") == found[name], f"refresh the README's {name}"
+        yield made
+
+
+def test_a_robot_that_was_unplugged_finishes_its_run(folder: Path) -> None:
     found, endpoint = blocks(), f"tcp/127.0.0.1:{free_port()}"
     first, push, start, unplug, second, *rest = commands(found["unplug"])
     assert unplug.startswith("kill -9")
-    with workplace() as folder:
-        assert run(commands(found["plan"])[0], folder).returncode == 0
-        with robot(first, folder, endpoint) as process:
-            assert run(push, folder, endpoint).returncode == 0
-            assert run(start, folder, endpoint).returncode == 0
-            assert int((folder / "robot-r2" / "lock").read_text()) == process.pid
-            process.kill()
-            process.wait()
-        with robot(second, folder, endpoint):
-            status, *others = [run(command, folder, endpoint) for command in rest]
-        assert "PAUSED" in status.stdout
-        assert [done.returncode for done in others] == [0, 0], [done.stderr for done in others]
-        scanned = re.findall(r"Scanned +(s\d+)", others[1].stderr)
-        assert len(scanned) == len(set(scanned))
+    with robot(first, folder, endpoint) as process:
+        assert run(push, folder, endpoint).returncode == 0
+        assert run(start, folder, endpoint).returncode == 0
+        assert int((folder / "robot-r2" / "lock").read_text()) == process.pid
+        process.kill()
+        process.wait()
+    with robot(second, folder, endpoint):
+        status, *others = [run(command, folder, endpoint) for command in rest]
+    assert "PAUSED" in status.stdout
+    assert [done.returncode for done in others] == [0, 0], [done.stderr for done in others]
+    scanned = re.findall(r"Scanned +(s\d+)", others[1].stderr)
+    assert len(scanned) == len(set(scanned))
 
 
-def test_the_tour_runs_from_plan_to_field_recording() -> None:
+def test_the_tour_runs_from_plan_to_field_recording(folder: Path) -> None:
     found, endpoint = blocks(), f"tcp/127.0.0.1:{free_port()}"
-    with workplace() as folder:
-        for name in PRINTED:
-            assert with_output(found[name], folder, endpoint) == found[name], f"refresh the README's {name}"
-        mission = mission_json.read(folder / "plan" / "mission.json")
-        with robot(commands(found["robot"])[0], folder, endpoint):
-            for command in commands(found["run"]):
-                done = run(command, folder, endpoint)
-                assert done.returncode == 0, (command, done.stderr)
-            told = run("stopgo status --robot r1 --connect tcp/127.0.0.1:7447 --json", folder, endpoint)
-        status = json.loads(told.stdout)
-        assert status["state"] == "FINISHED"
-        assert status["done"] == [stop.id for stop in mission.stops]
-        assert check(folder / "field.rrd").recording_id == mission.id
-        assert check(folder / "plan" / "plan.rrd").recording_id == mission.id
+    mission = mission_json.read(folder / "plan" / "mission.json")
+    with robot(commands(found["robot"])[0], folder, endpoint):
+        for command in commands(found["run"]):
+            done = run(command, folder, endpoint)
+            assert done.returncode == 0, (command, done.stderr)
+        told = run("stopgo status --robot r1 --connect tcp/127.0.0.1:7447 --json", folder, endpoint)
+    status = json.loads(told.stdout)
+    assert status["state"] == "FINISHED"
+    assert status["done"] == [stop.id for stop in mission.stops]
+    assert check(folder / "field.rrd").recording_id == mission.id
+    assert check(folder / "plan" / "plan.rrd").recording_id == mission.id

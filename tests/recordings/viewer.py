@@ -16,7 +16,8 @@ import rerun_cli
 from rerun.experimental import View, ViewerClient
 
 BINARY = Path(rerun_cli.__file__).with_name("rerun")
-PATIENCE_S = 15.0
+PATIENCE_S = 120.0
+"""Of real time: the last net."""
 REDRAW_S = 0.3
 
 
