@@ -36,7 +36,7 @@ from bridge.mavlink.line.url import Url
 from mission.errors import InputError
 
 NET_S = 120.0
-"""Of real time, in which some thread of a world must come on: else they wait for one another."""
+"""Of real time, in which some thread of a world must go on: else they wait for one another."""
 INSIDE = ("bridge.", "tests.bridge.", "tests.faults.")
 """Modules that live in the world."""
 
@@ -66,6 +66,8 @@ class World:
         self._active = 1
         self._looks = itertools.count()
         self._count = itertools.count()
+        self._gone_on = 0
+        """How often any thread did."""
         self._timers: list[tuple[int, int, _Waiting]] = []
         self._parked: set[_Waiting] = set()
         self._over = False
@@ -134,16 +136,23 @@ class World:
         self._rest()
         self._monitor.release()
         try:
-            came_on = me.gate.acquire(timeout=NET_S)
+            self._wait_at(me.gate)
         finally:
             self._monitor.acquire()
         if self._over:
             raise _Over
-        assert came_on, "every thread waits for another"
+
+    def _wait_at(self, gate: Any) -> None:
+        """Until it opens, however long that takes, as long as some thread of the world goes on meanwhile."""
+        before = self._gone_on
+        while not gate.acquire(timeout=NET_S):
+            assert self._gone_on != before, "every thread waits for another"
+            before = self._gone_on
 
     def _let_on(self, waiting: _Waiting) -> None:
         self._parked.discard(waiting)
         waiting.gone_on = True
+        self._gone_on += 1
         self._active += 1
         waiting.gate.release()
 

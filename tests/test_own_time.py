@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -21,6 +21,30 @@ HOUR_S = 3600.0
 def world() -> Iterator[World]:
     with stepped_into() as made:
         yield made
+
+
+class Gate:
+    """Opens at the third try; `between` happens before every one."""
+
+    def __init__(self, between: Callable[[], None]) -> None:
+        self._between = between
+        self._tries = 0
+
+    def acquire(self, *, timeout: float) -> bool:
+        self._between()
+        self._tries += 1
+        return self._tries == 3
+
+
+def test_a_thread_waits_however_slow_the_machine_is_while_others_go_on() -> None:
+    world = World()
+
+    def go_on() -> None:
+        world._gone_on += 1
+
+    world._wait_at(Gate(go_on))
+    with pytest.raises(AssertionError, match="every thread waits for another"):
+        world._wait_at(Gate(lambda: None))
 
 
 def test_an_hour_passes_for_all_at_once(world: World) -> None:

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from mission.errors import RobotUnreachable
 
-READY_S = 20.0
-END_S = 10.0
+READY_S = 60.0
+END_S = 30.0
 READY = "ready "
 """How the line begins that a robot says once it can be reached."""
 

@@ -49,6 +49,8 @@ ANSWERS_KEPT = 10_000
 NONCES_KEPT = 10_000
 MISSIONS_KEPT = 4
 """Of those that are not needed; of older ones their names."""
+LOCKED_S = 60.0
+"""How long another process's write is waited for; it takes milliseconds, on a machine under load seconds."""
 
 S = TypeVar("S", bound=msgspec.Struct)
 
@@ -409,7 +411,7 @@ def memory_journal() -> Journal:
 
 def _connect(path: Path) -> sqlite3.Connection:
     try:
-        connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+        connection = sqlite3.connect(path, LOCKED_S, isolation_level=None, check_same_thread=False)
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA wal_autocheckpoint = 200")  # pages: the log stays far below the reserve

@@ -77,7 +77,7 @@ def robot(command: str, folder: Path, endpoint: str) -> Iterator[subprocess.Pope
         yield process
     finally:
         process.terminate()
-        process.communicate(timeout=20)
+        process.communicate(timeout=120)
 
 
 def with_output(block: str, folder: Path, endpoint: str) -> str:

@@ -59,7 +59,7 @@ def vehicle(tmp_path: Path) -> Iterator[Vehicle]:
         yield made
     finally:
         made.process.terminate()
-        made.process.wait(10)
+        made.process.wait(60)
 
 
 HOURS = Scan(profile="default", duration_s=3e3, timeout_s=6e3)

@@ -204,7 +204,7 @@ def test_a_link_is_closed_when_the_robots_certificate_ends(site: Path, tmp_path:
     try:
         with connecting(endpoint, Guard(read_keys(site / "site" / "alice", now=NOW))) as link:
             seen = Presence(link, "r9")
-            assert seen.came.wait(10)
+            assert seen.came.wait(60)
             assert seen.went.wait(20), "the link outlives the certificate"
             # In its very last second a certificate is still taken for a new link.
             over = read_keys(site / "site" / "r9", now=NOW).holder.not_after + timedelta(seconds=1)

@@ -9,7 +9,15 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.robot.journal import MISSIONS_KEPT, TABLES, Owner, memory_journal, open_journal
+from bridge.robot.journal import (
+    LOCKED_S,
+    MISSIONS_KEPT,
+    TABLES,
+    Owner,
+    memory_journal,
+    open_journal,
+    shared_journal,
+)
 from bridge.robot.reserve import Reserve
 from bridge.robot.sealed_rows import FORMAT, SEALED
 from bridge.station.watch import event_line
@@ -60,6 +68,11 @@ def test_a_damaged_journal_is_named(tmp_path: Path) -> None:
     (tmp_path / "journal.sqlite").write_bytes(b"no database" * 1000)
     with pytest.raises(InputError, match=r"journal\.sqlite"), open_journal(tmp_path, "r1"):
         pass
+
+
+def test_what_another_process_writes_is_waited_for_on_a_slow_machine_too(tmp_path: Path) -> None:
+    with shared_journal(tmp_path, "r1") as journal:
+        assert journal._connection.execute("PRAGMA busy_timeout").fetchone() == (1000 * LOCKED_S,)
 
 
 def test_a_state_path_that_is_a_file_is_refused(tmp_path: Path) -> None:

@@ -138,7 +138,7 @@ def test_events_missed_while_the_link_was_cut_are_told_once_and_in_order() -> No
         watching = threading.Thread(target=lambda: [told.put(report) for report in station.reports()])
         watching.start()
         station.command("start")
-        while not isinstance(told.get(timeout=10), Scanned):
+        while not isinstance(told.get(timeout=60), Scanned):
             pass
         board.cut = True
         while controller.run.state != "FINISHED":

@@ -22,7 +22,7 @@ from tests.bridge.mavlink.simulated.bench import HOME, ORIGIN, camera, delay, sc
 
 mavsdk = pytest.importorskip("mavsdk")
 
-PATIENCE_S = 20.0
+PATIENCE_S = 120.0
 SPEED_UP = 50.0
 
 
