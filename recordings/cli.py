@@ -16,7 +16,7 @@ from mission.files.atomic import must_be_writable
 if TYPE_CHECKING:
     from mission.document import Mission, Transform
     from recordings.logs import FieldLog, Reading
-    from recordings.replay.placing import Align, Placing
+    from recordings.replay.log_placing import Align, Placing
     from recordings.replay.replayed import Replay
 
 
@@ -158,7 +158,7 @@ def _mission(path: Path | None, logs: list[FieldLog]) -> Mission:
 def _placing(
     map_: str | None, align: str | None, time_offset: float, poses: str | None, robot: str | None
 ) -> Placing:
-    from recordings.replay.placing import Placing
+    from recordings.replay.log_placing import Placing
 
     if align is not None and map_ is not None:
         raise InputError("--map and --align both say how the log lies; give one of them")
@@ -187,7 +187,7 @@ def _transform(text: str) -> Transform:
 
 def _write_replays(replays: list[Replay], out: Path | None, csv: Path | None) -> None:
     from mission.files.atomic import write_atomic
-    from recordings.replay.telling import as_csv
+    from recordings.replay.replay_text import as_csv
 
     if out is not None:
         from recordings.replay.drawing import write_recording
@@ -198,8 +198,8 @@ def _write_replays(replays: list[Replay], out: Path | None, csv: Path | None) ->
 
 
 def _tell_replays(replays: list[Replay], *, as_json: bool) -> None:
-    from recordings.replay.telling import as_json as told_json
-    from recordings.replay.telling import as_text
+    from recordings.replay.replay_text import as_json as told_json
+    from recordings.replay.replay_text import as_text
 
     if as_json:
         _echo_json([told_json(item) for item in replays], "replays")

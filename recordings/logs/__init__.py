@@ -13,52 +13,52 @@ from mission.errors import InputError
 from recordings.logs.field_log import FieldLog, Reading
 from recordings.logs.files import head, must_be_readable
 
-Reader = Callable[[Path, Reading], FieldLog]
+LogReader = Callable[[Path, Reading], FieldLog]
 
 
 @dataclass(frozen=True)
-class Format:
+class LogFormat:
     """One kind of log."""
 
     name: str
     suffixes: tuple[str, ...]
     begins: tuple[bytes, ...]
     """How such a file begins; () where its beginning does not tell."""
-    reader: Callable[[], Reader]
+    reader: Callable[[], LogReader]
     """Loads the reader: some need libraries that others do not."""
 
 
-def _ros() -> Reader:
+def _ros() -> LogReader:
     from recordings.logs.ros import read_ros
 
     return read_ros
 
 
-def _dataflash() -> Reader:
+def _dataflash() -> LogReader:
     from recordings.logs.dataflash import read_dataflash
 
     return read_dataflash
 
 
-def _telemetry() -> Reader:
+def _telemetry() -> LogReader:
     from recordings.logs.telemetry_log import read_telemetry_log
 
     return read_telemetry_log
 
 
-def _ulog() -> Reader:
+def _ulog() -> LogReader:
     from recordings.logs.ulog import read_ulog
 
     return read_ulog
 
 
-def _table() -> Reader:
+def _table() -> LogReader:
     from recordings.logs.tables import read_table
 
     return read_table
 
 
-def _journal() -> Reader:
+def _journal() -> LogReader:
     from recordings.logs.own import read_journal
 
     return read_journal
@@ -67,15 +67,15 @@ def _journal() -> Reader:
 SQLITE = b"SQLite format 3\0"
 ZSTD = b"\x28\xb5\x2f\xfd"
 READERS = (
-    Format("ROS 1 bag", (".bag",), (b"#ROSBAG V",), _ros),
-    Format("ROS 2 MCAP", (".mcap",), (b"\x89MCAP0\r\n",), _ros),
-    Format("ROS 2 SQLite", (".db3",), (SQLITE,), _ros),
-    Format("ROS 2, compressed", (".zstd",), (ZSTD,), _ros),
-    Format("stopgo journal", (".sqlite",), (SQLITE,), _journal),
-    Format("ArduPilot BIN", (".bin",), (b"\xa3\x95",), _dataflash),
-    Format("PX4 ULog", (".ulg",), (b"ULog\x01\x12\x35",), _ulog),
-    Format("MAVLink telemetry", (".tlog",), (), _telemetry),
-    Format("trajectory", (".tum", ".txt", ".csv", ".tsv"), (), _table),
+    LogFormat("ROS 1 bag", (".bag",), (b"#ROSBAG V",), _ros),
+    LogFormat("ROS 2 MCAP", (".mcap",), (b"\x89MCAP0\r\n",), _ros),
+    LogFormat("ROS 2 SQLite", (".db3",), (SQLITE,), _ros),
+    LogFormat("ROS 2, compressed", (".zstd",), (ZSTD,), _ros),
+    LogFormat("stopgo journal", (".sqlite",), (SQLITE,), _journal),
+    LogFormat("ArduPilot BIN", (".bin",), (b"\xa3\x95",), _dataflash),
+    LogFormat("PX4 ULog", (".ulg",), (b"ULog\x01\x12\x35",), _ulog),
+    LogFormat("MAVLink telemetry", (".tlog",), (), _telemetry),
+    LogFormat("trajectory", (".tum", ".txt", ".csv", ".tsv"), (), _table),
 )
 """Every kind of log that is read; a folder is a rosbag2's."""
 
@@ -96,7 +96,7 @@ def read_log(path: Path, reading: Reading | None = None) -> FieldLog:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
 
 
-def _reader_for(path: Path) -> Reader:
+def _reader_for(path: Path) -> LogReader:
     """By name and content; by content alone where the name says nothing."""
     if path.is_dir():
         return _of_folder(path)
@@ -112,7 +112,7 @@ def _reader_for(path: Path) -> Reader:
     raise InputError(f"{path}: neither its name nor its content is that of a log; known are {known}")
 
 
-def _of_folder(path: Path) -> Reader:
+def _of_folder(path: Path) -> LogReader:
     """A robot's state directory, or a rosbag2."""
     if not (path / JOURNAL).exists():
         return _ros()
@@ -123,4 +123,4 @@ def _of_folder(path: Path) -> Reader:
 JOURNAL = "journal.sqlite"
 
 
-__all__ = ["READERS", "FieldLog", "Format", "Reader", "Reading", "read_log"]
+__all__ = ["READERS", "FieldLog", "LogFormat", "LogReader", "Reading", "read_log"]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +22,17 @@ from mission.geometry import FloatArray, IntArray
 from mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from mission.mavlink.autopilots.kind import Mode
 from mission.mavlink.items import Command, Item
-from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, Upload, fixes_of, poses_of
+from recordings.logs.field_log import (
+    Channel,
+    FieldLog,
+    LoggedMission,
+    Poses,
+    Reading,
+    Remark,
+    RemarkKind,
+    fixes_of,
+    poses_of,
+)
 from recordings.logs.files import digest_of
 
 HEAD = b"\xa3\x95"
@@ -298,7 +308,7 @@ def _bearing_at(tables: _Tables, ns: IntArray) -> FloatArray:
     return np.interp(ns, tables.ns("ATT"), turn)
 
 
-def _uploads(tables: _Tables) -> Iterator[Upload]:
+def _uploads(tables: _Tables) -> Iterator[LoggedMission]:
     """Missions as they were written down, each from its item 0 (home) on."""
     if not tables.has("CMD", "CTot", "CNum", "CId"):
         return
@@ -312,7 +322,7 @@ def _uploads(tables: _Tables) -> Iterator[Upload]:
         if items:
             home = _home(part[0]) if part[0]["CNum"] == 0 else None
             whole = len(part) == int(part[0]["CTot"])
-            yield Upload(int(ns[begin]), items, "ardupilot", complete=whole, home=home)
+            yield LoggedMission(int(ns[begin]), items, "ardupilot", complete=whole, home=home)
 
 
 def _item(row: Any) -> Item:
@@ -327,7 +337,6 @@ def _home(row: Any) -> SiteOrigin | None:
     return _site(float(row["Lat"]), float(row["Lng"]), float(row["Alt"]))
 
 
-Kind = Literal["mode", "command", "trigger", "reached", "text"]
 TRIGGERS = (Command.DO_SEND_SCRIPT_MESSAGE, Command.IMAGE_START_CAPTURE, Command.DO_DIGICAM_CONTROL)
 
 
@@ -355,7 +364,7 @@ def _executed(tables: _Tables) -> Iterator[Remark]:
     assert rows is not None
     for ns, row in zip(tables.ns("MISE").tolist(), rows, strict=True):
         item = _item(row)
-        kind: Kind = "trigger" if item.command in TRIGGERS else "command"
+        kind: RemarkKind = "trigger" if item.command in TRIGGERS else "command"
         yield Remark(ns, kind, item.name, int(row["CNum"]))
 
 

@@ -20,6 +20,7 @@ from mission.geometry import FloatArray, IntArray, frozen
 from mission.mavlink.items import Item
 
 Stamps = Literal["header", "log"]
+RemarkKind = Literal["mode", "command", "trigger", "reached", "text"]
 Tick = Callable[[float], None]
 """Is told now and then which share of a file has been read, 0 to 1."""
 
@@ -88,14 +89,14 @@ class Remark:
     """Something a log tells at one moment."""
 
     ns: int
-    kind: Literal["mode", "command", "trigger", "reached", "text"]
+    kind: RemarkKind
     text: str
     number: int | None = None
     """Of the stop or the mission's item, where it carries one."""
 
 
 @dataclass(frozen=True)
-class Upload:
+class LoggedMission:
     """A MAVLink mission that the vehicle was given."""
 
     ns: int
@@ -141,7 +142,7 @@ class FieldLog:
     end_ns: int
     channels: tuple[Channel, ...] = ()
     poses: tuple[Poses, ...] = ()
-    uploads: tuple[Upload, ...] = ()
+    uploads: tuple[LoggedMission, ...] = ()
     remarks: tuple[Remark, ...] = ()
     events: tuple[AnyEvent, ...] = ()
     """Of stopgo's own logs."""

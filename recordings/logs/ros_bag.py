@@ -27,7 +27,7 @@ class Topic:
     """None where only reading to the end tells."""
 
 
-Message = tuple[Topic, int, bytes]
+BagMessage = tuple[Topic, int, bytes]
 """Its topic, when it was logged (ns), and its bytes."""
 
 
@@ -37,7 +37,7 @@ class Bag:
 
     ros2: bool
     topics: tuple[Topic, ...]
-    messages: Callable[[Sequence[Topic]], Iterator[Message]]
+    messages: Callable[[Sequence[Topic]], Iterator[BagMessage]]
     """Of these topics, in the order in which they were logged."""
     decode: Callable[[Topic, bytes], Any]
     """A message as an object with its fields; UnknownType where nobody knows how."""
@@ -147,7 +147,7 @@ def _reason(error: BaseException) -> str:
 def _bag(reader: Any) -> Bag:
     topics = {_key(c): Topic(k, c.topic, c.msgtype, c.msgcount) for k, c in enumerate(reader.connections)}
 
-    def messages(wanted: Sequence[Topic]) -> Iterator[Message]:
+    def messages(wanted: Sequence[Topic]) -> Iterator[BagMessage]:
         chosen = [c for c in reader.connections if topics[_key(c)] in wanted]
         with _damage_told():  # whoever takes the messages raises nothing in here
             for connection, ns, raw in reader.messages(connections=chosen) if chosen else ():
@@ -190,7 +190,7 @@ def _salvaged(found: Salvaged) -> Bag:
     store = _store_of(found)
     topics = {c.number: Topic(c.number, c.topic, c.msgtype, None) for c in found.connections}
 
-    def messages(wanted: Sequence[Topic]) -> Iterator[Message]:
+    def messages(wanted: Sequence[Topic]) -> Iterator[BagMessage]:
         numbers = {topic.number for topic in wanted}
         for number, ns, raw in found.messages():
             if number in numbers:

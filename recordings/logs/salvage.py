@@ -31,7 +31,7 @@ SQLITE_MAGIC = b"SQLite format 3\0"
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
-class Connection(NamedTuple):
+class BagConnection(NamedTuple):
     """A topic as the bag describes it."""
 
     number: int
@@ -46,7 +46,7 @@ class Salvaged:
     """What there is in damaged files."""
 
     ros2: bool
-    connections: tuple[Connection, ...]
+    connections: tuple[BagConnection, ...]
     messages: Callable[[], Iterator[Raw]]
     lost: Callable[[], str]
 
@@ -70,7 +70,7 @@ class _Part(NamedTuple):
     """How one kind of file is read: its records, each a connection or a message."""
 
     ros2: bool
-    records: Callable[[Path, _Loss], Iterator[Connection | Raw]]
+    records: Callable[[Path, _Loss], Iterator[BagConnection | Raw]]
 
 
 @contextmanager
@@ -87,15 +87,15 @@ def salvage(paths: Sequence[Path], why: str) -> Iterator[Salvaged]:
     if len({part.ros2 for _, part in parts}) > 1:
         raise InputError(f"{paths[0].parent}: holds bags of ROS 1 and of ROS 2; give one of them")
 
-    def read() -> Iterator[Connection | Raw]:
+    def read() -> Iterator[BagConnection | Raw]:
         for number, (path, part) in enumerate(parts):
             for record in part.records(path, loss):
                 yield _shifted(record, number * FILES_APART)
 
     def messages() -> Iterator[Raw]:
-        return (record for record in read() if not isinstance(record, Connection))
+        return (record for record in read() if not isinstance(record, BagConnection))
 
-    found = {record.number: record for record in read() if isinstance(record, Connection)}
+    found = {record.number: record for record in read() if isinstance(record, BagConnection)}
     yield Salvaged(parts[0][1].ros2, tuple(found.values()), messages, lambda: str(loss))
 
 
@@ -103,8 +103,8 @@ FILES_APART = 1 << 32
 """Connections are numbered anew in every file."""
 
 
-def _shifted(record: Connection | Raw, by: int) -> Connection | Raw:
-    if isinstance(record, Connection):
+def _shifted(record: BagConnection | Raw, by: int) -> BagConnection | Raw:
+    if isinstance(record, BagConnection):
         return record._replace(number=record.number + by)
     return (record[0] + by, *record[1:])
 
@@ -134,12 +134,12 @@ def _mapped(path: Path) -> Iterator[mmap]:
         yield mapped
 
 
-def _bag_records(path: Path, loss: _Loss) -> Iterator[Connection | Raw]:
+def _bag_records(path: Path, loss: _Loss) -> Iterator[BagConnection | Raw]:
     with _mapped(path) as data:
         yield from _bag_stream(data, len(BAG_MAGIC), path.name, loss)
 
 
-def _bag_stream(data: Bytes, at: int, name: str, loss: _Loss) -> Iterator[Connection | Raw]:
+def _bag_stream(data: Bytes, at: int, name: str, loss: _Loss) -> Iterator[BagConnection | Raw]:
     """Records of a file, or of an unpacked chunk: a header of fields, then data, each with its length."""
     while at < len(data):
         record = _bag_record(data, at)
@@ -199,11 +199,11 @@ def _fields(header: bytes) -> dict[bytes, bytes]:
     return fields
 
 
-def _bag_connection(fields: dict[bytes, bytes], body: bytes) -> Iterator[Connection]:
+def _bag_connection(fields: dict[bytes, bytes], body: bytes) -> Iterator[BagConnection]:
     about = _fields(body)
     if len(fields.get(b"conn", b"")) == 4 and b"type" in about:
         package, _, kind = _words(about[b"type"]).partition("/")
-        yield Connection(
+        yield BagConnection(
             struct.unpack("<I", fields[b"conn"])[0],
             _words(fields.get(b"topic") or about.get(b"topic", b"")),
             f"{package}/msg/{kind}",
@@ -215,14 +215,14 @@ def _words(value: bytes) -> str:
     return value.decode("utf-8", "replace")
 
 
-def _mcap_records(path: Path, loss: _Loss) -> Iterator[Connection | Raw]:
+def _mcap_records(path: Path, loss: _Loss) -> Iterator[BagConnection | Raw]:
     with _mapped(path) as data:
         yield from _mcap_stream(data, len(MCAP_MAGIC), path.name, loss, {})
 
 
 def _mcap_stream(
     data: Bytes, at: int, name: str, loss: _Loss, schemas: dict[int, tuple[str, str]]
-) -> Iterator[Connection | Raw]:
+) -> Iterator[BagConnection | Raw]:
     """Records of a file, or of an unpacked chunk: an operation, a length, a body."""
     while at + 9 <= len(data):
         operation, length = struct.unpack_from("<BQ", data, at)
@@ -245,7 +245,7 @@ def _mcap_stream(
 
 def _mcap_record(
     operation: int, body: bytes, name: str, loss: _Loss, schemas: dict[int, tuple[str, str]]
-) -> Iterator[Connection | Raw]:
+) -> Iterator[BagConnection | Raw]:
     if operation == 0x05:
         number, _, logged = struct.unpack_from("<HIQ", body)
         yield number, logged, body[22:]
@@ -257,7 +257,7 @@ def _mcap_record(
     elif operation == 0x04:
         number, schema = struct.unpack_from("<HH", body)
         kind, definition = schemas.get(schema, ("", ""))
-        yield Connection(number, _text(body, 4)[0], kind, definition)
+        yield BagConnection(number, _text(body, 4)[0], kind, definition)
     elif operation == 0x06:
         compression, at = _text(body, 28)
         plain = _unpacked(compression, body[at + 8 :])
@@ -315,13 +315,13 @@ PIECE = 4096
 _UNPACKING: dict[str, Callable[[bytes], bytes]] = {"lz4": _lz4, "zstd": _zstd, "bz2": _bz2}
 
 
-def _db3_records(path: Path, loss: _Loss) -> Iterator[Connection | Raw]:
+def _db3_records(path: Path, loss: _Loss) -> Iterator[BagConnection | Raw]:
     with TemporaryDirectory(prefix="stopgo-") as folder:
         whole = _of_full_length(path, Path(folder))
         connection = sqlite3.connect(f"file:{quote(str(whole))}?immutable=1", uri=True)
         try:
             topics = _rows(connection, "SELECT id, name, type FROM topics", path, loss)
-            yield from (Connection(int(number), str(name), str(kind), "") for number, name, kind in topics)
+            yield from (BagConnection(int(number), str(name), str(kind), "") for number, name, kind in topics)
             yield from _db3_messages(connection, path, loss)
         finally:
             connection.close()

@@ -16,7 +16,7 @@ from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, fixes_o
 from recordings.logs.files import digest_of
 from recordings.logs.ros_poses import headings_of
 
-Row = tuple[float, ...]
+Numbers = tuple[float, ...]
 TUM_COLUMNS = 8
 WALL_S = 1e9
 """Times from September 2001 on are taken for seconds since 1970."""
@@ -41,7 +41,7 @@ def read_tum(path: Path, reading: Reading) -> FieldLog:
     InputError
         When no line is one.
     """
-    rows: list[Row] = []
+    rows: list[Numbers] = []
     lost = 0
     with path.open(encoding="utf-8", errors="replace") as file:
         for line in file:
@@ -57,7 +57,7 @@ def read_tum(path: Path, reading: Reading) -> FieldLog:
     return _log(path, "TUM trajectory", track, len(rows), lost, ns)
 
 
-def _numbers(words: list[str]) -> Row | None:
+def _numbers(words: list[str]) -> Numbers | None:
     try:
         return tuple(map(float, words))
     except ValueError:
@@ -137,7 +137,7 @@ class _Columns:
     def needed(self) -> tuple[str, ...]:
         return (self.time, *self.place)
 
-    def row(self, cells: list[str]) -> tuple[int, Row] | None:
+    def row(self, cells: list[str]) -> tuple[int, Numbers] | None:
         """Time in ns; then x and y, and the heading in radians (NaN where none is told)."""
         try:
             ns = self._ns(cells[self.at[self.time]])
@@ -161,7 +161,7 @@ class _Columns:
             return float(headings_of(numbers)[0])
         return float("nan")
 
-    def track(self, rows: list[Row], ns: list[int]) -> Poses | None:
+    def track(self, rows: list[Numbers], ns: list[int]) -> Poses | None:
         table = np.array(rows)
         if self.place[0].startswith("lat"):
             return fixes_of("CSV", "wgs84", ns, table[:, :2], 90.0 - np.degrees(table[:, 2]))

@@ -26,7 +26,16 @@ from mission.geometry import FloatArray, IntArray
 from mission.mavlink.autopilots import autopilot_named, autopilot_of
 from mission.mavlink.autopilots.kind import ROVERS
 from mission.mavlink.items import Command, Item
-from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, Upload, fixes_of, poses_of
+from recordings.logs.field_log import (
+    Channel,
+    FieldLog,
+    LoggedMission,
+    Poses,
+    Reading,
+    Remark,
+    fixes_of,
+    poses_of,
+)
 from recordings.logs.files import digest_of
 
 STAMP = 8
@@ -213,7 +222,7 @@ class _Sorter:
     counts: Counter[tuple[int, int]] = field(default_factory=Counter)
     """By system and number."""
     vehicles: dict[int, _Vehicle] = field(default_factory=dict)
-    uploads: list[Upload] = field(default_factory=list)
+    uploads: list[LoggedMission] = field(default_factory=list)
     remarks: list[Remark] = field(default_factory=list)
     battery: list[tuple[int, float]] = field(default_factory=list)
     span: tuple[int, int] = (0, 0)
@@ -335,7 +344,9 @@ class _Sorter:
         ]
         if not any(upload.items == tuple(items) and upload.ns == ns for upload in self.uploads):
             home = self._sent.get(0) if kind.home_first else None
-            self.uploads.append(Upload(ns, tuple(items), kind.name, complete=complete, home=_site(home)))
+            self.uploads.append(
+                LoggedMission(ns, tuple(items), kind.name, complete=complete, home=_site(home))
+            )
         self._sent, self._due = {}, None
 
     def channels(self) -> tuple[Channel, ...]:

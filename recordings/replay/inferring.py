@@ -20,7 +20,7 @@ from recordings.replay.standing import Standing
 
 
 @dataclass(frozen=True)
-class Told:
+class Happening:
     """An event without what all events have."""
 
     ns: int
@@ -39,10 +39,10 @@ def events_of(
 ) -> tuple[AnyEvent, ...]:
     """The events of a run that drove as the halts say; it is over if the last stop was visited."""
     began, ended = _begin(track, matches, remarks), int(track.ns[-1])
-    told = [Told(began, Started, {"commander": "not told by the log"})]
+    told = [Happening(began, Started, {"commander": "not told by the log"})]
     told += sorted(_told(matches, mission, remarks), key=lambda item: item.ns)
     if len(mission.stops) - 1 in {match.stop for match in matches}:
-        told.append(Told(ended, Finished, {}))
+        told.append(Happening(ended, Finished, {}))
     about = {
         "robot": robot, "boot_id": "", "run_id": run_id,
         "mission_id": mission.id, "revision": mission.revision,
@@ -67,7 +67,7 @@ DRIVES = ("AUTO", "MISSION")
 """Modes in which a vehicle follows its mission."""
 
 
-def _told(matches: Sequence[Match], mission: Mission, remarks: Sequence[Remark]) -> Iterator[Told]:
+def _told(matches: Sequence[Match], mission: Mission, remarks: Sequence[Remark]) -> Iterator[Happening]:
     farthest = -1
     for match in matches:
         if match.stop is None:
@@ -93,22 +93,22 @@ def _of_scan(trigger: Remark | None, halt: Standing, remarks: Sequence[Remark]) 
     return f"{trigger.text}, then waited {(items[1].ns - waits[0].ns) / 1e9:.2f} s"
 
 
-def _passed(stop: Stop, before_ns: int) -> Told:
-    return Told(before_ns - 1, Skipped, {"stop": stop.id, "reason": "no halt there in the log"})
+def _passed(stop: Stop, before_ns: int) -> Happening:
+    return Happening(before_ns - 1, Skipped, {"stop": stop.id, "reason": "no halt there in the log"})
 
 
-def _visit(stop: Stop, halt: Standing, remarks: Sequence[Remark]) -> Iterator[Told]:
+def _visit(stop: Stop, halt: Standing, remarks: Sequence[Remark]) -> Iterator[Happening]:
     pose = Pose(x=halt.x, y=halt.y, heading=halt.heading)
     away = math.dist(halt.xy, (stop.x, stop.y))
-    yield Told(halt.begin_ns, Arrived, {"stop": stop.id, "pose": pose, "deviation_m": away})
+    yield Happening(halt.begin_ns, Arrived, {"stop": stop.id, "pose": pose, "deviation_m": away})
     trigger = next((remark for remark in remarks if remark.kind == "trigger" and _during(halt, remark)), None)
     if trigger is not None:
-        yield Told(max(trigger.ns, halt.begin_ns), Settled, {"stop": stop.id, "pose": pose})
+        yield Happening(max(trigger.ns, halt.begin_ns), Settled, {"stop": stop.id, "pose": pose})
     word = f"; {_of_scan(trigger, halt, remarks)}"
     if not long_enough(halt, stop):
         planned = stop.settle_s + stop.scan.duration_s
         reason = f"stood {halt.seconds:.1f} s of {planned:.1f} s{word}"
-        yield Told(halt.end_ns, Failed, {"stop": stop.id, "reason": reason})
+        yield Happening(halt.end_ns, Failed, {"stop": stop.id, "reason": reason})
     else:
         reason = f"stood {halt.seconds:.1f} s{word}"
-        yield Told(halt.end_ns, Unconfirmed, {"stop": stop.id, "pose": pose, "reason": reason})
+        yield Happening(halt.end_ns, Unconfirmed, {"stop": stop.id, "pose": pose, "reason": reason})

@@ -18,7 +18,7 @@ from mission.geometry import FloatArray
 from mission.run_log import Track
 from recordings.replay.standing import Standing
 
-How = Literal["visit", "again", "back", "extra"]
+HaltKind = Literal["visit", "again", "back", "extra"]
 EXTRA, SKIP, PASSED, AGAIN, BACK = 1.0, 0.4, 0.1, 0.05, 0.6
 """Of a halt at no stop, of each stop left out, of each left out that the robot passed, of one more halt at
 the same stop, of going back to one."""
@@ -43,7 +43,7 @@ class Match:
     """What one halt was."""
 
     standing: Standing
-    how: How
+    how: HaltKind
     stop: int | None
     """Index into the mission's stops; None of an extra halt."""
     away_m: float
@@ -65,7 +65,7 @@ def matched(halts: Sequence[Standing], mission: Mission, track: Track | None = N
     places, reach = np.array([halt.xy for halt in halts]), reaches(mission)
     skips = _skips(halts, stops, reach, track)
     drift = np.zeros(places.shape)
-    readings: list[tuple[How, int | None]] = []
+    readings: list[tuple[HaltKind, int | None]] = []
     for _ in range(PASSES):
         before = readings
         more = _costs_again(before, places, places - drift, stops)
@@ -108,7 +108,10 @@ def _costs(places: FloatArray, stops: FloatArray, reach: FloatArray) -> FloatArr
 
 
 def _costs_again(
-    readings: Sequence[tuple[How, int | None]], places: FloatArray, driftless: FloatArray, stops: FloatArray
+    readings: Sequence[tuple[HaltKind, int | None]],
+    places: FloatArray,
+    driftless: FloatArray,
+    stops: FloatArray,
 ) -> FloatArray:
     """What it costs that a halt is one more at a stop: near the stop, or near where the robot stood there."""
     costs = _costs(driftless, stops, np.full(len(stops), AGAIN_REACH_M))
@@ -119,8 +122,10 @@ def _costs_again(
     return costs
 
 
-def _drift(readings: Sequence[tuple[How, int | None]], places: FloatArray, stops: FloatArray) -> FloatArray:
-    """How far the visits around each halt lie off their stops, itself left out (n, 2)."""
+def _drift(
+    readings: Sequence[tuple[HaltKind, int | None]], places: FloatArray, stops: FloatArray
+) -> FloatArray:
+    """HaltKind far the visits around each halt lie off their stops, itself left out (n, 2)."""
     visits = np.array([k for k, (how, _) in enumerate(readings) if how == "visit"], np.int64)
     drift = np.zeros(places.shape)
     if len(visits) < LEAST_VISITS:
@@ -134,14 +139,14 @@ def _drift(readings: Sequence[tuple[How, int | None]], places: FloatArray, stops
 
 
 def reaches(mission: Mission) -> FloatArray:
-    """How far from each stop a halt may be to be at it (n,), metres."""
+    """HaltKind far from each stop a halt may be to be at it (n,), metres."""
     stops = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)
     apart = np.hypot(*(stops[:, None] - stops[None]).transpose(2, 0, 1))
     apart[apart < LEAST_REACH_M] = np.inf  # stops at one place are told apart by their order alone
     return np.clip(apart.min(axis=1) / 2, LEAST_REACH_M, REACH_M)
 
 
-def _least(visits: FloatArray, more: FloatArray, skips: FloatArray) -> list[tuple[How, int | None]]:
+def _least(visits: FloatArray, more: FloatArray, skips: FloatArray) -> list[tuple[HaltKind, int | None]]:
     """The reading of least cost, by what it costs that a halt is a first visit of a stop, is one more, and
     that the stop is passed by until then, each (halts, stops).
 
@@ -173,9 +178,9 @@ def _running_least(values: FloatArray) -> tuple[FloatArray, np.ndarray]:
     return least, np.maximum.accumulate(at)
 
 
-def _traced(came: list[tuple[np.ndarray, ...]], behind: int) -> list[tuple[How, int | None]]:
+def _traced(came: list[tuple[np.ndarray, ...]], behind: int) -> list[tuple[HaltKind, int | None]]:
     """The choices from the last halt back to the first, then in order."""
-    readings: list[tuple[How, int | None]] = []
+    readings: list[tuple[HaltKind, int | None]] = []
     for choice, source, back_to in reversed(came):
         how = HOWS[int(choice[behind])]
         stop = {"extra": None, "back": int(back_to[behind])}.get(how, behind - 1)
@@ -184,4 +189,4 @@ def _traced(came: list[tuple[np.ndarray, ...]], behind: int) -> list[tuple[How, 
     return readings[::-1]
 
 
-HOWS: tuple[How, ...] = ("extra", "visit", "again", "back")
+HOWS: tuple[HaltKind, ...] = ("extra", "visit", "again", "back")

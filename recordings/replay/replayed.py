@@ -13,8 +13,8 @@ from mission.document import Mission
 from mission.geometry import FloatArray
 from mission.run_log import RunLog
 from recordings.logs.field_log import FieldLog
+from recordings.replay.log_placing import PlacedLog
 from recordings.replay.matching import Match
-from recordings.replay.placing import Placed
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class Replay:
 
     log: FieldLog
     mission: Mission
-    placed: Placed
+    placed: PlacedLog
     matches: tuple[Match, ...]
     """What each halt of the robot was, in order of time."""
     run: RunLog

@@ -19,8 +19,8 @@ from mission.run_log import LogSource, RunLog, Track
 from mission.sight import Sight
 from recordings.logs.field_log import FieldLog, Remark
 from recordings.replay.inferring import events_of
+from recordings.replay.log_placing import PlacedLog, Placing, placed
 from recordings.replay.matching import Match, matched, reaches
-from recordings.replay.placing import Placed, Placing, placed
 from recordings.replay.replayed import Replay
 from recordings.replay.standing import standings
 from recordings.replay.uploaded import differences_of
@@ -69,13 +69,13 @@ def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight
     )
 
 
-def _matches(laid: Placed, mission: Mission) -> tuple[Match, ...]:
+def _matches(laid: PlacedLog, mission: Mission) -> tuple[Match, ...]:
     halts = standings(laid.track, speed=mission.robot.speed, turns=laid.turns)
     return matched(halts, mission, laid.track)
 
 
 def _inferred(
-    log: FieldLog, laid: Placed, mission: Mission, matches: Sequence[Match], remarks: Sequence[Remark]
+    log: FieldLog, laid: PlacedLog, mission: Mission, matches: Sequence[Match], remarks: Sequence[Remark]
 ) -> tuple[AnyEvent, ...]:
     robot = laid.source.robot or Path(log.path).stem
     return events_of(matches, mission, laid.track, remarks, run_id=f"replay-{log.digest[:12]}", robot=robot)
@@ -106,7 +106,7 @@ def _own_events(log: FieldLog, mission: Mission, offset_ns: int) -> tuple[AnyEve
     )
 
 
-def _source(log: FieldLog, laid: Placed) -> LogSource:
+def _source(log: FieldLog, laid: PlacedLog) -> LogSource:
     notes = (*((f"damaged: {log.lost}",) if log.lost else ()), *log.oddities, *laid.source.oddities)
     return LogSource(Path(log.path).name, log.format, log.digest, log.messages, lost=0, notes=notes)
 

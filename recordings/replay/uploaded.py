@@ -15,7 +15,7 @@ from mission.mavlink.items import Item
 from mission.mavlink.recognise import PLACES, recognise
 from mission.mavlink.recognised_tour import RecognisedStop, recognised_tour
 from mission.settings import Settings
-from recordings.logs.field_log import FieldLog, Upload
+from recordings.logs.field_log import FieldLog, LoggedMission
 
 SAME_M, SAME_S = 0.02, 0.05
 """Places in steps of 1e-7 degrees are a centimetre off, times in float32 not at all."""
@@ -66,7 +66,7 @@ def differences_of(log: FieldLog, mission: Mission) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _differences(upload: Upload, mission: Mission) -> Iterator[str]:
+def _differences(upload: LoggedMission, mission: Mission) -> Iterator[str]:
     if not upload.complete:
         yield f"only {len(upload.items)} items, the upload was broken off"
         return

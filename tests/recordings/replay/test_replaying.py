@@ -19,11 +19,11 @@ from mission.errors import InputError
 from mission.files.mission_json import write
 from mission.run_log import Track
 from recordings.logs.field_log import FieldLog, Poses, Remark, poses_of
-from recordings.replay.figures import lost_times, way_of
 from recordings.replay.judged import judged
-from recordings.replay.placing import Placing
+from recordings.replay.log_placing import Placing
+from recordings.replay.replay_text import as_csv, as_json, as_text
 from recordings.replay.replaying import replay
-from recordings.replay.telling import as_csv, as_json, as_text
+from recordings.replay.way_and_time import lost_times, way_of
 from tests.recordings.logs.writing import Messages, write_bag
 from tests.recordings.replay.driving import Drive, Odd, Senses, driven, logged, wandering
 
@@ -199,9 +199,9 @@ def test_the_command_reads_a_bag_and_writes_table_and_recording(
     assert len((tmp_path / "stops.csv").read_text().splitlines()) == 1 + len(MISSION.stops)
     from recordings.review import review
 
-    (run,) = review(tmp_path / "replay.rrd").runs
-    assert run.ended == "Finished"
-    assert len(run.unconfirmed) == len(MISSION.stops)
+    (run,) = review([tmp_path / "replay.rrd"]).comparisons
+    assert run.log.ended
+    assert [item.outcome for item in run.stops] == ["unconfirmed"] * len(MISSION.stops)
 
 
 @pytest.mark.parametrize(

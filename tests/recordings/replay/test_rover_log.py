@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from recordings.logs import read_log
-from recordings.replay.placing import Placing
+from recordings.replay.log_placing import Placing
 from recordings.replay.replayed import Replay
 from recordings.replay.replaying import replay
 from recordings.replay.uploaded import mission_in

@@ -38,7 +38,7 @@ class Placing:
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class PlacedLog:
     """A log's poses in the mission's frame."""
 
     track: Track
@@ -51,7 +51,7 @@ class Placed:
     """Where a simulator says the robot was."""
 
 
-def placed(log: FieldLog, mission: Mission, how: Placing) -> Placed:
+def placed(log: FieldLog, mission: Mission, how: Placing) -> PlacedLog:
     """The log's poses in the mission's frame.
 
     Raises
@@ -67,7 +67,7 @@ def placed(log: FieldLog, mission: Mission, how: Placing) -> Placed:
     offset = round(how.time_offset_s * 1e9)
     moved = _moved(track, transform, offset)
     alignment = replace(transform, time_offset_ns=offset)
-    return Placed(moved, alignment, source, turns, _truth(log, source, mission, offset))
+    return PlacedLog(moved, alignment, source, turns, _truth(log, source, mission, offset))
 
 
 def chosen(log: FieldLog, how: Placing) -> Poses:

@@ -11,9 +11,9 @@ from mission.comparing.telling import comparison_json, comparison_table
 from mission.run_log import Alignment
 from mission.table import printable
 from recordings.logs.field_log import FieldLog
-from recordings.replay.figures import lost_times, way_of
 from recordings.replay.judged import HEADLINES, judged
 from recordings.replay.replayed import Replay
+from recordings.replay.way_and_time import lost_times, way_of
 
 MOST_LOST = 5
 """Places where time was lost that are listed on a terminal; --json has all."""
