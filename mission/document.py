@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 import msgspec
 
 from mission.floor_source import FloorSource
-from mission.settings import Settings
+from mission.settings import FLOOR_PARAMETERS, Settings
 
 SCHEMA: Final = "stopgo/mission"
 VERSION: Final = 1
@@ -150,6 +150,11 @@ def sealed(mission: Mission) -> Mission:
 
 
 def mission_id(source: FloorSource, settings: Settings, version: str, part: int = 0) -> str:
-    """Hash of floor, parameters, version and part: known before planning, and the recording id."""
-    basis = [source.basis, msgspec.to_builtins(settings), version, part]
+    """Hash of floor, parameters, version and part: known before planning, and the recording id.
+
+    What the settings tell the floor's reader is in the source.
+    """
+    told = msgspec.to_builtins(settings)
+    parameters = {key: value for key, value in told.items() if key not in FLOOR_PARAMETERS}
+    basis = [source.basis, parameters, version, part]
     return hashlib.sha256(canonical({"basis": basis})).hexdigest()[:32]

@@ -22,9 +22,11 @@ class Rank(IntEnum):
 
 GRAVE = (
     *("walls_missing", "little_reached", "stray_element", "leg_over_ignored", "units_doubtful"),
+    *("no_geometry", "kernel_crashed"),
     *("open_outline", "missing_block", "no_outline", "bad_coordinates"),
 )
 NOTES = (
+    *("floor_from_rooms", "rooms_derived", "spaces_overlap", "off_floor"),
     *("duplicate", "repeated_points", "no_length", "text_outside_rooms", "gap_closed", "repaired"),
     "joint_closed",
     *("layer_as_told", "exterior_opening", "rooms_overlap"),

@@ -24,8 +24,8 @@ LEAST_SHARE = 0.7
 LAYER_ROLES = ("floor", "rooms", "doors", "passages", *KINDS, "ignore")
 """What a layer of a drawing can stand for."""
 
-_plan, _robot, _scanner, _policy = (
-    partial(Parameter, table) for table in ("plan", "robot", "scanner", "policy")
+_floor, _plan, _robot, _scanner, _policy = (
+    partial(Parameter, table) for table in ("floor", "plan", "robot", "scanner", "policy")
 )
 _share = partial(_plan, least=0, most=1, why="0.7 is 70 %", undecided=f"{LEAST_SHARE:g}; none by units")
 
@@ -35,8 +35,19 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """All parameters of a plan. `None` means: decided from the others or from the floor."""
+    """All parameters of a plan. `None` means: decided from the others or from the floor.
 
+    What is in the table `floor` tells the floor's reader what to read; it makes a floor another floor.
+    """
+
+    storey: Annotated[str | None, _floor("The model's storey, by name", undecided="its only one")] = None
+    level: Annotated[float | None, _floor("Level of the floor in a model", "m", undecided="storey's")] = None
+    scan_height: Annotated[
+        float | None, _floor("Scanner above the floor of a model", "m", above=0, below=10, undecided="1.3")
+    ] = None
+    robot_height: Annotated[
+        float | None, _floor("Robot's height", "m", above=0.1, below=10, undecided="scan_height")
+    ] = None
     candidates: Annotated[str, _plan("grid, triangulation, or module:function")] = "grid"
     visibility: Annotated[str, _plan("exact or bresenham")] = "exact"
     selector: Annotated[str, _plan("default, greedy, or exact")] = "default"
@@ -197,6 +208,8 @@ def _declared() -> dict[str, Parameter]:
 
 PARAMETERS = _declared()
 """Every parameter of a plan by name, in the order of their declaration."""
+FLOOR_PARAMETERS = tuple(name for name, item in PARAMETERS.items() if item.section == "floor")
+"""Those that choose and shape the floor that is read."""
 
 
 def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:

@@ -8,7 +8,7 @@ import msgspec
 
 from mission import __version__
 from mission.document import Origin, Policy, RobotSpec, Scan, ScannerSpec, SiteOrigin
-from mission.settings import Settings
+from mission.settings import FLOOR_PARAMETERS, Settings
 
 DECIMALS = 6
 """Missions hold micrometres and microradians: finer would be float noise."""
@@ -56,8 +56,11 @@ def site_origin_of(settings: Settings) -> SiteOrigin | None:
 
 
 def origin_of(settings: Settings, *, floor: str, digest: str) -> Origin:
-    """What the mission was made from: a file's name and digest, and every setting."""
-    parameters = msgspec.json.decode(msgspec.json.encode(settings))
+    """What the mission was made from: a file's name and digest, and every setting that was decided."""
+    told = msgspec.json.decode(msgspec.json.encode(settings))
+    parameters = {
+        key: value for key, value in told.items() if value not in (None, []) or key not in FLOOR_PARAMETERS
+    }
     return Origin(floor=floor, floor_digest=digest, parameters=parameters, stopgo=__version__)
 
 

@@ -41,7 +41,8 @@ def add_commands(app: typer.Typer) -> None:
 
 def plan_command(
     floor: Annotated[
-        Path | None, typer.Argument(help="The floor: a layered .dxf.", show_default=False)
+        Path | None,
+        typer.Argument(help="The floor: a layered .dxf; an .ifc or .ifczip.", show_default=False),
     ] = None,
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")] = Path(),
     parameters: Annotated[

@@ -4,39 +4,62 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
+    from planner.floors.reader import FloorOptions
     from planner.floors.survey import FloorChoice, LayerUse, Survey
 
 
 def add_floor_commands(app: typer.Typer) -> None:
     """Add the verbs about floors' files."""
-    app.command(name="floors", epilog="Example: stopgo floors building.dxf")(floors_command)
+    from mission.settings import FLOOR_PARAMETERS
+    from planner.options import with_options
+
+    floors = with_options(floors_command, (*FLOOR_PARAMETERS, "layers"))
+    app.command(name="floors", epilog="Example: stopgo floors building.ifc --svg floors.svg")(floors)
 
 
 def floors_command(
-    file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf.")],
-    layer: Annotated[
-        list[str] | None,
-        typer.Option(help="NAME=KIND of a layer, such as A-WALL=walls or DIM=ignore; repeatable."),
-    ] = None,
+    file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf, an .ifc or an .ifczip.")],
+    *,
+    svg: Annotated[Path | None, typer.Option(help="Draw what was read, and what was left out.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+    **given: Any,
 ) -> int:
     """Tell what a file holds that a plan can be made of, what it was taken for, and what is odd about it."""
     from mission.settings import read_settings
     from mission.table import printable_lines
     from planner.floors import options_of, survey_floor
+    from planner.options import values_of
 
-    settings = read_settings(None, {"layers": tuple(layer) if layer else None})
-    found = survey_floor(file, options_of(settings))
+    options = options_of(read_settings(None, values_of(given)))
+    found = survey_floor(file, options)
+    if svg is not None:
+        _draw(svg, file, found, options)
     if as_json:
         typer.echo(json.dumps(found.as_json(), ensure_ascii=False))
     else:
         typer.echo(printable_lines("\n".join(survey_lines(found))))
     return 0
+
+
+def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:
+    """Draw the floor that the options choose; else every floor of the file that a plan may be made of."""
+    from dataclasses import replace
+
+    from mission.files.atomic import write_atomic
+    from mission.files.floor_svg import floor_svg
+    from planner.floors import read_floor
+
+    names = [item.name for item in found.floors if not item.aside]
+    if any(item.chosen for item in found.floors) or not names:
+        floors = [read_floor(file, options)]
+    else:
+        floors = [read_floor(file, replace(options, storey=name)) for name in names]
+    write_atomic(out, floor_svg(floors))
 
 
 def survey_lines(found: Survey) -> list[str]:

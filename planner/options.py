@@ -1,10 +1,10 @@
-"""The options of `stopgo plan`: one for every parameter, as mission/settings.py declares it."""
+"""The options of `stopgo plan` and `stopgo floors`: one for each parameter of mission/settings.py."""
 
 from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any, cast
 
 import typer
@@ -13,18 +13,22 @@ from mission.parameter import Parameter
 from mission.settings import PARAMETERS
 
 
-def with_options(command: Callable[..., int]) -> Callable[..., int]:
-    """The command with an option for every parameter in place of its `**given`, after its positional ones."""
+def with_options(command: Callable[..., int], names: Iterable[str] = PARAMETERS) -> Callable[..., int]:
+    """The command with an option for each parameter in place of its `**given`, after its positional ones."""
     *own, _ = inspect.signature(command, eval_str=True).parameters.values()
     first, last = [[p for p in own if (p.kind == p.KEYWORD_ONLY) is late] for late in (False, True)]
     whole: Any = functools.wraps(command)(functools.partial(command))
-    whole.__signature__ = inspect.Signature([*first, *map(_option, PARAMETERS.values()), *last])
+    whole.__signature__ = inspect.Signature([*first, *(_option(PARAMETERS[name]) for name in names), *last])
     return cast(Callable[..., int], whole)
 
 
 def values_of(options: dict[str, Any]) -> dict[str, Any]:
     """The values of the options that were given, by the parameters' names."""
-    return {name: parameter.given(options[_key(parameter)]) for name, parameter in PARAMETERS.items()}
+    return {
+        name: parameter.given(options[_key(parameter)])
+        for name, parameter in PARAMETERS.items()
+        if _key(parameter) in options
+    }
 
 
 def _key(parameter: Parameter) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mission.files.sheet import PaperSheet
-from mission.files.svg import group, line_data, number, path, ring_data
+from mission.files.svg import clean, group, line_data, number, path, ring_data
 from mission.floor import Element, FloorPlan
 from mission.geometry import BoolArray, FloatArray, Polygon
 from mission.planning import NavigableSpace, OpeningState, Selection, Targets
@@ -86,9 +86,18 @@ def _region(part: Polygon, sheet: PaperSheet) -> str:
 
 
 def _elements(elements: list[Element], sheet: PaperSheet) -> Iterator[str]:
+    """Those of a model are a shape each, which says what it is where a mouse points at it."""
+    yield from (_named(item, sheet) for item in elements if item.global_id)
+    elements = [item for item in elements if not item.global_id]
     solids = (_region(part, sheet) for item in elements for part in item.solids)
     yield path(solids, **_EVEN_ODD)
     yield path((line_data(sheet.on_paper(line)) for item in elements for line in item.lines), fill="none")
+
+
+def _named(item: Element, sheet: PaperSheet) -> str:
+    solids = path((_region(part, sheet) for part in item.solids), **_EVEN_ODD)
+    lines = path((line_data(sheet.on_paper(line)) for line in item.lines), fill="none")
+    return f"<g><title>{clean(f'{item.id} {item.global_id}')}</title>{solids}{lines}</g>"
 
 
 def _openings(openings: tuple[OpeningState, ...], sheet: PaperSheet) -> Iterator[str]:

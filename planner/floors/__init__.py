@@ -9,17 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from mission.errors import InputError
 from mission.floor import FloorPlan
 from mission.plugins import Variant
+from mission.settings import FLOOR_PARAMETERS, Settings
 from planner.floors.foreign import foreign_readers, sound
 from planner.floors.reader import FloorFile, FloorOptions, Reader
 from planner.floors.survey import Survey
-
-if TYPE_CHECKING:
-    from mission.settings import Settings
 
 READERS: tuple[Reader, ...] = (
     Reader(
@@ -75,7 +73,8 @@ def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
 
 def options_of(settings: Settings) -> FloorOptions:
     """What a plan's settings tell a reader."""
-    return FloorOptions(d_dis=settings.d_dis, layers=settings.layer_roles)
+    told = {name: getattr(settings, name) for name in FLOOR_PARAMETERS}
+    return FloorOptions(d_dis=settings.d_dis, layers=settings.layer_roles, **told)
 
 
 def _opened(path: Path, options: FloorOptions | None) -> tuple[FloorFile, Variant[Reader], FloorOptions]:

@@ -25,6 +25,8 @@ class FloorChoice:
     """Elements by kind; `rooms`, `doors` and `passages` are counted with them."""
     notes: tuple[str, ...] = ()
     """What a person should know, such as `foundation` or `2 duplicates merged`."""
+    aside: bool = False
+    """Whether nobody would plan it: a foundation, a roof, or what has no floor."""
     chosen: bool = False
     """Whether this is the floor that is planned with the same options."""
 

@@ -9,7 +9,7 @@ import shapely
 
 from mission.geometry import FloatArray
 from planner.floors.ifc.levels import Level
-from planner.floors.ifc.model import Mesh, Model, Product
+from planner.floors.ifc.model import Surface, Model, Product
 from planner.floors.rings import Region
 
 SILL = 0.3
@@ -33,7 +33,9 @@ def doors_on(level: Level, model: Model, walls: dict[str, Region]) -> list[Door]
     return [door for door in found if door is not None]
 
 
-def _door(product: Product, mesh: Mesh, level: Level, model: Model, walls: dict[str, Region]) -> Door | None:
+def _door(
+    product: Product, mesh: Surface, level: Level, model: Model, walls: dict[str, Region]
+) -> Door | None:
     if not (level.z - 0.6 < mesh.z[0] < level.z + SILL and mesh.z[1] > level.z + LEAST_HEIGHT):
         return None
     frame = _frame(product, mesh)
@@ -42,13 +44,13 @@ def _door(product: Product, mesh: Mesh, level: Level, model: Model, walls: dict[
     if np.ptp(box[:, 0]) < np.ptp(box[:, 1]) and _is_turned(box, product):
         frame = np.array([frame[0], frame[2], -frame[1]])
         box = _box(opening.vertices[:, :2], frame)
-    middle = _middle_of_wall(box, frame, _host(product, model, walls))
-    ends = np.array([[box[0, 0], middle], [box[1, 0], middle]])
-    corners = np.array([[box[i, 0], box[j, 1]] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
+    near, far = _faces_of_wall(box, frame, _host(product, model, walls))
+    ends = np.array([[x, (near + far) / 2] for x in box[:, 0]])
+    corners = np.array([[box[i, 0], (near, far)[j]] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
     return Door(product, _world(ends, frame), shapely.Polygon(_world(corners, frame)))
 
 
-def _frame(product: Product, mesh: Mesh) -> FloatArray:
+def _frame(product: Product, mesh: Surface) -> FloatArray:
     """Origin and axes (3, 2) of a door in plan: x along it, y through it."""
     if product.placement is None:
         box = shapely.get_coordinates(shapely.MultiPoint(mesh.vertices[:, :2]).minimum_rotated_rectangle)
@@ -85,13 +87,13 @@ def _host(product: Product, model: Model, walls: dict[str, Region]) -> Region | 
     return walls.get(opening.host or "") if opening else None
 
 
-def _middle_of_wall(box: FloatArray, frame: FloatArray, wall: Region | None) -> float:
-    """The y of the middle of the wall beside the opening; of the opening itself without one."""
+def _faces_of_wall(box: FloatArray, frame: FloatArray, wall: Region | None) -> tuple[float, float]:
+    """The y of the wall's faces beside the opening; of the opening itself without a wall."""
     if wall is not None:
         local = (shapely.get_coordinates(wall) - frame[0]) @ frame[1:].T
         x, y = local.T
         jambs = (np.abs(x - box[0, 0]) < 0.02) | (np.abs(x - box[1, 0]) < 0.02)
         at = y[jambs & (y > box[0, 1] - 0.05) & (y < box[1, 1] + 0.05)]
         if len(at) > 1:
-            return float(at.min() + at.max()) / 2
-    return float(box[0, 1] + box[1, 1]) / 2
+            return float(at.min()), float(at.max())
+    return float(box[0, 1]), float(box[1, 1])

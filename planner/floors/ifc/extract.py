@@ -1,4 +1,4 @@
-"""IFC file -> model, in a process of its own: `python -m planner.floors.ifc.extract MODEL OUT`.
+"""IFC file -> model, in a process of its own, with the arguments MODEL and OUT.
 
 The geometry kernel is compiled code that may crash on a bad solid; here it takes nobody with it. Progress
 goes to stderr where that is a terminal. What it was working on last is in the file OUT.at.
@@ -78,11 +78,11 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-Shape = tuple[int, Any]
+Made = tuple[int, Any]
 """A product's number in the file, and its geometry."""
 
 
-def extracted(model: ifcopenshell.file, shapes: Iterable[Shape]) -> Model:
+def extracted(model: ifcopenshell.file, shapes: Iterable[Made]) -> Model:
     """All of a model that a plan needs."""
     unit = ifcopenshell.util.unit.calculate_unit_scale(model)
     vertices, faces, where, clear = _arrays(shapes)
@@ -132,7 +132,7 @@ def _settings() -> Any:
     return settings
 
 
-def _all_at_once(model: ifcopenshell.file) -> Iterator[Shape]:
+def _all_at_once(model: ifcopenshell.file) -> Iterator[Made]:
     entities = [entity for entity, _ in _chosen(model) if entity.Representation]
     if not entities:
         return
@@ -147,7 +147,7 @@ def _all_at_once(model: ifcopenshell.file) -> Iterator[Shape]:
             return
 
 
-def _one_by_one(model: ifcopenshell.file, without: frozenset[str], at: Path) -> Iterator[Shape]:
+def _one_by_one(model: ifcopenshell.file, without: frozenset[str], at: Path) -> Iterator[Made]:
     """Each shape alone; before each its GlobalId is written down, for whoever reads the crash."""
     chosen = [entity for entity, _ in _chosen(model) if entity.Representation]
     for number, entity in enumerate(chosen):
@@ -169,7 +169,7 @@ def _tell(percent: int) -> None:
 
 
 def _arrays(
-    shapes: Iterable[Shape],
+    shapes: Iterable[Made],
 ) -> tuple[np.ndarray, np.ndarray, dict[int, tuple[int, int, int, int]], dict[int, bool]]:
     """All vertices and faces, the rows of each product in them, and which products are glass."""
     vertices: list[np.ndarray] = []
@@ -301,7 +301,3 @@ def _is(entity: Any, name: str) -> bool:
         return bool(entity.is_a(name))
     except RuntimeError:
         return False
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

@@ -11,7 +11,7 @@ import numpy as np
 from mission.errors import InputError
 from mission.geometry import FloatArray
 from planner.floors.drawing import legible
-from planner.floors.ifc.model import Mesh, Model, Storey
+from planner.floors.ifc.model import Surface, Model, Storey
 from planner.floors.ifc.section import upward
 
 NEAR = 0.6
@@ -60,7 +60,7 @@ def _surfaces(model: Model) -> tuple[FloatArray, FloatArray]:
     return np.concatenate([z for z, _ in parts]), np.concatenate([area for _, area in parts])
 
 
-def walked_on(model: Model) -> list[Mesh]:
+def walked_on(model: Model) -> list[Surface]:
     """Slabs and floor coverings; ceilings are coverings too."""
     found = model.of_role("slabs", "coverings")
     return [mesh for item, mesh in found if item.role == "slabs" or item.predefined == "FLOORING"]
@@ -124,9 +124,8 @@ def chosen_level(
     if z is not None:
         near = [level for level in levels if abs(level.z - z) <= 0.3]
         return min(near, key=lambda level: abs(level.z - z)) if near else _bare(z, levels)
-    inhabited = [level for level in levels if not level.aside]
-    if len(inhabited) == 1:
-        return inhabited[0]
+    if len(walked(levels)) == 1:
+        return walked(levels)[0]
     if not levels:
         raise InputError(
             f"{path}: the model has no storeys; say where the floor lies with --level Z (its elements lie "
@@ -137,6 +136,11 @@ def chosen_level(
 
 FOUNDATION = "below the lowest storey with doors or rooms: a foundation"
 ROOF = "nothing above it: a roof"
+
+
+def walked(levels: Iterable[Level]) -> list[Level]:
+    """Without foundations and roofs."""
+    return [level for level in levels if not level.aside]
 
 
 def _named(levels: tuple[Level, ...], name: str, path: Path) -> Level:
@@ -206,7 +210,7 @@ def _under_the_sky(level: Level, model: Model) -> bool:
     return above < below / 2 if below else not above
 
 
-def _shade(mesh: Mesh) -> float:
+def _shade(mesh: Surface) -> float:
     """Area in plan of a closed body, m²: half of what all its faces throw down."""
     a, b, c = (mesh.triangles[:, index, :2] for index in range(3))
     u, v = b - a, c - a

@@ -67,7 +67,7 @@ class Product(msgspec.Struct, frozen=True, kw_only=True):
     phase: str | None = None
 
 
-class Place(msgspec.Struct, frozen=True, kw_only=True):
+class OnEarth(msgspec.Struct, frozen=True, kw_only=True):
     """What a model says of its place on earth; everything in the model's own words."""
 
     eastings: float | None = None
@@ -98,7 +98,7 @@ class Described(msgspec.Struct, frozen=True, kw_only=True):
     application: str
     storeys: tuple[Storey, ...]
     products: tuple[Product, ...]
-    place: Place
+    place: OnEarth
     left_out: dict[str, int]
     """Products by class that no plan is made of, such as furniture."""
     failed: tuple[str, ...] = ()
@@ -108,7 +108,7 @@ class Described(msgspec.Struct, frozen=True, kw_only=True):
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Surface:
     """Triangles of one product in the world, metres."""
 
     vertices: FloatArray
@@ -144,14 +144,14 @@ class Model:
         return {product.global_id: product for product in self.described.products}
 
     @cached_property
-    def meshes(self) -> dict[str, Mesh]:
+    def meshes(self) -> dict[str, Surface]:
         """Meshes by GlobalId of the products that have one."""
         return {item.global_id: self._mesh(item) for item in self.described.products if item.faces[1]}
 
-    def _mesh(self, product: Product) -> Mesh:
-        return Mesh(self.vertices[slice(*product.vertices)], self.faces[slice(*product.faces)])
+    def _mesh(self, product: Product) -> Surface:
+        return Surface(self.vertices[slice(*product.vertices)], self.faces[slice(*product.faces)])
 
-    def of_role(self, *roles: str) -> list[tuple[Product, Mesh]]:
+    def of_role(self, *roles: str) -> list[tuple[Product, Surface]]:
         """Products of these roles that have a mesh, with it, in the order of their GlobalIds."""
         return [(item, self.meshes[item.global_id]) for item in self._by_role(roles)]
 

@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 
 from mission.geometry import FloatArray
+from planner.floors.ifc.areas import Space
 from planner.floors.ifc.doors import Door
-from planner.floors.ifc.ground import Space
 from planner.floors.ifc.solids import Solid
 from planner.floors.rings import Region
 

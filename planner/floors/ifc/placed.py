@@ -9,19 +9,19 @@ import ifcopenshell.util.element
 import ifcopenshell.util.placement
 import numpy as np
 
-from planner.floors.ifc.model import Place
+from planner.floors.ifc.model import OnEarth
 
 CONVERSIONS = ("ePset_MapConversion", "ePSet_MapConversion")
 PROJECTIONS = ("ePset_ProjectedCRS", "ePSet_ProjectedCRS")
 PREFIXES = {"MILLI": 1e-3, "CENTI": 1e-2, "DECI": 1e-1, "KILO": 1e3}
 
 
-def place_of(model: ifcopenshell.file, unit: float) -> Place:
+def place_of(model: ifcopenshell.file, unit: float) -> OnEarth:
     """The map conversion, the site's latitude and longitude, and true north, as far as they are there."""
     conversion = _conversion(model)
     site = next(iter(model.by_type("IfcSite")), None)
     latitude, longitude, elevation = _on_earth(site, unit)
-    return Place(
+    return OnEarth(
         **conversion,
         latitude=latitude,
         longitude=longitude,

@@ -1,4 +1,4 @@
-"""Mesh -> plan: the cut at a height, the projection of a band, and the faces that look up."""
+"""Surface -> plan: the cut at a height, the projection of a band, and the faces that look up."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from mission.geometry import FloatArray
-from planner.floors.ifc.model import Mesh
+from planner.floors.ifc.model import Surface
 from planner.floors.rings import Region
 
 GRID = 1e-4
@@ -20,7 +20,7 @@ MOST_FACES = 6000
 NOTHING = shapely.Polygon()
 
 
-def cut(mesh: Mesh, height: float) -> Region:
+def cut(mesh: Surface, height: float) -> Region:
     """What of a mesh a horizontal plane at `height` goes through.
 
     Triangles become directed segments; a face between them is solid if the surface winds around it, or if
@@ -70,7 +70,7 @@ def tidy(region: Region) -> Region:
     return shapely.union_all(parts) if parts else NOTHING
 
 
-def footprint(mesh: Mesh, low: float, high: float) -> Region:
+def footprint(mesh: Surface, low: float, high: float) -> Region:
     """The projection of what of a mesh lies between two heights.
 
     What looks up within the band, and the cuts at both its ends, throw the same shadow as the whole. Bodies
@@ -98,7 +98,7 @@ def _areas(region: Region) -> Region:
     return tidy(shapely.union_all([part for part in shapely.get_parts(whole) if part.area > 0]))
 
 
-def _hulls(mesh: Mesh, low: float, high: float) -> Region:
+def _hulls(mesh: Surface, low: float, high: float) -> Region:
     """The convex hull of each piece of a mesh that reaches into the band."""
     edges = mesh.faces[:, [0, 1, 2]], mesh.faces[:, [1, 2, 0]]
     a, b = (np.concatenate(edge.T) for edge in edges)
@@ -134,7 +134,7 @@ def _half(points: FloatArray, height: float, *, keep_below: bool) -> FloatArray:
     return np.array(kept).reshape(-1, 3)
 
 
-def upward(mesh: Mesh) -> tuple[FloatArray, FloatArray, FloatArray]:
+def upward(mesh: Surface) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Triangles (k, 3, 2) that look straight up, their heights (k,) and areas (k,)."""
     a, b, c = (mesh.triangles[:, index] for index in range(3))
     normal = np.cross(b - a, c - a)

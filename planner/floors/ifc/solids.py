@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import shapely
 
 from planner.floors.ifc.levels import Level
-from planner.floors.ifc.model import Mesh, Model, Product
+from planner.floors.ifc.model import Surface, Model, Product
 from planner.floors.ifc.section import NOTHING, cut, footprint, tidy
 from planner.floors.rings import Region
 
@@ -93,7 +93,7 @@ def _without_pores(part: shapely.Polygon) -> shapely.Polygon:
     return shapely.Polygon(part.exterior, holes)
 
 
-def _cut(product: Product, mesh: Mesh, plane: float) -> list[Solid]:
+def _cut(product: Product, mesh: Surface, plane: float) -> list[Solid]:
     kind = AT_SCANNER[product.role]
     if product.transparent and product.role in GLASS:
         kind = "windows"
@@ -107,14 +107,14 @@ def _filled(region: Region) -> Region:
     return _on_grid(shapely.union_all([region, closed]))
 
 
-def _stairs(product: Product, mesh: Mesh, level: Level) -> list[Solid]:
+def _stairs(product: Product, mesh: Surface, level: Level) -> list[Solid]:
     low, high = level.z + TREADS[0], level.z + TREADS[1]
     if mesh.z[1] <= low or mesh.z[0] >= high:
         return []
     return _solid(product, "stairs", footprint(mesh, low, high))
 
 
-def _low(product: Product, mesh: Mesh, level: Level, heights: Heights) -> list[Solid]:
+def _low(product: Product, mesh: Surface, level: Level, heights: Heights) -> list[Solid]:
     """What the scanner looks over, and the robot runs into."""
     top = max(heights.top, TREADS[1]) if product.role == "railings" else heights.top
     low, high = level.z + KERB, level.z + top
