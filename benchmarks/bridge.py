@@ -18,7 +18,8 @@ from pathlib import Path
 import msgspec
 
 from bridge.commands.spawn import end_robot, free_port, start_robot
-from bridge.link.keys import init_site, issue, now_utc
+from bridge.link.authority import init_site, issue
+from bridge.link.keys import now_utc
 from bridge.station.station import Station, connect
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor

@@ -1,104 +1,154 @@
-"""Who may do what on a robot's keys: nothing, unless a rule here says so.
+"""Who may send what on a robot's keys, at the robot and at a router: nothing, unless a rule here says so.
 
-zenoh applies this at the robot, by the role that stands in the certificate of the link. A rule lets a message
-pass only if it includes the message's whole key. What is denied looks to the other end like no answer.
+zenoh applies this by the certificate of a link. At a robot every holder of the site's keys may ask and
+listen; who may order is told by the seals, for behind a router all come by one link. At a router each robot
+is held to its own keys, and nobody can stand in for another. A rule lets a message pass only if it includes
+the message's whole key. What is denied looks to the other end like no answer.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
+from bridge.link.keys import Holder
 from bridge.link.protocol import KeyExpressions
+
+LOOKING = ("declare_liveliness_subscriber", "liveliness_query")
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Messages on some keys, from those who begin with them to those who serve them."""
+
+    name: str
+    asked: tuple[str, ...] = ()
+    """Questions."""
+    told: tuple[str, ...] = ()
+    """Publications, by those who serve."""
+    said: tuple[str, ...] = ()
+    """Publications to those who serve."""
+    shown: tuple[str, ...] = ()
+    """Tokens of those who serve."""
+    signed_in: tuple[str, ...] = ()
+    """Tokens shown to those who serve."""
 
 
 def access_control(keys: KeyExpressions) -> dict[str, Any]:
-    """zenoh's `access_control` for one robot: default deny, viewers watch, stations command as well.
+    """zenoh's `access_control` at one robot: default deny; its own tunnel's end may join it as well."""
+    every = _served(_everything(keys), "ingress", "egress")
+    # An end of the tunnel in a process of its own; and another robot of this name, looking for itself.
+    own = _served(_own_tunnel(keys), "egress", "ingress")
+    return _control(
+        [*every, *own],
+        subjects=[{"id": "holder"}, {"id": "own", "cert_common_names": [f"robot:{keys.robot}"]}],
+        policies=[
+            {"rules": _ids(every), "subjects": ["holder"]},
+            {"rules": _ids(own), "subjects": ["own"]},
+        ],
+    )
 
-    A router in between holds a robot's certificate and passes on what stations ask; there the
-    signatures of orders and missions tell who asks. Raw MAVLink frames carry no such signature, so they are
-    taken towards the vehicle from a station's own link only.
-    """
-    looking = [*_watching(keys), *_overhearing(keys)]
+
+def router_access_control(holders: Sequence[Holder], site: str | None) -> dict[str, Any]:
+    """zenoh's `access_control` at a router: default deny, each robot on its own keys, others by role."""
+    every = KeyExpressions.of_every_robot(site)
     roles = {
-        "viewer": looking,
-        "station": [*looking, *_commanding(keys), *_steering(keys)],
-        "robot": [*looking, *_commanding(keys), *_tunnelling(keys)],
+        "viewer": _served(_watching(every, "viewer"), "ingress", "egress"),
+        "station": _served(_commanding(every, "station"), "ingress", "egress"),
     }
+    rules, subjects, policies = [], [], []
+    for role, own in roles.items():
+        names = sorted({f"{role}:{holder.name}" for holder in holders if holder.role == role})
+        if names:
+            rules += own
+            subjects.append({"id": role, "cert_common_names": names})
+            policies.append({"rules": _ids(own), "subjects": [role]})
+    for name in sorted({holder.name for holder in holders if holder.role == "robot"}):
+        keys = KeyExpressions(name, site)
+        own = [
+            *_served(_commanding(keys, f"robot {name}"), "egress", "ingress"),
+            *_served(_looking_for_twins(keys), "ingress", "egress"),
+        ]
+        rules += own
+        subjects.append({"id": f"robot {name}", "cert_common_names": [f"robot:{name}"]})
+        policies.append({"rules": _ids(own), "subjects": [f"robot {name}"]})
+    return _control(rules, subjects, policies)
+
+
+def _watching(keys: KeyExpressions, name: str) -> Flow:
+    return Flow(
+        f"{name} watch",
+        asked=(keys.info, keys.log, keys.poses, keys.mission("*", "part/*"), keys.mavlink("hello")),
+        told=(f"{keys.root}/tel/*", keys.mavlink("down")),
+        shown=(keys.alive, keys.mavlink("alive")),
+        signed_in=(keys.watcher("*"),),
+    )
+
+
+def _commanding(keys: KeyExpressions, name: str) -> Flow:
+    watching = _watching(keys, name)
+    orders = (keys.command("*"), keys.mission("*", "**"))
+    return Flow(
+        f"{name} command",
+        asked=(*watching.asked, *orders),
+        told=watching.told,
+        said=(keys.mavlink("up"),),
+        shown=watching.shown,
+        signed_in=watching.signed_in,
+    )
+
+
+def _everything(keys: KeyExpressions) -> Flow:
+    """What any station may want of one robot, and of all robots at once: who is there."""
+    every, own = KeyExpressions.of_every_robot(keys.site), _commanding(keys, "holder")
+    return Flow(
+        "holder", (*own.asked, every.info), own.told, own.said, (*own.shown, every.alive), own.signed_in
+    )
+
+
+def _own_tunnel(keys: KeyExpressions) -> Flow:
+    return Flow(
+        "own tunnel",
+        asked=(keys.mavlink("hello"), keys.info),
+        told=(keys.mavlink("down"),),
+        said=(keys.mavlink("up"),),
+        shown=(keys.mavlink("alive"),),
+    )
+
+
+def _looking_for_twins(keys: KeyExpressions) -> Flow:
+    return Flow(f"robot {keys.robot} twin", asked=(keys.info,), shown=(keys.alive,))
+
+
+def _served(flow: Flow, inward: str, outward: str) -> list[dict[str, Any]]:
+    """Rules where what is asked comes `inward`, and what is answered and told goes `outward`."""
+    rules = (
+        _rule(f"{flow.name} ask", ["query"], inward, flow.asked),
+        _rule(f"{flow.name} answer", ["reply", "declare_queryable"], outward, flow.asked),
+        _rule(f"{flow.name} tell", ["put"], outward, flow.told),
+        _rule(f"{flow.name} listen", ["declare_subscriber"], inward, flow.told),
+        _rule(f"{flow.name} say", ["put"], inward, flow.said),
+        _rule(f"{flow.name} hear", ["declare_subscriber"], outward, flow.said),
+        _rule(f"{flow.name} show", ["liveliness_token"], outward, flow.shown),
+        _rule(f"{flow.name} look", [*LOOKING], inward, flow.shown),
+        _rule(f"{flow.name} sign in", ["liveliness_token"], inward, flow.signed_in),
+        _rule(f"{flow.name} look for", [*LOOKING], outward, flow.signed_in),
+    )
+    return [rule for rule in rules if rule["key_exprs"]]
+
+
+def _rule(name: str, messages: list[str], flow: str, keys: tuple[str, ...]) -> dict[str, Any]:
+    return {"id": name, "messages": messages, "flows": [flow], "permission": "allow", "key_exprs": list(keys)}
+
+
+def _control(
+    rules: list[dict[str, Any]], subjects: list[dict[str, Any]], policies: list[dict[str, Any]]
+) -> dict[str, Any]:
     return {
-        "enabled": True,
-        "default_permission": "deny",
-        "rules": [*looking, *_commanding(keys), *_steering(keys), *_tunnelling(keys)],
-        "subjects": [{"id": role, "cert_common_names": [role]} for role in roles],
-        "policies": [{"rules": _ids(rules), "subjects": [role]} for role, rules in roles.items()],
-    }
-
-
-def _watching(keys: KeyExpressions) -> list[dict[str, Any]]:
-    every = KeyExpressions.of_every_robot(keys.site)
-    asked = [every.info, keys.log, keys.poses, keys.mission("*", "part/*")]
-    told = [f"{keys.root}/tel/*"]
-    tokens = [every.alive]
-    watchers = [keys.watcher("*")]
-    return [
-        _rule("watch_ask", ["query"], "ingress", asked),
-        _rule("watch_answer", ["reply", "declare_queryable"], "egress", asked),
-        _rule("watch_told", ["put"], "egress", told),
-        _rule("watch_listen", ["declare_subscriber"], "ingress", told),
-        _rule("watch_alive", ["liveliness_token"], "egress", tokens),
-        _rule("watch_look", ["declare_liveliness_subscriber", "liveliness_query"], "ingress", tokens),
-        _rule("watch_show", ["liveliness_token"], "ingress", watchers),
-        _rule("watch_seen", ["declare_liveliness_subscriber", "liveliness_query"], "egress", watchers),
-    ]
-
-
-def _commanding(keys: KeyExpressions) -> list[dict[str, Any]]:
-    orders = [keys.command("*"), keys.mission("*", "**")]
-    return [
-        _rule("command_ask", ["query"], "ingress", orders),
-        _rule("command_answer", ["reply", "declare_queryable"], "egress", orders),
-    ]
-
-
-def _overhearing(keys: KeyExpressions) -> list[dict[str, Any]]:
-    """Frames from the vehicle."""
-    down, alive, hello = [keys.mavlink("down")], [keys.mavlink("alive")], [keys.mavlink("hello")]
-    return [
-        _rule("mavlink_greet", ["query"], "ingress", hello),
-        _rule("mavlink_greeted", ["reply", "declare_queryable"], "egress", hello),
-        _rule("mavlink_told", ["put"], "egress", down),
-        _rule("mavlink_listen", ["declare_subscriber"], "ingress", down),
-        _rule("mavlink_alive", ["liveliness_token"], "egress", alive),
-        _rule("mavlink_look", ["declare_liveliness_subscriber", "liveliness_query"], "ingress", alive),
-    ]
-
-
-def _steering(keys: KeyExpressions) -> list[dict[str, Any]]:
-    """Frames to the vehicle."""
-    up = [keys.mavlink("up")]
-    return [
-        _rule("mavlink_say", ["put"], "ingress", up),
-        _rule("mavlink_hear", ["declare_subscriber"], "egress", up),
-    ]
-
-
-def _tunnelling(keys: KeyExpressions) -> list[dict[str, Any]]:
-    """The tunnel's end at the robot, if it is a process of its own that joins the robot's."""
-    down, up, alive = [keys.mavlink("down")], [keys.mavlink("up")], [keys.mavlink("alive")]
-    hello = [keys.mavlink("hello")]
-    return [
-        _rule("tunnel_greeted", ["query"], "egress", hello),
-        _rule("tunnel_greets", ["reply", "declare_queryable"], "ingress", hello),
-        _rule("tunnel_tell", ["put"], "ingress", down),
-        _rule("tunnel_wanted", ["declare_subscriber"], "egress", down),
-        _rule("tunnel_told", ["put"], "egress", up),
-        _rule("tunnel_listen", ["declare_subscriber"], "ingress", up),
-        _rule("tunnel_alive", ["liveliness_token"], "ingress", alive),
-        _rule("tunnel_seen", ["declare_liveliness_subscriber", "liveliness_query"], "egress", alive),
-    ]
-
-
-def _rule(name: str, messages: list[str], flow: str, keys: list[str]) -> dict[str, Any]:
-    return {"id": name, "messages": messages, "flows": [flow], "permission": "allow", "key_exprs": keys}
+        "enabled": True, "default_permission": "deny", "rules": rules, "subjects": subjects,
+        "policies": policies,
+    }  # fmt: skip
 
 
 def _ids(rules: list[dict[str, Any]]) -> list[str]:

@@ -1,17 +1,17 @@
-"""A site's keys: an authority of its own, and a certificate for every station, viewer and robot.
+"""One holder's keys, and whom they let it believe: everybody whom the same authority has issued keys to.
 
-A certificate's common name is its role, which the robot's access control goes by; its organisation is the
-name of the one who holds it, which the lease goes by. Keys are Ed25519 and serve both the links (mTLS) and
-the signatures. There are no revocation lists: certificates are short-lived.
+A certificate names who holds it in its common name (`robot:r1`, `station:alice`), so that a router can tell
+one from another, and carries the role apart, as its organisational unit. Keys are Ed25519 and serve both the
+links (mTLS) and the seals. `bridge.link.authority` issues them and calls them back.
 """
 
 from __future__ import annotations
 
 import os
-import re
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
@@ -24,17 +24,15 @@ if TYPE_CHECKING:
     from cryptography import x509
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 
-HolderRole = Literal["station", "viewer", "robot"]
-ROLES: Final[tuple[HolderRole, ...]] = ("station", "viewer", "robot")
-AUTHORITY = "authority"
-AUTHORITY_DAYS = 3650
-DAYS = 90
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.@-]{0,63}")
+HolderRole = Literal["station", "viewer", "robot", "router"]
+ROLES: Final[tuple[HolderRole, ...]] = ("station", "viewer", "robot", "router")
+REVOKED = b"stopgo/1 revoked\n"
+"""Goes before the list that is signed."""
 
 
 @dataclass(frozen=True)
 class KeyFiles:
-    """One holder's folder: the authority's certificate, its own, and its private key."""
+    """One holder's folder: the authority's certificate, its own, its private key, and who is revoked."""
 
     folder: Path
 
@@ -50,12 +48,18 @@ class KeyFiles:
     def key(self) -> Path:
         return self.folder / "key.pem"
 
+    @property
+    def revoked(self) -> Path:
+        return self.folder / "revoked.json"
+
 
 class Holder(msgspec.Struct, frozen=True, kw_only=True):
     """Who a certificate was issued to."""
 
     role: HolderRole
     name: str
+    serial: str
+    """Of the certificate, hexadecimal."""
     not_before: datetime
     not_after: datetime
 
@@ -82,13 +86,63 @@ class Untrusted(Exception):
     """A signature that does not hold; the message says why."""
 
 
+class Revoked(msgspec.Struct, frozen=True, kw_only=True):
+    """Certificates that count no more."""
+
+    number: int
+    """Grows with every list; an older one does not replace a newer."""
+    serials: tuple[str, ...]
+
+
+class SignedList(msgspec.Struct, frozen=True, kw_only=True):
+    """How `Revoked` is written to a file: signed by the authority, over the list as it stands there."""
+
+    revoked: msgspec.Raw
+    signature: bytes
+
+
+def read_revoked(path: Path, authority: x509.Certificate) -> Revoked:
+    """The list of revoked certificates.
+
+    Raises
+    ------
+    InputError
+        If it is missing, or not signed by the authority.
+    """
+    from cryptography.exceptions import InvalidSignature
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+    public = authority.public_key()
+    assert isinstance(public, Ed25519PublicKey)
+    try:
+        signed = msgspec.json.decode(path.read_bytes(), type=SignedList)
+        public.verify(signed.signature, REVOKED + bytes(signed.revoked))
+        return msgspec.json.decode(signed.revoked, type=Revoked)
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}); copy it from the site's folder of keys, or have the"
+            " keys issued anew if they are older than it (stopgo keys rotate)"
+        ) from None
+    except (msgspec.DecodeError, UnicodeDecodeError):
+        raise InputError(f"{path}: not a list of revoked keys; copy it from the site's folder") from None
+    except InvalidSignature:
+        raise InputError(f"{path}: not signed by the authority of these keys; copy it again") from None
+
+
 class Certificates:
-    """Tells who holds a certificate, if the authority of one's own keys has issued it and it is valid now."""
+    """Tells who holds a certificate, if the authority of one's own keys has issued it and it counts now.
+
+    The list of those revoked is looked at each time, and read again when its file has changed. One that
+    cannot be read, or is older, does not replace what is known.
+    """
 
     def __init__(self, held: HeldKeys, now: Callable[[], datetime]) -> None:
         self._held = held
         self._now = now
-        self._read = lru_cache(maxsize=64)(self._issued)
+        self._issued_to = lru_cache(maxsize=64)(self._issued)
+        self._lock = threading.Lock()
+        self._revoked = Revoked(number=0, serials=())
+        self._stamp: tuple[int, ...] = ()
 
     def holder(self, der: bytes) -> tuple[Holder, Ed25519PublicKey]:
         """Who holds a certificate, and the public key that proves it.
@@ -96,12 +150,31 @@ class Certificates:
         Raises
         ------
         Untrusted
-            If it is not the authority's, is none of ours, or is not valid now.
+            If it is not the authority's, is none of ours, is revoked, or is not valid now.
         """
-        holder, public = self._read(der)
+        holder, public = self._issued_to(der)
         if not holder.not_before <= self._now() <= holder.not_after:
             raise Untrusted(f"the certificate of {holder.name} ends {holder.not_after:%Y-%m-%d %H:%M} UTC")
+        if holder.serial in self._revoked_now().serials:
+            raise Untrusted(f"the certificate of {holder.name} is revoked")
         return holder, public
+
+    def _revoked_now(self) -> Revoked:
+        path = self._held.files.revoked
+        try:
+            stat = os.stat(path)
+        except OSError:
+            return self._revoked
+        stamp = (stat.st_mtime_ns, stat.st_size, stat.st_ino)
+        with self._lock:
+            if stamp != self._stamp:
+                self._stamp = stamp
+                try:
+                    read = read_revoked(path, self._held.authority)
+                except InputError:
+                    return self._revoked
+                self._revoked = max(self._revoked, read, key=lambda revoked: revoked.number)
+            return self._revoked
 
     def _issued(self, der: bytes) -> tuple[Holder, Ed25519PublicKey]:
         from cryptography import x509
@@ -124,163 +197,86 @@ class Certificates:
         return holder, public
 
 
-def init_site(folder: Path, *, now: datetime) -> None:
-    """Make a site's authority in `folder`.
-
-    Raises
-    ------
-    InputError
-        If there is one already: everything issued by it would be worth nothing.
-    """
-    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
-
-    files = KeyFiles(folder / AUTHORITY)
-    if files.key.exists():
-        raise InputError(f"{folder}: has an authority already; issue from it, or choose another folder")
-    key = Ed25519PrivateKey.generate()
-    name = _name(AUTHORITY, folder.resolve().name)
-    certificate = _certificate(name, name, key.public_key(), key, now=now, days=AUTHORITY_DAYS, role=None)
-    _write(files, certificate, certificate, key)
-
-
-def issue(folder: Path, role: HolderRole, name: str, *, now: datetime, days: int = DAYS) -> KeyFiles:
-    """Issue keys for `name` from the authority in `folder`, into a folder of that name.
-
-    Raises
-    ------
-    InputError
-        If there is no authority, or the name cannot be used or is taken.
-    """
-    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
-
-    if not _NAME.fullmatch(name) or name == AUTHORITY:
-        raise InputError(f"name {name!r}: use letters, digits, '_', '.', '@' and '-', and not {AUTHORITY!r}")
-    files = KeyFiles(folder / name)
-    if files.key.exists():
-        raise InputError(f"{files.folder}: exists; move it away to issue new keys for {name}")
-    authority_files = KeyFiles(folder / AUTHORITY)
-    authority, authority_key = _read_certificate(authority_files.certificate), _read_key(authority_files.key)
-    key = Ed25519PrivateKey.generate()
-    certificate = _certificate(
-        _name(role, name), authority.subject, key.public_key(), authority_key, now=now, days=days, role=role
-    )
-    _write(files, authority, certificate, key)
-    return files
-
-
 def read_keys(folder: Path, *, now: datetime) -> HeldKeys:
     """The keys in one holder's folder.
 
     Raises
     ------
     InputError
-        If one is missing, unreadable by its owner alone, expired, or does not belong to the others.
+        If one is missing, readable by others than its owner, expired, revoked, of an older kind, or does not
+        belong to the others.
     """
     from cryptography.exceptions import InvalidSignature
 
     files = KeyFiles(folder)
-    authority, certificate = _read_certificate(files.authority), _read_certificate(files.certificate)
-    key = _read_key(files.key)
-    if os.name == "posix" and files.key.stat().st_mode & 0o077:
-        raise InputError(f"{files.key}: others may read it; chmod 600 {files.key}")
+    authority, certificate = read_certificate(files.authority), read_certificate(files.certificate)
+    key = read_key(files.key)
     try:
         certificate.verify_directly_issued_by(authority)
     except (InvalidSignature, ValueError, TypeError):
         raise InputError(f"{files.certificate}: not issued by {files.authority}; issue it again") from None
     if certificate.public_key() != key.public_key():
         raise InputError(f"{files.key}: is not the key of {files.certificate}; issue it again")
-    holder = holder_of(certificate)
+    try:
+        holder = holder_of(certificate)
+    except InputError as error:
+        raise InputError(f"{files.certificate}: {error}") from None
     if not holder.not_before <= now <= holder.not_after:
         raise InputError(
             f"{files.certificate}: valid from {holder.not_before:%Y-%m-%d %H:%M} to"
             f" {holder.not_after:%Y-%m-%d %H:%M} UTC; issue new keys for {holder.name}"
         )
+    if holder.serial in read_revoked(files.revoked, authority).serials:
+        raise InputError(f"{files.certificate}: is revoked; issue new keys for {holder.name}")
     return HeldKeys(files, holder, authority, certificate, key)
 
 
 def holder_of(certificate: x509.Certificate) -> Holder:
     """Role, name and validity that a certificate tells; raises `InputError` if it is none of ours."""
-    from cryptography.x509.oid import NameOID
-
-    roles = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-    names = certificate.subject.get_attributes_for_oid(NameOID.ORGANIZATION_NAME)
-    if not roles or not names or roles[0].value not in (*ROLES, AUTHORITY):
+    common, unit = common_name(certificate), _unit(certificate)
+    if common in ROLES:
+        raise InputError(
+            "names its role and not its holder, as those of older versions did; have it issued anew:"
+            f" stopgo keys rotate {_organisation(certificate) or 'NAME'} --in SITE-KEYS"
+        )
+    role = next((role for role in ROLES if role == unit), None)
+    if role is None or not common.startswith(f"{role}:"):
         raise InputError("the certificate names no role; issue it with stopgo keys")
     return Holder(
-        role=roles[0].value,  # type: ignore[arg-type]
-        name=str(names[0].value),
+        role=role,
+        name=common.removeprefix(f"{role}:"),
+        serial=f"{certificate.serial_number:x}",
         not_before=certificate.not_valid_before_utc,
         not_after=certificate.not_valid_after_utc,
     )
 
 
-def holders(folder: Path) -> tuple[Holder, ...]:
-    """Everybody that the site's authority has issued keys to, by name."""
-    found = sorted(path.parent for path in folder.glob("*/cert.pem") if path.parent.name != AUTHORITY)
-    if not KeyFiles(folder / AUTHORITY).certificate.exists():
-        raise InputError(f"{folder}: no authority there; make one with stopgo keys init {folder}")
-    return tuple(holder_of(_read_certificate(KeyFiles(path).certificate)) for path in found)
-
-
-def _name(role: str, name: str) -> x509.Name:
-    from cryptography import x509
+def common_name(certificate: x509.Certificate) -> str:
+    """Empty if it has none."""
     from cryptography.x509.oid import NameOID
 
-    return x509.Name(
-        [x509.NameAttribute(NameOID.COMMON_NAME, role), x509.NameAttribute(NameOID.ORGANIZATION_NAME, name)]
-    )
+    return _attribute(certificate, NameOID.COMMON_NAME)
 
 
-def _certificate(
-    subject: x509.Name,
-    issuer: x509.Name,
-    public: object,
-    signer: Ed25519PrivateKey,
-    *,
-    now: datetime,
-    days: int,
-    role: HolderRole | None,
-) -> x509.Certificate:
-    """A certificate; without a role it is an authority's own."""
-    from cryptography import x509
-    from cryptography.x509.oid import ExtendedKeyUsageOID
+def _unit(certificate: x509.Certificate) -> str:
+    from cryptography.x509.oid import NameOID
 
-    builder = (
-        x509.CertificateBuilder()
-        .subject_name(subject)
-        .issuer_name(issuer)
-        .public_key(public)  # type: ignore[arg-type]
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(now - timedelta(minutes=5))
-        .not_valid_after(now + timedelta(days=days))
-        .add_extension(x509.BasicConstraints(ca=role is None, path_length=0 if role is None else None), True)
-    )
-    if role is not None:
-        # Only a robot may answer as a server, so that no viewer can stand in for one.
-        server = [ExtendedKeyUsageOID.SERVER_AUTH] if role == "robot" else []
-        usage = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.CLIENT_AUTH, *server])
-        names = x509.SubjectAlternativeName([x509.DNSName("robot.stopgo")])
-        builder = builder.add_extension(usage, False).add_extension(names, False)
-    return builder.sign(signer, None)
+    return _attribute(certificate, NameOID.ORGANIZATIONAL_UNIT_NAME)
 
 
-def _write(
-    files: KeyFiles, authority: x509.Certificate, certificate: x509.Certificate, key: Ed25519PrivateKey
-) -> None:
-    from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+def _organisation(certificate: x509.Certificate) -> str:
+    from cryptography.x509.oid import NameOID
 
-    try:
-        files.folder.mkdir(parents=True, exist_ok=True)
-        files.authority.write_bytes(authority.public_bytes(Encoding.PEM))
-        files.certificate.write_bytes(certificate.public_bytes(Encoding.PEM))
-        private = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-        with open(os.open(files.key, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-            file.write(private)
-    except OSError as error:
-        raise InputError(f"{files.folder}: cannot be written ({error.strerror})") from None
+    return _attribute(certificate, NameOID.ORGANIZATION_NAME)
 
 
-def _read_certificate(path: Path) -> x509.Certificate:
+def _attribute(certificate: x509.Certificate, oid: x509.ObjectIdentifier) -> str:
+    found = certificate.subject.get_attributes_for_oid(oid)
+    return str(found[0].value) if found else ""
+
+
+def read_certificate(path: Path) -> x509.Certificate:
+    """The certificate in a file; raises `InputError` naming it."""
     from cryptography import x509
 
     try:
@@ -291,11 +287,13 @@ def _read_certificate(path: Path) -> x509.Certificate:
         raise InputError(f"{path}: not a certificate") from None
 
 
-def _read_key(path: Path) -> Ed25519PrivateKey:
+def read_key(path: Path) -> Ed25519PrivateKey:
+    """The private key in a file that its owner alone may read or write; raises `InputError` naming it."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
     try:
+        mode = path.stat().st_mode
         key = load_pem_private_key(path.read_bytes(), password=None)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); make keys with stopgo keys") from None
@@ -303,6 +301,8 @@ def _read_key(path: Path) -> Ed25519PrivateKey:
         raise InputError(f"{path}: not a private key") from None
     if not isinstance(key, Ed25519PrivateKey):
         raise InputError(f"{path}: not an Ed25519 key; issue it with stopgo keys")
+    if os.name == "posix" and mode & 0o077:
+        raise InputError(f"{path}: others may read or write it; chmod 600 {path}")
     return key
 
 

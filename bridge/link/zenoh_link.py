@@ -122,8 +122,7 @@ def _guarding(guard: Guard) -> dict[str, Any]:
     return settings | {
         f"{tls}/root_ca_certificate": str(files.authority),
         f"{tls}/enable_mtls": True,
-        # Robots have addresses, not names; what they are is in their certificates' roles.
-        f"{tls}/verify_name_on_connect": False,
+        f"{tls}/verify_name_on_connect": True,
         f"{tls}/close_link_on_expiration": True,
         f"{tls}/listen_certificate": str(files.certificate),
         f"{tls}/listen_private_key": str(files.key),

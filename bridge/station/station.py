@@ -12,7 +12,7 @@ import socket
 import threading
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -39,6 +39,7 @@ from bridge.link.protocol import (
     Reply,
     encode,
 )
+from bridge.link.tls_probe import why_no_link
 from bridge.station import follow
 from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
@@ -102,7 +103,7 @@ def connect(
             patience_s=patience_s,
             held=held,
         )
-        station.reach(endpoint)
+        station.reach(endpoint, why=lambda: why_no_link(endpoint, held))
         yield station
 
 
@@ -130,7 +131,7 @@ def fleet(
         link.watch_presence(
             station.keys.alive, lambda key, alive: seen.add(station.keys.robot_of(key)) if alive else None
         )
-        station.reach(endpoint)
+        station.reach(endpoint, why=lambda: why_no_link(endpoint, held))
         time.sleep(GATHER_S)
         names = sorted(seen)
         with ThreadPoolExecutor(max_workers=MOST_ASKED) as pool:
@@ -172,15 +173,19 @@ class Station:
         self.patience_s = max(patience_s, timeout_s)
         """For each piece of a mission."""
 
-    def reach(self, endpoint: str) -> None:
-        """Wait until the robot shows itself: a question sent before comes back empty at once."""
+    def reach(self, endpoint: str, *, why: Callable[[], str] = lambda: "") -> None:
+        """Wait until the robot shows itself: a question sent before comes back empty at once.
+
+        `why` tells what is wrong with the line, if that can be found out.
+        """
         seen = threading.Event()
         self.link.watch_presence(self.keys.alive, lambda key, alive: seen.set() if alive else None)
         if not seen.wait(self.timeout_s):
             who = "no robot showed" if self.keys.every else f"robot {self.keys.robot} did not show"
+            reason = why() or "is it running, under this name and site?"
             raise RobotUnreachable(
                 f"{endpoint}: {who} itself within {self.timeout_s:g} s"
-                f" (key {self.keys.alive}); nothing was sent. Is it running, under this name and site?"
+                f" (key {self.keys.alive}); nothing was sent: {reason}"
             )
 
     def info(self, *, within_s: float | None = None) -> Info:

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from bridge.link.keys import HolderRole, init_site, issue, now_utc, read_keys
+from bridge.link.authority import init_site, issue
+from bridge.link.keys import HolderRole, now_utc, read_keys
 from bridge.link.memory_link import Packet, Switchboard
 from bridge.link.seals import KeySeals
 from bridge.station.station import Station

@@ -1,7 +1,11 @@
-"""A zenoh router as a process: `python -m tests.bridge.router tcp/127.0.0.1:7447 [KEYS]`, until SIGTERM."""
+"""A zenoh router as a process, until SIGTERM.
+
+`python -m tests.bridge.router tcp/127.0.0.1:7447 [KEYS [RULES]]`; rules of `stopgo keys router-rules`.
+"""
 
 from __future__ import annotations
 
+import json
 import signal
 import sys
 import threading
@@ -18,6 +22,7 @@ def leave(signum: int, frame: object) -> None:
 if __name__ == "__main__":
     signal.signal(signal.SIGTERM, leave)
     keys = read_keys(Path(sys.argv[2]), now=now_utc()) if len(sys.argv) > 2 else None
-    with listening(sys.argv[1], Guard(keys)):
+    rules = json.loads(Path(sys.argv[3]).read_text())["access_control"] if len(sys.argv) > 3 else None
+    with listening(sys.argv[1], Guard(keys, access=rules)):
         print("ready", flush=True)
         threading.Event().wait()

@@ -22,7 +22,8 @@ from typing import TypeVar
 import pytest
 
 from bridge.commands.spawn import end_robot, free_port, start_robot
-from bridge.link.keys import init_site, issue, now_utc
+from bridge.link.authority import init_site, issue
+from bridge.link.keys import now_utc
 from bridge.link.protocol import encode
 from bridge.robot.journal import open_journal
 from bridge.station.station import Station, connect

@@ -30,7 +30,10 @@ READERS = {
     "push --keys": ("push", "mission.json", "--robot", "r1", "--keys", "FILE"),
     "status --keys": ("status", "--robot", "r1", "--keys", "FILE"),
     "review": ("review", "FILE"),
-    "keys show": ("keys", "show", "FILE"),
+    "keys list": ("keys", "list", "FILE"),
+    "keys rotate": ("keys", "rotate", "r1", "--in", "FILE"),
+    "keys revoke": ("keys", "revoke", "r1", "--in", "FILE"),
+    "keys router-rules": ("keys", "router-rules", "--in", "FILE"),
     "keys issue": ("keys", "issue", "robot", "r1", "--in", "FILE"),
 }
 """Commands that read FILE."""
@@ -100,7 +103,10 @@ def test_a_command_that_is_told_nothing_says_what_it_needs(
     assert len(line) < 120
 
 
-@pytest.mark.parametrize(("command", "verbs"), [("keys", "init, issue, show"), ("tunnel", "robot, station")])
+@pytest.mark.parametrize(
+    ("command", "verbs"),
+    [("keys", "init, issue, list, rotate, revoke, router-rules"), ("tunnel", "robot, station")],
+)
 @pytest.mark.parametrize("verb", [(), ("nope",)])
 def test_a_command_without_its_verb_names_them(
     command: str, verbs: str, verb: tuple[str, ...], capsys: pytest.CaptureFixture[str]

@@ -14,7 +14,8 @@ import pytest
 
 from bridge.commands.spawn import end_robot, free_port, start_robot
 from bridge.link import keys as site_keys
-from bridge.link.keys import Certificates, Untrusted, holders, init_site, issue, now_utc, read_keys
+from bridge.link.authority import init_site, issue, listed
+from bridge.link.keys import Certificates, Untrusted, now_utc, read_keys
 from bridge.link.link import Link, Request
 from bridge.link.protocol import KeyExpressions, Reply, encode
 from bridge.link.zenoh_link import Guard, check_endpoint, connecting
@@ -83,7 +84,7 @@ def test_keys_that_do_not_fit_are_named(site: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"valid from .* issue new keys for alice"):
         read_keys(site / "site" / "alice", now=NOW + timedelta(days=91))
     files = site_keys.KeyFiles(tmp_path)
-    for name in ("ca.pem", "cert.pem", "key.pem"):
+    for name in ("ca.pem", "cert.pem", "key.pem", "revoked.json"):
         (tmp_path / name).write_bytes((site / "site" / "alice" / name).read_bytes())
     files.key.chmod(0o644)
     with pytest.raises(InputError, match="chmod 600"):
@@ -106,7 +107,7 @@ def test_nothing_is_overwritten(site: Path) -> None:
         init_site(site / "site", now=NOW)
     with pytest.raises(InputError, match="exists"):
         issue(site / "site", "viewer", "alice", now=NOW)
-    assert [holder.name for holder in holders(site / "site")] == ["alice", "bob", "r1", "vera"]
+    assert [issued.holder.name for issued in listed(site / "site", now=NOW)] == ["alice", "bob", "r1", "vera"]
 
 
 def test_an_endpoint_must_be_guarded_as_it_should(site: Path) -> None:
@@ -239,27 +240,10 @@ def test_a_viewer_that_forges_is_not_heard_and_a_forged_name_is_not_believed(
     assert "signed by bob, not by alice" in msgspec.json.decode(forged, type=Reply).messages[0]
 
 
-def test_the_commands_make_keys(tmp_path: Path) -> None:
-    folder = str(tmp_path / "site")
-    assert stopgo("keys", "init", folder).returncode == 0
-    assert stopgo("keys", "issue", "station", "alice", "--in", folder).returncode == 0
-    assert "alice" in stopgo("keys", "show", "--in", folder).stdout
-    assert "alice" in stopgo("keys", "show", folder).stdout
-    assert stopgo("keys", "show").returncode == stopgo("keys", "show", folder, "--in", folder).returncode == 2
-    assert stopgo("keys", "issue", "king", "bob", "--in", folder).returncode == 2
-    assert stopgo("keys", "show", "--in", str(tmp_path / "nowhere")).returncode == 2
-    wrong = stopgo(
-        "robot", "--name", "r1", "--listen", f"tls/127.0.0.1:{free_port()}",
-        "--state", str(tmp_path / "state"), "--keys", str(tmp_path / "site" / "alice"),
-    )  # fmt: skip
-    assert wrong.returncode == 2
-    assert "not of robot r1" in wrong.stderr
-
-
 def test_behind_a_router_signatures_tell_who_orders(site: Path, tmp_path: Path) -> None:
     """The router's link is let in whole; a viewer's order comes through it, and is not trusted."""
     endpoint = f"tls/127.0.0.1:{free_port()}"
-    issue(site / "site", "robot", "router", now=NOW)
+    issue(site / "site", "router", "router", now=NOW)
     extra = ("--connect", endpoint, "--keys", str(site / "site" / "r1"))
     with router(endpoint, str(site / "site" / "router")):
         robot = start_robot("r1", tmp_path, listen=None, speed_up=100, extra=extra)

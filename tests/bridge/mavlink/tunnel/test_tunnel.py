@@ -13,7 +13,8 @@ import pytest
 
 from bridge.commands.spawn import end_robot, free_port, robot_process, start
 from bridge.commands.tunnel_commands import Refusals, RefusalsHeard
-from bridge.link.keys import init_site, issue, now_utc, read_keys
+from bridge.link.authority import init_site, issue
+from bridge.link.keys import now_utc, read_keys
 from bridge.link.memory_link import MemoryLink, Switchboard
 from bridge.link.protocol import KeyExpressions
 from bridge.link.zenoh_link import Guard, connecting

@@ -1,0 +1,53 @@
+"""Why no link comes about, in words: asked of the endpoint itself, once nobody was found behind it."""
+
+from __future__ import annotations
+
+import socket
+import ssl
+
+from bridge.link.keys import HeldKeys
+
+PROBE_S = 2.0
+ALERT_S = 0.5
+"""How long a server may take to refuse the certificate that it was shown."""
+
+
+def why_no_link(endpoint: str, keys: HeldKeys | None) -> str:
+    """What is wrong with the line to `endpoint`, as `tls/10.1.2.3:7447`; empty if nothing is to be seen."""
+    protocol, _, rest = endpoint.partition("/")
+    host, _, port = rest.partition("?")[0].partition("#")[0].rpartition(":")
+    if protocol not in ("tcp", "tls"):
+        return ""
+    try:
+        with socket.create_connection((host.strip("[]"), int(port)), timeout=PROBE_S) as line:
+            return "" if keys is None else _handshake(line, host.strip("[]"), keys)
+    except ConnectionRefusedError:
+        return "nothing listens there"
+    except OSError as error:
+        return f"it cannot be reached ({error.strerror or error})"
+
+
+def _handshake(line: socket.socket, host: str, keys: HeldKeys) -> str:
+    files = keys.files
+    context = ssl.create_default_context(cafile=str(files.authority))
+    context.load_cert_chain(str(files.certificate), str(files.key))
+    try:
+        with context.wrap_socket(line, server_hostname=host) as secured:
+            secured.settimeout(ALERT_S)
+            secured.recv(1)
+    except TimeoutError:
+        return ""
+    except ssl.SSLCertVerificationError as error:
+        return _refused_here(error, host)
+    except ssl.SSLError as error:
+        return f"the other end does not take these keys ({error.reason or error})"
+    return ""
+
+
+def _refused_here(error: ssl.SSLCertVerificationError, host: str) -> str:
+    if "mismatch" in error.verify_message or "not valid for" in error.verify_message:
+        return (
+            f"its certificate is not for {host}: have it issued anew with --address {host}"
+            " (stopgo keys rotate)"
+        )
+    return f"its certificate is not of the authority of these keys ({error.verify_message})"
