@@ -10,7 +10,7 @@ import shapely
 from mission.floor import Finding
 from planner.floors.ifc.doors import Door
 from planner.floors.ifc.levels import Level, walked_on
-from planner.floors.ifc.model import Surface, Model, Product
+from planner.floors.ifc.model import Model, Product, Surface
 from planner.floors.ifc.section import NOTHING, cut, tidy, union_of, upward
 from planner.floors.ifc.solids import OFF_LEVEL, Solid
 from planner.floors.rings import Region

@@ -9,7 +9,7 @@ import shapely
 
 from mission.geometry import FloatArray
 from planner.floors.ifc.levels import Level
-from planner.floors.ifc.model import Surface, Model, Product
+from planner.floors.ifc.model import Model, Product, Surface
 from planner.floors.rings import Region
 
 SILL = 0.3

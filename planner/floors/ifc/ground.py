@@ -10,7 +10,7 @@ import shapely
 from mission.floor import Finding
 from planner.floors.ifc.doors import Door
 from planner.floors.ifc.levels import Level, walked_on
-from planner.floors.ifc.model import Mesh, Model, Product
+from planner.floors.ifc.model import Model, Product, Surface
 from planner.floors.ifc.section import NOTHING, cut, tidy, union_of, upward
 from planner.floors.ifc.solids import OFF_LEVEL, Solid
 from planner.floors.rings import Region
@@ -76,7 +76,7 @@ def _apart(spaces: Sequence[Space]) -> list[Space]:
     return sorted(kept, key=lambda item: item.global_id or "")
 
 
-def _cut_of(product: Product, mesh: Mesh, level: Level, scan_height: float) -> Region:
+def _cut_of(product: Product, mesh: Surface, level: Level, scan_height: float) -> Region:
     plane = level.z + scan_height + OFF_LEVEL
     if mesh.z[1] <= plane:  # a low space, as under a stair
         plane = (mesh.z[0] + mesh.z[1]) / 2

@@ -11,7 +11,7 @@ import numpy as np
 from mission.errors import InputError
 from mission.geometry import FloatArray
 from planner.floors.drawing import legible
-from planner.floors.ifc.model import Surface, Model, Storey
+from planner.floors.ifc.model import Model, Storey, Surface
 from planner.floors.ifc.section import upward
 
 NEAR = 0.6

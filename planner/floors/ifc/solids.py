@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import shapely
 
 from planner.floors.ifc.levels import Level
-from planner.floors.ifc.model import Surface, Model, Product
+from planner.floors.ifc.model import Model, Product, Surface
 from planner.floors.ifc.section import NOTHING, cut, footprint, tidy
 from planner.floors.rings import Region
 
