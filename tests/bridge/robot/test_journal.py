@@ -23,6 +23,7 @@ from bridge.robot.sealed_rows import FORMAT, SEALED
 from bridge.station.watch import event_line
 from mission.errors import AnswerIsNo, InputError
 from mission.events import Started, UnknownKind, event_of
+from mission.run.orders import Verb
 from tests.bridge.world import Field, corridor
 
 
@@ -108,7 +109,8 @@ def test_a_journal_of_the_first_format_is_brought_up_to_date(tmp_path: Path) -> 
         with open_journal(tmp_path, "r1") as journal:
             field = Field(journal=journal)
             assert field.controller.run.state == state
-            assert field.order("start" if state == "READY" else "resume").outcome == "ok"
+            verb: Verb = "start" if state == "READY" else "resume"
+            assert field.order(verb, cmd_id=verb).outcome == "ok"
 
 
 def test_a_journal_of_a_newer_stopgo_is_refused(tmp_path: Path) -> None:
