@@ -196,6 +196,10 @@ _EVENTS = msgspec.json.Decoder(AnyEvent)
 _ENVELOPE = msgspec.json.Decoder(dict[str, Any])
 
 
+STOPS_LISTED = 50
+"""In a state; the journal has them all."""
+
+
 class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     """A full snapshot, sent on every change and at least every second."""
 
@@ -211,6 +215,7 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     stop: str | None
     stop_state: str | None
     done: tuple[str, ...]
+    """The newest of them, at most STOPS_LISTED, so that a state is small whatever the mission."""
     skipped: tuple[str, ...]
     battery: float
     """0 to 1."""
@@ -218,6 +223,8 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     """Number of the newest event in the journal, 0 if none."""
     next_revision: int | None = None
     """The revision that will be followed from the next stop on."""
+    done_count: int = 0
+    skipped_count: int = 0
 
 
 class PoseReport(msgspec.Struct, frozen=True, kw_only=True):

@@ -182,10 +182,10 @@ def state_line(report: StateReport) -> str:
         f"mission {report.mission_id[:12]} revision {report.revision}" if report.mission_id else "no mission"
     )
     stop = f", {report.stop_state} at {report.stop}" if report.stop else ""
-    skipped = f", {len(report.skipped)} skipped" if report.skipped else ""
+    skipped = f", {report.skipped_count} skipped" if report.skipped_count else ""
     if report.next_revision is not None:
         mission += f" (revision {report.next_revision} from the next stop on)"
     return (
-        f"{report.robot}: {report.state}{stop}; {mission}; {len(report.done)} done{skipped};"
+        f"{report.robot}: {report.state}{stop}; {mission}; {report.done_count} done{skipped};"
         f" battery {report.battery:.0%}"
     )

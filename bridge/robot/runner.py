@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from mission.document import Mission
-from mission.events import Pose, StateReport
+from mission.events import STOPS_LISTED, Pose, StateReport
 from mission.run.orders import Answer, Order
 from mission.run.states import Run, stop_of
 
@@ -61,6 +61,7 @@ def state_report(runner: Runner, *, robot: str, seq: int, ns: int, newest: int) 
     return StateReport(
         robot=robot, boot_id=runner.boot_id, seq=seq, robot_ns=ns, state=run.state, run_id=run.run_id,
         mission_id=run.mission_id, revision=run.revision, stop=stop.id if stop else None,
-        stop_state=run.stop_state if stop else None, done=run.done, skipped=run.skipped,
+        stop_state=run.stop_state if stop else None, done=run.done[-STOPS_LISTED:],
+        skipped=run.skipped[-STOPS_LISTED:], done_count=len(run.done), skipped_count=len(run.skipped),
         battery=runner.battery(), last_event=newest, next_revision=run.next_revision,
     )  # fmt: skip

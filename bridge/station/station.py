@@ -43,7 +43,7 @@ from bridge.link.tls_probe import why_no_link
 from bridge.station import follow
 from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
-from mission.events import AnyEvent, StateReport
+from mission.events import AnyEvent, Scanned, Skipped, StateReport, Unconfirmed
 from mission.files.mission_json import parse
 from mission.run.orders import FREE_VERBS, LONGEST_VALID_S, Answer, Order, Verb
 
@@ -204,7 +204,16 @@ class Station:
         return info
 
     def status(self) -> StateReport:
-        return self.info().state
+        """The robot's state, with every stop that is done or skipped."""
+        state = self.info().state
+        if (state.done_count, state.skipped_count) == (len(state.done), len(state.skipped)):
+            return state
+        events = self.log(run_id=state.run_id)
+        done = tuple(event.stop for event in events if isinstance(event, Scanned | Unconfirmed))
+        skipped = tuple(event.stop for event in events if isinstance(event, Skipped))
+        return msgspec.structs.replace(
+            state, done=done, skipped=skipped, done_count=len(done), skipped_count=len(skipped)
+        )
 
     def push(
         self,
@@ -302,6 +311,8 @@ class Station:
             If the robot did not even tell its state: the order was not sent.
         """
         self._may_order(verb)
+        if verb in FREE_VERBS:
+            return self.give(self.stop_order(verb, **details))
         deadline = time.monotonic() + self.timeout_s
         try:
             order = self.order(verb, **details)
@@ -334,20 +345,29 @@ class Station:
             raise AnswerIsNo(f"{self.keys.robot} refused {order.verb}: {why}", reason=answer.reason)
         return answer
 
+    def stop_order(self, verb: Verb, **details: Any) -> Order:
+        """A pause or an abort: a few hundred bytes that need nothing of what the robot tells."""
+        given = {key: value for key, value in details.items() if value is not None}
+        plain: dict[str, Any] = {
+            "commander": self.commander,
+            "issued_ns": 0,
+            "valid_for_s": LONGEST_VALID_S,
+        }
+        return Order(cmd_id=uuid.uuid4().hex, verb=verb, **(plain | given))
+
     def order(self, verb: Verb, **details: Any) -> Order:
         """An order for the robot as it is just now: late, it meets another state and is refused."""
         info = self.info()
-        state, cautious = info.state, verb not in FREE_VERBS
+        state = info.state
         meant: dict[str, Any] = {
             "commander": self.commander,
             "valid_for_s": min(self.timeout_s, LONGEST_VALID_S),
             "run_id": None if verb == "start" else state.run_id,
             "mission_id": state.mission_id,
-            # A pause is meant for the run, also if it has just gone on by a new revision.
-            "revision": state.revision if cautious else None,
-            "expect_state": (state.state,) if cautious else None,
-            "boot_id": info.boot_id if cautious else None,
-            "fence": info.lease.fence if info.lease and cautious else None,
+            "revision": state.revision,
+            "expect_state": (state.state,),
+            "boot_id": info.boot_id,
+            "fence": info.lease.fence if info.lease else None,
             "stop": state.stop if verb in ("skip", "retry") else None,
         }
         given = {key: value for key, value in details.items() if value is not None}

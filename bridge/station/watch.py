@@ -171,7 +171,7 @@ def table_lines(
     rows = [
         ("robot", f"{state.robot}  run {state.run_id or 'none yet'}"),
         ("state", f"{state.state}  {stop}"),
-        ("stops", f"{len(state.done)} done, {len(state.skipped)} skipped{of}"),
+        ("stops", f"{state.done_count} done, {state.skipped_count} skipped{of}"),
         ("place", f"{pose.pose.x:.2f}, {pose.pose.y:.2f} m at {pose.speed:.2f} m/s" if pose else "-"),
         ("battery", f"{state.battery:.0%}"),
         ("time", f"{clock(elapsed)} run, {'-' if left is None else clock(left)} left as planned"),
@@ -187,7 +187,7 @@ def remaining_s(
     """Seconds left if all goes as planned from the stop that is worked on."""
     plan = schedule(mission)
     ids = [stop.id for stop in mission.stops]
-    behind = len(state.done) + len(state.skipped) if state.stop is None else ids.index(state.stop)
+    behind = state.done_count + state.skipped_count if state.stop is None else ids.index(state.stop)
     if behind == 0:
         begun = 0.0
     else:

@@ -89,6 +89,9 @@ def handed_over(before: Lease | None, after: Lease | None) -> tuple[Telling, ...
 
 
 def _too_late(order: Order, situation: Situation) -> Refused | None:
+    """A stop is never too late: it counts whenever it comes, and needs nothing that the robot has told."""
+    if order.verb in FREE_VERBS:
+        return None
     if not 0 < order.valid_for_s <= LONGEST_VALID_S:
         return Refused(
             "expired", f"valid for {order.valid_for_s:g} s; at most {LONGEST_VALID_S:g} s are taken"

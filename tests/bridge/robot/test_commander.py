@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import pytest
 
 from bridge.console import refusals_in
+from bridge.link.link import Link
+from bridge.link.protocol import encode
 from mission.errors import AnswerIsNo
-from mission.events import TakenOver
+from mission.events import STOPS_LISTED, TakenOver
 from mission.run.lease import LEASE_S, Lease, claimed
-from mission.run.orders import Refused
+from mission.run.orders import Refused, Verb
 from tests.bridge.world import Field, corridor
 
 ALICE = Lease(commander="alice", fence=3, until_ns=10_000_000_000)
@@ -138,3 +141,52 @@ def test_a_refusal_is_printed_as_json_where_json_is_wanted(capsys: pytest.Captur
         printed = capsys.readouterr().out
         told = {"outcome": "refused", "reason": "wrong_state", "message": str(no.value)}
         assert (json.loads(printed) if as_json else printed) == (told if as_json else "")
+
+
+class Mute:
+    """A link that passes orders on, and no question."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self.asked: list[str] = []
+
+    def ask(self, key: str, payload: bytes = b"", **options: Any) -> bytes | None:
+        self.asked.append(key)
+        return self._link.ask(key, payload, **options) if "/cmd/" in key else None
+
+
+@pytest.mark.parametrize(("verb", "state"), [("pause", "PAUSED"), ("abort", "ABORTED")])
+def test_a_stop_needs_nothing_that_the_robot_tells(verb: Verb, state: str) -> None:
+    field = Field()
+    station = field.station()
+    station.push(corridor())
+    field.order("start")
+    station.link = mute = Mute(station.link)  # type: ignore[assignment]
+    assert station.command(verb).state == state
+    assert len(mute.asked) == 1
+
+
+def test_a_stop_is_small_whatever_the_mission() -> None:
+    order = Field().station().stop_order("pause")
+    assert len(encode(order)) < 400
+
+
+def test_a_stop_that_comes_very_late_still_stops() -> None:
+    field = Field()
+    field.station().push(corridor())
+    late = field.station().stop_order("pause")
+    field.order("start")
+    field.clock.jump(3600.0)
+    assert field.controller.obey(late).state == "PAUSED"
+
+
+def test_a_state_is_small_whatever_the_mission_and_status_tells_every_stop() -> None:
+    field = Field()
+    station = field.station()
+    names = tuple(f"s{number}" for number in range(1, 61))
+    station.push(corridor(stops=60))
+    field.order("start")
+    for _ in names:
+        field.order("skip")
+    assert station.info().state.skipped == names[-STOPS_LISTED:]
+    assert station.status().skipped == names
