@@ -19,7 +19,7 @@ import msgspec
 
 from bridge.link.protocol import Manifest
 from bridge.robot.reserve import Reserve
-from bridge.robot.sealed_rows import Damaged, Newest, bring_up_to_date, put, sealed, verify
+from bridge.robot.sealed_rows import DamagedRow, NewestTransaction, bring_up_to_date, put, sealed, verify
 from mission.errors import InputError
 from mission.events import AnyEvent, event_of
 from mission.run.orders import Answer
@@ -59,7 +59,10 @@ class Journal:
     """An open journal; every method may be called from any thread."""
 
     def __init__(
-        self, connection: sqlite3.Connection, newest: Newest | None = None, reserve: Reserve | None = None
+        self,
+        connection: sqlite3.Connection,
+        newest: NewestTransaction | None = None,
+        reserve: Reserve | None = None,
     ) -> None:
         self._connection = connection
         self._newest = newest
@@ -82,7 +85,7 @@ class Journal:
             bring_up_to_date(self._connection)
             verify(self._connection)
             if stored > self._changes():
-                raise Damaged("its last entries are missing")
+                raise DamagedRow("its last entries are missing")
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -377,13 +380,13 @@ def _opened(directory: Path, robot: str) -> Iterator[Journal]:
 
 
 def _verified(
-    path: Path, robot: str, connection: sqlite3.Connection, newest: Newest, reserve: Reserve
+    path: Path, robot: str, connection: sqlite3.Connection, newest: NewestTransaction, reserve: Reserve
 ) -> Journal:
     try:
         journal = Journal(connection, newest, reserve)
         journal.verify()
         _claim(journal, path.parent, robot)
-    except (Damaged, UnicodeDecodeError) as error:
+    except (DamagedRow, UnicodeDecodeError) as error:
         raise InputError(
             f"{path}: {_line(error)}; nothing in it can be trusted: move the folder away to begin anew,"
             " and bring the robot to its start yourself"
@@ -397,9 +400,9 @@ def _line(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
-def _newest(directory: Path) -> Newest:
+def _newest(directory: Path) -> NewestTransaction:
     try:
-        return Newest(directory / "newest")
+        return NewestTransaction(directory / "newest")
     except OSError as error:
         raise InputError(f"--state {directory}: cannot be used ({error.strerror})") from None
 

@@ -19,7 +19,7 @@ SEALED = ("facts", "events", "answers", "missions", "nonces", "transfers", "chun
 SLOT_BYTES = 24
 
 
-class Damaged(sqlite3.DatabaseError):
+class DamagedRow(sqlite3.DatabaseError):
     """What is read is not what was written."""
 
 
@@ -39,7 +39,7 @@ def sealed(connection: sqlite3.Connection, table: str, clause: str, *values: obj
     rows = connection.execute(f"SELECT * FROM {table} {clause}", values).fetchall()
     for row in rows:
         if seal_of(table, row[:-1]) != row[-1]:
-            raise Damaged(f"a row of {table} is not what was written ({str(row[0])[:40]})")
+            raise DamagedRow(f"a row of {table} is not what was written ({str(row[0])[:40]})")
     return [row[:-1] for row in rows]
 
 
@@ -59,7 +59,7 @@ def bring_up_to_date(connection: sqlite3.Connection) -> None:
     """
     (found,) = connection.execute("PRAGMA user_version").fetchone()
     if found > FORMAT:
-        raise Damaged(
+        raise DamagedRow(
             f"a newer stopgo wrote it (format {found}; this one reads up to {FORMAT}); update stopgo"
         )
     for table in SEALED:
@@ -87,15 +87,15 @@ def verify(connection: sqlite3.Connection) -> None:
     """
     (told,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
     if told != "ok":
-        raise Damaged(" ".join(str(told).split()))
+        raise DamagedRow(" ".join(str(told).split()))
     for table in SEALED:
         sealed(connection, table, "")
     count, newest = connection.execute("SELECT COUNT(*), COALESCE(MAX(number), 0) FROM events").fetchone()
     if count != newest:
-        raise Damaged(f"of {newest} events {newest - count} are missing")
+        raise DamagedRow(f"of {newest} events {newest - count} are missing")
 
 
-class Newest:
+class NewestTransaction:
     """The number of the newest transaction, in a file of its own: two places, written in turn."""
 
     def __init__(self, path: Path) -> None:
@@ -123,7 +123,7 @@ class Newest:
         numbers = [_number_in(slot) for slot in slots if slot.strip(b"\0")]
         known = [number for number in numbers if number is not None]
         if numbers and not known:
-            raise Damaged("the number of its newest entry is not what was written")
+            raise DamagedRow("the number of its newest entry is not what was written")
         return max(known, default=0)
 
 
