@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mission.align_command import align
 from mission.errors import AnswerIsNo, InputError
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ def add_commands(app: typer.Typer) -> None:
     app.command()(check)
     app.command()(export)
     app.command(name="import")(import_command)
+    app.command()(align)
 
 
 def show(mission: MissionFile, as_json: AsJson = False) -> None:

@@ -1,0 +1,132 @@
+"""A turn and a shift from points known in both frames; what does not determine them is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.commands.robot_commands import read_map
+from mission.__main__ import main
+from mission.errors import InputError
+from mission.files.mission_json import read, write
+from mission.rigid_fit import rigid_fit
+from mission.turning import turned
+from tests.mission.worlds import square_tour
+
+CORNERS = np.array([(0.0, 0.0), (8.0, 0.0), (8.0, 6.0)])
+QUARTER = np.array([(10.0, 5.0), (10.0, 13.0), (4.0, 13.0)])
+"""The corners turned by 90° to the left, then shifted by (10, 5)."""
+
+
+def test_a_quarter_turn_is_found() -> None:
+    fit = rigid_fit(CORNERS, QUARTER)
+    assert (fit.transform.x, fit.transform.y) == pytest.approx((10, 5))
+    assert math.degrees(fit.transform.heading) == pytest.approx(90)
+    assert fit.residuals == pytest.approx([0, 0, 0], abs=1e-12)
+    assert fit.scale == pytest.approx(1)
+
+
+numbers = st.floats(-1e3, 1e3)
+
+
+@given(x=numbers, y=numbers, heading=st.floats(-3.1, 3.1), far=numbers)
+def test_any_turn_and_shift_is_found(x: float, y: float, heading: float, far: float) -> None:
+    from mission.document import Transform
+
+    wanted = Transform(x=x, y=y, heading=heading)
+    site = CORNERS + far
+    there = np.array([turned(wanted, (px, py)) for px, py in site.tolist()])
+    found = rigid_fit(site, there).transform
+    back = np.array([turned(found, (px, py)) for px, py in site.tolist()])
+    assert np.abs(back - there).max() < 1e-8
+
+
+def test_a_point_that_was_noted_wrongly_has_the_largest_residual() -> None:
+    square = np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)])
+    noted = square + np.array([(0.0, 0.0), (0.0, 0.0), (0.1, 0.0), (0.0, 0.0)])
+    fit = rigid_fit(square, noted)
+    assert int(fit.residuals.argmax()) == 2
+    assert fit.max_m < 0.1
+    assert fit.rms_m == pytest.approx(math.sqrt((fit.residuals**2).mean()))
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "said"),
+    [
+        ([(0, 0)], [(1, 1)], "one pair of points: two are needed"),
+        ([(1, 1), (1, 1)], [(2, 2), (2, 2)], "too near each other to tell a turn"),
+        ([(0, 0), (0.1, 0)], [(0, 0), (0.1, 0)], "at least 2 m apart"),
+        ([(0, 0), (8, 0)], [(0, 0), (8000, 0)], "1000.000 times as far apart"),
+        ([(0, 0), (8, 0), (8, 6)], [(0, 0), (-8, 0), (-8, 6)], "the map is mirrored"),
+    ],
+)
+def test_what_tells_no_turn_is_refused(
+    first: list[tuple[float, float]], second: list[tuple[float, float]], said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        rigid_fit(np.array(first, dtype=float), np.array(second, dtype=float))
+
+
+def options(site: np.ndarray, there: np.ndarray) -> list[str]:
+    pairs = zip(site.tolist(), there.tolist(), strict=True)
+    return [f"--pair={x},{y}={mx},{my}" for (x, y), (mx, my) in pairs]
+
+
+def test_the_command_prints_what_the_robot_takes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["align", *options(CORNERS, QUARTER)]) == 0
+    *_, last = capsys.readouterr().out.splitlines()
+    taken = read_map(last.removeprefix("--map "))
+    assert taken is not None
+    assert (taken.x, taken.y, taken.heading) == pytest.approx((10, 5, math.pi / 2))
+    (tmp_path / "pairs.csv").write_text("x,y,map_x,map_y\n0,0,10,5\n8,0,10,13\n\n8,6,4,13\n")
+    assert main(["align", str(tmp_path / "pairs.csv"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["map"] == last.removeprefix("--map ")
+    assert [pair["map_xy"] for pair in told["pairs"]] == QUARTER.tolist()
+
+
+def test_the_mission_gets_the_transform_on_demand(tmp_path: Path) -> None:
+    path = tmp_path / "mission.json"
+    write(square_tour(), path)
+    assert main(["align", *options(CORNERS, QUARTER), "--mission", str(path), "-o", str(path)]) == 0
+    placed = read(path)
+    assert placed.frame.to_map is not None
+    assert placed.frame.to_map.x == pytest.approx(10)
+    assert placed.revision == square_tour().revision + 1
+    assert placed.stops == square_tour().stops
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "no points given"),
+        (["--pair", "1,2"], "--pair 1,2: write X,Y=MAPX,MAPY"),
+        (["--pair", "1,2=3,4=5,6"], "write X,Y=MAPX,MAPY"),
+        (["--pair", "nan,2=3,4"], "must be finite numbers"),
+        (["none.csv"], "none.csv: cannot be read"),
+        (["odd.csv"], "odd.csv: line 2 is '1,2,3': write four numbers"),
+        (["--pair", "1,2=3,4", "-o", "x.json"], "give --mission FILE and -o FILE together"),
+    ],
+)
+def test_what_is_no_pair_is_one_line(
+    arguments: list[str],
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "odd.csv").write_text("0,0,1,1\n1,2,3\n")
+    assert main(["align", *arguments]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert said in told.err
+    assert told.err.count("\n") == 1
