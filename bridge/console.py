@@ -45,9 +45,9 @@ def say(line: str) -> None:
     print(printable(line), file=sys.stderr, flush=True)  # noqa: T201
 
 
-def tell(text: str) -> None:
+def tell(text: str, *, at_once: bool = False) -> None:
     """What a command was asked for, on stdout; it may hold what a robot, a vehicle or a file says."""
-    print(printable_lines(text))  # noqa: T201
+    print(printable_lines(text), flush=at_once)  # noqa: T201
 
 
 @contextmanager
@@ -62,4 +62,4 @@ def refusals_in(as_json: bool) -> Iterator[None]:
 
 
 def print_json(document: dict[str, Any]) -> None:
-    print(json.dumps(document))  # noqa: T201
+    print(json.dumps(document), flush=True)  # noqa: T201

@@ -10,6 +10,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from mission.errors import MissingExtra, StopgoError
+from mission.json_answer import answering
 from mission.process import PIPE_CLOSED, Signals, drop_output, have_output, reader_is_gone
 
 if TYPE_CHECKING:
@@ -50,13 +51,16 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _heeding(arguments: list[str], *, whole_process: bool) -> int:
     try:
-        with Signals(whole_process=whole_process) as signals:
+        with Signals(whole_process=whole_process) as signals, answering(arguments) as answer:
             try:
                 code = _run(arguments)
                 sys.stdout.flush()
                 return code
             except BaseException as error:  # noqa: BLE001  the process ends here
-                return _ended_by(error, signals)
+                message, code = _ended_by(error, signals)
+                _say(message)
+                answer.fail(message, code)
+                return code
     except KeyboardInterrupt:  # a second one, while the first was told of
         return INTERRUPTED
 
@@ -108,39 +112,39 @@ def _run(arguments: list[str]) -> int:
     return result if isinstance(result, int) else 0
 
 
-def _ended_by(error: BaseException, signals: Signals) -> int:
-    """The exit code of a command that has raised, after a line for the user; raises what nobody foresaw."""
+def _ended_by(error: BaseException, signals: Signals) -> tuple[str, int]:
+    """A line for the user, and the exit code, of a command that has raised; raises what nobody foresaw."""
     if isinstance(error, StopgoError):
-        return _say(str(error), error.exit_code)
+        return str(error), error.exit_code
     if isinstance(error, KeyboardInterrupt) or signals.first is not None:
         return _stopped(signals)
     if isinstance(error, BrokenPipeError) and reader_is_gone():
-        return PIPE_CLOSED
+        return "", PIPE_CLOSED
     if isinstance(error, ModuleNotFoundError):
-        return _say(*_missing(error))
+        return _missing(error)
     if isinstance(error, OSError):  # such as a full disk under the output
-        return _say(f"{error.filename or 'output'}: {error.strerror}", StopgoError.exit_code)
+        return f"{error.filename or 'output'}: {error.strerror}", StopgoError.exit_code
     return _left_by(error)
 
 
-def _stopped(signals: Signals) -> int:
-    """The exit code of a command that a signal has ended; only Ctrl-C has somebody to be told."""
+def _stopped(signals: Signals) -> tuple[str, int]:
+    """Of a command that a signal has ended; only Ctrl-C has somebody to be told."""
     if signals.first not in (None, signal.SIGINT):
-        return signals.exit_code
-    return _say("stopped by Ctrl-C", INTERRUPTED)
+        return "", signals.exit_code
+    return "stopped by Ctrl-C", INTERRUPTED
 
 
-def _left_by(error: BaseException) -> int:
-    """The exit code of what the library of commands has raised."""
+def _left_by(error: BaseException) -> tuple[str, int]:
+    """Of what the library of commands has raised."""
     from typer import Abort, Exit
     from typer.exceptions import TyperException
 
     if isinstance(error, Exit):
-        return error.exit_code
+        return "", error.exit_code
     if isinstance(error, Abort):
-        return INTERRUPTED
+        return "", INTERRUPTED
     if isinstance(error, TyperException):
-        return _say(f"{_misused(error)} (see --help)", StopgoError.exit_code)
+        return f"{_misused(error)} (see --help)", StopgoError.exit_code
     raise error
 
 
@@ -161,12 +165,13 @@ def _missing(error: ModuleNotFoundError) -> tuple[str, int]:
     return message, MissingExtra.exit_code
 
 
-def _say(message: str, code: int) -> int:
+def _say(message: str) -> None:
+    """The line on stderr, if there is one."""
     from mission.table import printable
 
-    with contextlib.suppress(OSError):  # nobody reads it
-        print(f"stopgo: {printable(' '.join(message.split()))}", file=sys.stderr)  # noqa: T201
-    return code
+    if message:
+        with contextlib.suppress(OSError):  # nobody reads it
+            print(f"stopgo: {printable(' '.join(message.split()))}", file=sys.stderr)  # noqa: T201
 
 
 if __name__ == "__main__":

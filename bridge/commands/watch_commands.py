@@ -15,6 +15,7 @@ from bridge.commands.order_commands import Json, status_json
 from bridge.console import print_json, say, tell
 
 if TYPE_CHECKING:
+    from bridge.station.watch import Showing
     from mission.events import StateReport
     from mission.heard_run import HeardRun
 
@@ -52,17 +53,25 @@ def watch_by(recording: Recorder) -> Callable[..., None]:
         autopilots, and 2 when it brought it and its recording is incomplete, as on a full disk. While a
         vehicle is watched over MAVLink, what its mission says of a stop that failed is done by this command.
 
+        The timeline goes to stdout. With --json that is one object a line for every event, and for the state
+        and the comparison at the end.
+
         Example: stopgo watch --robot r1 --plan plan.rrd --rrd field.rrd
 
         Example: stopgo watch --mavlink udpout:127.0.0.1:14550 --rrd field.rrd
         """
-        from bridge.station.watch import Lines, Table, watch_showing
+        from bridge.station.watch import EventObjects, Lines, Table, watch_showing
 
+        showing: Showing = Lines(lambda line: tell(line, at_once=True))
+        if json_:
+            showing = EventObjects(print_json)
+        elif sys.stdout.isatty():
+            showing = Table(sys.stdout.write)
         with (
             recording(rrd, plan, view=view) as heard,
             reached(connection.to_look(compares=True)) as station,
         ):
-            state = watch_showing(station, heard, Table() if sys.stderr.isatty() else Lines(say))
+            state = watch_showing(station, heard, showing)
             code = tell_compared(heard, state, json_=json_)
             if code:  # which weighs more than what became of the recording
                 raise typer.Exit(code)

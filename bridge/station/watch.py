@@ -8,6 +8,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
+import msgspec
+
 from bridge.station.follow import Followed, Silence
 from bridge.station.station import Station
 from mission.document import Mission
@@ -15,6 +17,7 @@ from mission.errors import OutcomeUnknown
 from mission.events import (
     AnyEvent,
     Arrived,
+    Held,
     PoseReport,
     RevisionDropped,
     RevisionTaken,
@@ -24,6 +27,7 @@ from mission.events import (
     UnknownKind,
 )
 from mission.heard_run import RunTaker
+from mission.run.decision import STATES
 from mission.schedule import schedule
 from mission.table import printable
 
@@ -116,6 +120,26 @@ class Lines:
             self._say(f"no word for {report.seconds:.0f} s")
         elif not isinstance(report, PoseReport):
             self._say(event_line(report))
+            if isinstance(report, Held):
+                self._say(HINT)
+
+
+class EventObjects:
+    """One JSON object for every event."""
+
+    def __init__(self, write: Callable[[dict[str, Any]], None]) -> None:
+        self._write = write
+
+    def mission(self, mission: Mission) -> None:
+        """Nothing: events and the state name the mission they are of."""
+
+    def show(self, report: Followed) -> None:
+        if not isinstance(report, StateReport | PoseReport | Silence):
+            self._write(msgspec.to_builtins(report))
+
+
+_WAITED_FOR = [f"stopgo {verb}" for verb, places in STATES.items() if "HELD" in places]
+HINT = f"{'':11} held: the robot waits for {', '.join(_WAITED_FOR[:-1])} or {_WAITED_FOR[-1]}"
 
 
 class Table:
@@ -178,6 +202,8 @@ def table_lines(
         ("link", "no word for " + f"{silent_s:.0f} s, asking" if silent_s else "alive"),
     ]
     told = [event_line(event) for event in events]
+    if state.state == "HELD":
+        told = [*told[1 - LAST_EVENTS :], HINT]
     return [f"  {name:8} {value}" for name, value in rows] + told + [""] * (LAST_EVENTS - len(told))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -92,7 +93,7 @@ def names() -> list[str]:
     return sorted(front_door().commands)
 
 
-@pytest.mark.parametrize("command", [name for name in names() if name not in ("demo", "status")])
+@pytest.mark.parametrize("command", [name for name in names() if name not in ("demo", "status", "doctor")])
 def test_a_command_that_is_told_nothing_says_what_it_needs(
     command: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -151,3 +152,30 @@ def test_an_order_is_for_one_robot(
 ) -> None:
     assert main([*command, "--robot", "*"]) == 2
     assert capsys.readouterr().err.startswith("stopgo: robot name '*': use letters")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("show", "none.json"), ("plan", "none.dxf"), ("pause",), ("check", "none.json"), ("plan", "--nonsense")],
+)
+def test_with_json_an_error_is_json_too(
+    command: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code = main([*command, "--json"])
+    told = capsys.readouterr()
+    error = json.loads(told.out)["error"]
+    assert code == error["exit_code"] == 2
+    assert told.err == f"stopgo: {error['message']}\n"
+    assert main([*command]) == 2
+    assert capsys.readouterr().out == ""
+
+
+def test_an_answer_in_json_is_the_only_one(workplace: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What `check` finds is its answer; that it found something is no second one."""
+    (workplace / "other.dxf").write_text("another floor")
+    assert main(["check", "mission.json", "--floor", "other.dxf", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["ok"] is False

@@ -39,7 +39,7 @@ def test_a_robot_that_was_unplugged_finishes_its_run(folder: Path) -> None:
         status, *others = [run(command, folder, endpoint) for command in rest]
     assert "PAUSED" in status.stdout
     assert [done.returncode for done in others] == [0, 0], [done.stderr for done in others]
-    scanned = re.findall(r"Scanned +(s\d+)", others[1].stderr)
+    scanned = re.findall(r"Scanned +(s\d+)", others[1].stdout)
     assert len(scanned) == len(set(scanned))
 
 

@@ -79,9 +79,9 @@ def test_a_mission_is_pushed_started_and_watched_to_its_end(vehicle: Vehicle, tm
     begun = vehicle.run("start", "--arm", "--json")
     assert begun.returncode == 0 and json.loads(begun.stdout)["state"] == "RUNNING"
 
-    killed = subprocess.Popen(vehicle.command("watch"), stderr=subprocess.PIPE, text=True)
-    assert killed.stderr is not None
-    assert any("Scanned" in line for line in killed.stderr)
+    killed = subprocess.Popen(vehicle.command("watch"), stdout=subprocess.PIPE, text=True)
+    assert killed.stdout is not None
+    assert any("Scanned" in line for line in killed.stdout)
     killed.send_signal(signal.SIGKILL)
     killed.wait()
 
@@ -89,12 +89,14 @@ def test_a_mission_is_pushed_started_and_watched_to_its_end(vehicle: Vehicle, tm
     assert " ".join(json.loads(told.stdout)) == KEYS
     command = vehicle.command("watch", "--rrd", str(tmp_path / "field.rrd"), "--json")
     watching = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert watching.stderr is not None
-    assert any("Arrived         S2" in line for line in watching.stderr)
+    assert watching.stdout is not None
+    events = (json.loads(line) for line in watching.stdout)
+    assert any((event["event"], event.get("stop")) == ("Arrived", "S2") for event in events)
     assert vehicle.run("skip").returncode == 0
     out, said = watching.communicate(timeout=120)
     assert watching.returncode == 1, said  # a stop was left out
-    told = json.loads(out)
+    *events, told = map(json.loads, out.splitlines())
+    assert events[-1]["event"] == "Finished"
     assert (told["done"], told["skipped"]) == (["S1", "S3"], ["S2"])
     (log,) = read_recording(tmp_path / "field.rrd").logs
     through = [event.stop for event in log.events if isinstance(event, Scanned | Unconfirmed)]
@@ -106,9 +108,9 @@ def test_ctrl_c_in_watch_leaves_the_vehicle_alone(vehicle: Vehicle) -> None:
     write(tour(scan=HOURS), vehicle.mission)
     assert vehicle.run("push", str(vehicle.mission)).returncode == 0
     assert vehicle.run("start", "--arm").returncode == 0
-    watching = subprocess.Popen(vehicle.command("watch"), stderr=subprocess.PIPE, text=True)
-    assert watching.stderr is not None
-    assert any("Arrived" in line for line in watching.stderr)
+    watching = subprocess.Popen(vehicle.command("watch"), stdout=subprocess.PIPE, text=True)
+    assert watching.stdout is not None
+    assert any("Arrived" in line for line in watching.stdout)
     watching.send_signal(signal.SIGINT)
     assert watching.wait(120) == 130
     assert json.loads(vehicle.run("status", "--json").stdout)["state"] == "RUNNING"

@@ -68,12 +68,12 @@ def test_a_watch_that_comes_first_waits_for_the_run_and_ends_with_1_when_it_is_a
     with robot_process("r1", tmp_path, speed_up=10) as endpoint, connect(endpoint, robot="r1") as station:
         station.push(corridor())
         command = [sys.executable, "-m", "mission", "watch", "--robot", "r1", "--connect", endpoint]
-        watch = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-        assert watch.stderr is not None
-        assert "waiting" in watch.stderr.readline()
+        watch = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert watch.stdout is not None
+        assert "waiting" in watch.stdout.readline()
         station.command("start")
         station.command("abort")
-        said = watch.communicate(timeout=120)[1]
+        said = watch.communicate(timeout=120)[0]
     assert watch.returncode == 1
     assert "Aborted" in said
 

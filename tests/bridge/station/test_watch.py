@@ -25,7 +25,16 @@ from bridge.robot.journal import memory_journal
 from bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from bridge.station.follow import Report, Silence
 from bridge.station.station import Station
-from bridge.station.watch import Lines, Table, clock, remaining_s, table_lines, watch_showing
+from bridge.station.watch import (
+    HINT,
+    EventObjects,
+    Lines,
+    Table,
+    clock,
+    remaining_s,
+    table_lines,
+    watch_showing,
+)
 from mission.__main__ import main
 from mission.document import Mission
 from mission.errors import OutcomeUnknown
@@ -96,16 +105,40 @@ def test_lines_tell_events_and_silence_but_not_every_pose() -> None:
     assert said[-1] == "no word for 3 s"
 
 
-def test_a_robot_cannot_colour_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    held = Held(
+def held(reason: str) -> Held:
+    return Held(
         number=1, robot="r1", boot_id="b", run_id="1", mission_id="m", revision=1, robot_ns=0,
-        mission_time_s=0.0, reason=RED,
+        mission_time_s=0.0, reason=reason,
     )  # fmt: skip
+
+
+def test_a_held_robot_is_told_with_what_it_waits_for() -> None:
+    said: list[str] = []
+    Lines(said.append).show(held("the way is blocked"))
+    assert said[0].endswith("the way is blocked")
+    assert said[1].strip() == HINT.strip()
+    assert HINT.endswith("held: the robot waits for stopgo skip, stopgo retry, stopgo abort or stopgo home")
+
+
+def test_every_event_is_an_object() -> None:
+    streamed: list[dict[str, object]] = []
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    field.work()
+    for report in (field.controller.report(), *field.journal.events(), Silence(seconds=3.0)):
+        EventObjects(streamed.append).show(report)
+    assert [event["number"] for event in streamed] == [event.number for event in field.journal.events()]
+    assert streamed[-1]["event"] == "Finished"
+    json.dumps(streamed)
+
+
+def test_a_robot_cannot_colour_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     written: list[str] = []
     table = Table(written.append)
     table.show(Field().report())
-    table.show(held)
-    Lines(say).show(held)
+    table.show(held(RED))
+    Lines(say).show(held(RED))
     tell(f"one\n{RED}")
     assert RED not in written[-1]
     assert RED not in "".join(capsys.readouterr())
@@ -235,7 +268,7 @@ def test_a_run_is_followed_to_its_end_though_its_recording_finds_no_room(
     with small_disk(0):
         assert main(["watch", "--robot", "r1", "--rrd", str(rrd), "--json"]) == code
     told = capsys.readouterr()
-    assert json.loads(told.out)["state"] == {2: "FINISHED", 1: "ABORTED"}[code]
+    assert json.loads(told.out.splitlines()[-1])["state"] == {2: "FINISHED", 1: "ABORTED"}[code]
     assert [line for line in told.err.splitlines() if "field" in line] == [
         f"{rrd.with_name('field.partial.rrd')}: cannot be written (File too large); "
         "the recording waits in memory for room",

@@ -69,7 +69,7 @@ def test_a_mission_over_zenoh_is_driven_by_an_autopilot_and_recorded(tmp_path: P
         assert started.returncode == 0, started.stderr
         out, said = watch.communicate(timeout=120)
         assert watch.returncode == 0, said
-        assert json.loads(out)["done"] == ["s1", "s2", "s3"]
+        assert json.loads(out.splitlines()[-1])["done"] == ["s1", "s2", "s3"]
         assert scans_begun(operator) == 3
     review = json.loads(stopgo("review", str(field), "--json").stdout)
     assert review["mission_id"] == site_mission().id
