@@ -43,9 +43,10 @@ class Acquired:
 
     @cached_property
     def rooms(self) -> tuple[tuple[Share, Share], ...]:
-        """Every room with targets as planned and as acquired, the one least seen first."""
+        """Every room with targets as planned and as acquired, least seen first; last what faces none."""
         ledger = self.sight.ledger
-        return _paired(ledger.rooms_seen(self.sight.all_seen), ledger.rooms_seen(self.seen))
+        planned, acquired = ledger.rooms_seen(self.sight.all_seen), ledger.rooms_seen(self.seen)
+        return (*_paired(planned[:-1], acquired[:-1]), *_paired(planned[-1:], acquired[-1:]))
 
     @cached_property
     def kinds(self) -> tuple[tuple[Share, Share], ...]:

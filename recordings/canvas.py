@@ -96,7 +96,9 @@ class Canvas:
 
     def take(self, chunk: Chunk) -> None:
         """Take a part of another recording of the same origin as it is."""
-        self.counts[str(chunk.entity_path)] += chunk.num_rows
+        entity = str(chunk.entity_path)
+        self.counts[entity] += 0 if chunk.is_static else chunk.num_rows
+        self.counts[entity] = max(1, self.counts[entity])
         self.stream.send_chunks([chunk])
 
     def say(self, text: str, *, level: str = "INFO", step: int = 0) -> None:

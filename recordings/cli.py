@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def add_commands(app: typer.Typer) -> None:
     """Add this folder's verbs to the front door."""
-    app.command(epilog="Example: stopgo review plan.rrd field.rrd --view")(review)
+    app.command(epilog="Example: stopgo review plan.rrd field.rrd --html report.html")(review)
     app.command(
         epilog="Example: stopgo replay field.bag --mission plan/mission.json --align stops -o replay.rrd"
     )(replay)
@@ -36,6 +36,9 @@ def review(
     check: Annotated[
         bool, typer.Option("--check", help="Exit 1 where one is incomplete or contradicts its mission.")
     ] = False,
+    html: Annotated[
+        Path | None, typer.Option("--html", metavar="REPORT.html", help="Write a report, one file alone.")
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Open them together in the Rerun viewer.")] = False,
 ) -> int:
     """Read recordings to their end, and tell what the plan was, and what the runs acquired.
@@ -47,6 +50,12 @@ def review(
     from recordings.review import review as read
 
     found = read(recordings)
+    if html is not None and found.recordings:
+        from mission.files.atomic import write_atomic
+        from recordings.page import report_html
+        from recordings.page.from_recordings import subject_of
+
+        write_atomic(html, report_html(subject_of(found)))
     if json_:
         told = [item.as_json() for item in found.recordings]
         alone = len(told) == 1 and not found.faults

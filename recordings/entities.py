@@ -76,6 +76,7 @@ REPORT = "/report"
 
 MISSION = "/carried/mission"
 SIGHT = "/carried/sight"
+FINDINGS = "/carried/findings"
 
 PROPERTIES = "/__properties"
 PROPERTY_PLAN = "plan"
@@ -193,7 +194,7 @@ def sight(revision: int) -> str:
 def carries(entity: str) -> bool:
     """Whether values of the entity are read back."""
     parts = entity.split("/")
-    if entity.startswith((f"{MISSION}/", f"{SIGHT}/", f"{FLOOR}/")):
+    if entity == FINDINGS or entity.startswith((f"{MISSION}/", f"{SIGHT}/", f"{FLOOR}/")):
         return True
     return len(parts) == 4 and f"/{parts[1]}" == FIELD and parts[3] in (EVENTS, ROBOT)
 

@@ -10,6 +10,7 @@ import rerun as rr
 
 from mission import __version__
 from mission.document import Mission
+from mission.figures import Figures
 from mission.floor import FloorPlan
 from mission.geometry import bounds
 from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
@@ -17,6 +18,7 @@ from mission.sight import Sight
 from recordings import entities
 from recordings.canvas import Canvas, LocalOrigin, Sheet, local_origin, mission_origin, open_canvas
 from recordings.carried.checking import carry_end
+from recordings.carried.findings import carry_findings
 from recordings.carried.missions import carry_mission
 from recordings.carried.sight import carry_sight
 from recordings.layout import Bounds
@@ -47,6 +49,7 @@ DRAWINGS: dict[type, tuple[Drawing, ...]] = {
     Route: (tell_route,),
     Mission: (draw_mission, carry_mission),
     Sight: (carry_sight,),
+    Figures: (carry_findings,),
 }
 """How each noun is drawn; nouns of other types are left out."""
 

@@ -29,7 +29,7 @@ class Contents:
     complete: bool
     """False when the writer was killed before it closed the file."""
     rows: dict[str, int]
-    """Rows per entity, static ones included."""
+    """Rows per entity; all that is static counts as one."""
     timelines: tuple[str, ...]
     properties: dict[str, dict[str, Any]]
     """Values of each property, by the property's name."""
@@ -53,8 +53,14 @@ def check(path: Path) -> Contents:
     counts: Counter[str] = Counter()
     timelines: set[str] = set()
     properties: dict[str, dict[str, Any]] = {}
+    fixed: set[str] = set()
     for chunk in chunks(path, reader):
-        counts[str(chunk.entity_path)] += chunk.num_rows
+        entity = str(chunk.entity_path)
+        if not chunk.is_static:
+            counts[entity] += chunk.num_rows
+        elif entity not in fixed:  # of static rows only the last one shows, and compacting drops the others
+            fixed.add(entity)
+            counts[entity] += 1
         timelines.update(chunk.timeline_names)
         _take_property(properties, chunk)
     return Contents(

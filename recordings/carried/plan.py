@@ -8,7 +8,7 @@ from recordings.canvas import Canvas
 from recordings.carried.reading import Recording
 from recordings.read import chunks
 
-TAKEN = (entities.FLOOR, entities.COVERAGE, entities.WORLD_FLOOR, entities.SIGHT)
+TAKEN = (entities.FLOOR, entities.COVERAGE, entities.WORLD_FLOOR, entities.SIGHT, entities.FINDINGS)
 """What is taken, with all below it."""
 
 

@@ -1,0 +1,31 @@
+"""The report of a plan and its runs as one HTML file that needs nothing beside it, to read and to print."""
+
+from __future__ import annotations
+
+from recordings.page.sections import body
+from recordings.page.style import STYLE
+from recordings.page.subject import ReportSubject
+from recordings.page.words import shown
+
+HEAD = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+{body}
+</body>
+</html>
+"""
+
+
+def report_html(subject: ReportSubject) -> bytes:
+    """The page; the same subject gives the same bytes."""
+    return HEAD.format(title=shown(subject.title), style=STYLE, body=body(subject)).encode()
+
+
+__all__ = ["ReportSubject", "report_html"]

@@ -1,0 +1,79 @@
+"""Recordings that were reviewed -> what a report is of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from hashlib import file_digest
+from typing import Any
+
+from mission.errors import InputError
+from mission.run_log import LogSource
+from recordings import entities
+from recordings.carried.findings import CarriedFindings, findings_in
+from recordings.carried.floor_lines import FloorLines, floor_lines
+from recordings.carried.reading import Recording
+from recordings.page.subject import ReportSubject
+from recordings.review import RecordingReview, Review, missions_of, sights_of
+
+
+def subject_of(review: Review) -> ReportSubject:
+    """The mission of all recordings, its plan and its runs.
+
+    Raises
+    ------
+    InputError
+        When they are of several missions, or none of them carries its mission.
+    """
+    items = review.recordings
+    ids = sorted({item.recording.mission_id for item in items})
+    if len(ids) > 1:
+        raise InputError(f"a report is of one mission; these recordings are of {len(ids)}: {', '.join(ids)}")
+    read = [item.recording for item in items]
+    missions, sights = missions_of(read), sights_of(read)
+    if not missions:
+        raise InputError(
+            "no recording carries its mission: all are of another version; plan and record again"
+        )
+    return ReportSubject(
+        missions=missions,
+        comparisons=tuple(sorted(review.comparisons, key=lambda item: item.log.began_ns or 0)),
+        sight=sights[-1] if sights else None,
+        floor=_first(read, _floor),
+        results=_results(items),
+        found=_first(read, _found) or CarriedFindings(),
+        sources=tuple(_source(item) for item in read),
+        problems=tuple(f"{item.recording.path.name}: {text}" for item in items for text in item.problems),
+    )
+
+
+def _first(read: Sequence[Recording], of: Any) -> Any:
+    """What the first recording has that has any."""
+    return next((found for item in read if (found := of(item)) is not None), None)
+
+
+def _floor(recording: Recording) -> FloorLines | None:
+    return floor_lines(recording.values, _origin(recording))
+
+
+def _found(recording: Recording) -> CarriedFindings | None:
+    found = findings_in(recording.values)
+    return found if found.findings or found.unreached else None
+
+
+def _origin(recording: Recording) -> tuple[float, float]:
+    """Where the recording's own origin lies in the drawing."""
+    for name in (entities.PROPERTY_PLAN, entities.PROPERTY_RUN):
+        origin = recording.contents.properties.get(name, {}).get("local_origin")
+        if origin is not None:
+            return (float(origin[0]), float(origin[1]))
+    return (0.0, 0.0)
+
+
+def _results(items: Sequence[RecordingReview]) -> dict[str, Any]:
+    return next((item.plan for item in items if item.plan is not None), {})
+
+
+def _source(recording: Recording) -> LogSource:
+    with recording.path.open("rb") as file:
+        digest = file_digest(file, "sha256").hexdigest()
+    return LogSource(recording.path.name, "rrd", digest, recording.contents.total_rows)

@@ -1,0 +1,227 @@
+"""The plan as an SVG inside the page: floor, what was seen and lost, ways, and what became of each stop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mission.comparison import Comparison
+from mission.document import Mission, Stop
+from mission.events import Held, LinkLost, Paused
+from mission.geometry import BoolArray, FloatArray, bounds
+from mission.run.way import legs_of
+from mission.seen import runs_of
+from recordings.page.style import BLUE, GREY, INK, PALE, PURPLE, VERMILION, YELLOW
+from recordings.page.subject import ReportSubject
+from recordings.page.words import shown, tag
+
+FILLED = {"walls": PALE, "columns": "#b9bcc4", "stairs": "#e3e4e8", "other": "#e3e0d8"}
+"""Kinds of elements that are filled; of the others the outline is drawn."""
+MOST_LABELS = 60
+"""With more stops than these, only those that need somebody are named."""
+STOOD = (Held, Paused, LinkLost)
+"""Events whose place is marked."""
+
+
+def plan_picture(subject: ReportSubject, comparison: Comparison | None) -> str:
+    """The plan, and one of its runs if there is any."""
+    mission = subject.mission if comparison is None else comparison.mission
+    frame = _Frame.of(subject, mission)
+    layers = [
+        *_floor(subject, frame),
+        *_coverage(subject, comparison, frame),
+        *_ways(mission, comparison, frame),
+        *_marks(mission, comparison, frame),
+    ]
+    return tag("svg", *layers, class_="plan", viewBox=frame.view, role="img", aria_label="plan of the floor")
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Where metres of the drawing lie in the picture, whose y goes down."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+    mark: float
+    """Radius of a stop, metres."""
+
+    @classmethod
+    def of(cls, subject: ReportSubject, mission: Mission) -> _Frame:
+        lines = [] if subject.floor is None else list(subject.floor.outline)
+        ways = [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs_of(mission)]
+        start = np.array([(mission.start.x, mission.start.y)])
+        left, low, right, high = bounds([*lines, *ways, start])
+        size = max(right - left, high - low, 1.0)
+        margin = 0.02 * size
+        return cls(
+            left - margin, high + margin, right - left + 2 * margin, high - low + 2 * margin,
+            min(0.013 * size, 0.35 * _spacing(mission)),
+        )  # fmt: skip
+
+    @property
+    def view(self) -> str:
+        return f"0 0 {self.width:.3f} {self.height:.3f}"
+
+    def place(self, x: float, y: float) -> tuple[float, float]:
+        return x - self.left, self.top - y
+
+    def path(self, lines: Iterable[FloatArray], *, close: bool = False) -> str:
+        """The `d` of a path; lines that end where they begin are closed."""
+        return "".join(self._line(line, close) for line in lines if len(line) > 1)
+
+    def _line(self, line: FloatArray, close: bool) -> str:
+        closed = close and np.allclose(line[0], line[-1])
+        points = np.stack([line[:, 0] - self.left, self.top - line[:, 1]], axis=1)
+        points = points[:-1] if closed else points
+        return "M" + "L".join(f"{x:.3f} {y:.3f}" for x, y in points.tolist()) + ("Z" if closed else "")
+
+
+def _spacing(mission: Mission) -> float:
+    """How far apart stops usually are: the median distance from each to the nearest other."""
+    xy = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)
+    if len(xy) < 2:
+        return 10.0
+    apart = np.hypot(*(xy[:, None] - xy[None]).transpose(2, 0, 1))
+    np.fill_diagonal(apart, np.inf)
+    return float(max(np.median(apart.min(axis=1)), 0.5))
+
+
+def _stroke(d: str, colour: str, width: float, **style: Any) -> str:
+    if not d:
+        return ""
+    look = {"fill": "none", "stroke": colour, "stroke_width": width, "vector_effect": "non-scaling-stroke"}
+    return tag("path", d=d, **{**look, **style})
+
+
+def _floor(subject: ReportSubject, frame: _Frame) -> Iterator[str]:
+    floor = subject.floor
+    if floor is None:
+        return
+    yield _stroke(frame.path(floor.outline, close=True), GREY, 1)
+    for kind, lines in floor.kinds.items():
+        fill = {"fill": FILLED[kind], "fill_rule": "evenodd"} if kind in FILLED else {}
+        yield _stroke(frame.path(lines, close=True), "#9a9da5", 0.6, **fill)
+    for name, x, y in floor.names:
+        px, py = frame.place(x, y)
+        size = 0.011 * max(frame.width, frame.height)
+        at = {"x": f"{px:.3f}", "y": f"{py + 1.6 * size:.3f}", "font_size": f"{size:.3f}"}
+        yield tag("text", shown(name), fill="#5a5e66", text_anchor="middle", **at)
+
+
+def _coverage(subject: ReportSubject, comparison: Comparison | None, frame: _Frame) -> Iterator[str]:
+    """What nobody planned to see dashed, what was seen, and thick what was planned and not seen."""
+    acquired = None if comparison is None else comparison.acquired
+    sight = subject.sight if acquired is None else acquired.sight
+    if sight is None:
+        return
+    planned = sight.all_seen
+    seen = planned if acquired is None else acquired.seen
+
+    def along(units: BoolArray) -> str:
+        runs = runs_of(sight.targets, units)
+        a, b = sight.targets.a[runs.segment], sight.targets.b[runs.segment]
+        ends = (a + (b - a) * runs.t0[:, None], a + (b - a) * runs.t1[:, None])
+        return frame.path(np.stack(ends, axis=1))
+
+    yield _stroke(along(~planned & ~seen), GREY, 1.2, stroke_dasharray="4 3")
+    yield _stroke(along(planned & ~seen), VERMILION, 5)
+    yield _stroke(along(seen), BLUE, 2.4)
+
+
+def _ways(mission: Mission, comparison: Comparison | None, frame: _Frame) -> Iterator[str]:
+    legs = [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs_of(mission)]
+    yield _stroke(frame.path(legs), "#444", 1.1, stroke_dasharray="6 4")
+    if comparison is not None and len(comparison.log.poses):
+        driven = _thinned(comparison.log.poses.xy, max(frame.width, frame.height) / 1500)
+        yield _stroke(frame.path([driven]), PURPLE, 2, stroke_linejoin="round", stroke_opacity=0.9)
+
+
+def _thinned(xy: FloatArray, least: float) -> FloatArray:
+    """Points of a line (n, 2), a new one each time that it has gone on by `least` metres."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+    kept = np.unique(np.concatenate([[0], np.flatnonzero(np.diff(along // least) > 0) + 1, [len(xy) - 1]]))
+    return xy[kept]
+
+
+def _marks(mission: Mission, comparison: Comparison | None, frame: _Frame) -> Iterator[str]:
+    missing = {} if comparison is None else {item.stop: item for item in comparison.missing}
+    named = len(mission.stops) <= MOST_LABELS
+    over = comparison is not None and comparison.log.ended
+    for stop in mission.stops:
+        if stop.id not in missing:
+            yield _stop(stop, stop.id.lstrip("sS") if named else "", frame)
+    if comparison is not None:
+        yield from _stood(comparison, frame)
+    for stop in mission.stops:
+        item = missing.get(stop.id)
+        if item is not None:
+            yield _cross(
+                stop,
+                f"{item.stop} {item.outcome}",
+                frame,
+                over=over,
+            )
+
+
+OUTLINE: dict[str, Any] = {"stroke": INK, "stroke_width": 1.5, "vector_effect": "non-scaling-stroke"}
+
+
+def _stop(stop: Stop, label: str, frame: _Frame) -> str:
+    x, y = frame.place(stop.x, stop.y)
+    at = {"cx": f"{x:.3f}", "cy": f"{y:.3f}", "r": f"{frame.mark:.3f}", "fill": "#fff"}
+    circle = tag("circle", tag("title", shown(stop.id)), **at, **OUTLINE)
+    return circle + (_letter(x, y, label, frame) if label else "")
+
+
+def _cross(stop: Stop, label: str, frame: _Frame, *, over: bool) -> str:
+    """A stop that was not scanned: a square with a cross; hollow while the run may still come there."""
+    x, y = frame.place(stop.x, stop.y)
+    r = frame.mark * 1.1
+    k = 0.6 * r
+    at = {"x": f"{x - r:.3f}", "y": f"{y - r:.3f}", "width": f"{2 * r:.3f}", "height": f"{2 * r:.3f}"}
+    square = tag("rect", tag("title", shown(label)), fill=VERMILION if over else "#fff", **at, **OUTLINE)
+    strokes = (f"M{x - k:.3f} {y + side * k:.3f}L{x + k:.3f} {y - side * k:.3f}" for side in (1, -1))
+    beside = {"x": f"{x + 1.5 * r:.3f}", "y": f"{y + 0.4 * r:.3f}", "font_size": f"{1.3 * r:.3f}"}
+    halo = {"stroke": "#fff", "stroke_width": f"{0.25 * r:.3f}", "paint_order": "stroke"}
+    text = tag("text", shown(label), font_weight="bold", fill="#8a3000", **beside, **halo)
+    return square + _stroke("".join(strokes), "#fff" if over else INK, 2) + text
+
+
+def _letter(x: float, y: float, content: str, frame: _Frame) -> str:
+    size = frame.mark * (1.15 if len(content) < 3 else 0.85)
+    return tag("text", shown(content), x=f"{x:.3f}", y=f"{y + 0.36 * size:.3f}", font_size=f"{size:.3f}",
+               font_weight="bold", text_anchor="middle")  # fmt: skip
+
+
+def _stood(comparison: Comparison, frame: _Frame) -> Iterator[str]:
+    """A diamond where the run was paused or held, or its link was lost."""
+    poses = comparison.log.poses
+    for event in comparison.log.events:
+        index = poses.last_until(event.robot_ns) if isinstance(event, STOOD) else None
+        if index is not None:
+            x, y = frame.place(*poses.xy[index].tolist())
+            r = frame.mark
+            d = f"M{x:.3f} {y - r:.3f}L{x + r:.3f} {y:.3f}L{x:.3f} {y + r:.3f}L{x - r:.3f} {y:.3f}Z"
+            why = f"{type(event).__name__}: {getattr(event, 'reason', '')}"
+            yield tag(
+                "g", tag("title", shown(why)), _stroke(d, INK, 1.2, fill=YELLOW), _letter(x, y, "!", frame)
+            )
+
+
+def legend(items: Sequence[tuple[str, str]]) -> str:
+    """What lines and marks mean: (SVG of 26 × 12, words)."""
+    return tag("div", *(_sample(mark) + shown(words) for mark, words in items), class_="legend")
+
+
+def _sample(mark: str) -> str:
+    return tag("svg", mark, width=26, height=12, viewBox="0 0 26 12")
+
+
+def line_sample(colour: str, width: float, dash: str = "") -> str:
+    style = {"stroke_dasharray": dash} if dash else {}
+    return _stroke("M0 6L26 6", colour, width, **style)

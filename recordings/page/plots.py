@@ -1,0 +1,137 @@
+"""Small plots of a run: beside the route, late at the stops, and coverage as it grew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mission.comparison import Comparison
+from mission.events import Scanned
+from mission.geometry import FloatArray
+from mission.table import duration
+from recordings.page.style import BLUE, GREY, PURPLE, VERMILION
+from recordings.page.words import shown, tag
+
+WIDTH, HEIGHT = 360, 150
+LEFT, BOTTOM, TOP, RIGHT = 44, 20, 8, 8
+MOST_POINTS = 1500
+"""Of a curve with more points, the least and the greatest of each stretch are drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A line through (x, y), or marks at them."""
+
+    x: FloatArray
+    y: FloatArray
+    colour: str
+    dash: str = ""
+    steps: bool = False
+
+
+def plots(comparison: Comparison) -> str:
+    """Every plot of which the run tells anything, side by side."""
+    return tag("div", *_plots(comparison), class_="plots")
+
+
+def _plots(comparison: Comparison) -> Iterator[str]:
+    log, beside = comparison.log, comparison.beside
+    known = np.isfinite(beside.metres)
+    if known.any():
+        seconds = log.seconds(beside.ns)[known]
+        tolerance = 1000 * max((stop.tolerance_m for stop in comparison.mission.stops), default=0.0)
+        limits = [
+            Curve(seconds[[0, -1]], np.full(2, side), VERMILION, "4 3") for side in (tolerance, -tolerance)
+        ]
+        curve = Curve(*_few(seconds, 1000 * beside.metres[known]), PURPLE)
+        yield _plot("beside the route, mm, left positive; dashed: tolerance", [*limits, curve])
+    late = [(item.arrived_s, item.late_s) for item in comparison.stops if item.late_s is not None]
+    if late:
+        times, values = np.array(late, dtype=np.float64).T
+        yield _plot("late at each stop, s", [Curve(times, values, BLUE)])
+    yield from _growth(comparison)
+
+
+def _growth(comparison: Comparison) -> Iterator[str]:
+    """Coverage after each scan, and what was asked."""
+    acquired = comparison.acquired
+    if acquired is None:
+        return
+    ledger, seen = acquired.sight.ledger, np.zeros(len(acquired.seen), dtype=bool)
+    visible = ledger.amount(ledger.visible)
+    times, shares = [0.0], [0.0]
+    for event in comparison.log.events:
+        if isinstance(event, Scanned) and visible:
+            seen |= acquired.sight.seen_units([event.stop]) & acquired.seen
+            times.append(event.mission_time_s)
+            shares.append(100 * ledger.amount(seen & ledger.visible) / visible)
+    if len(times) > 1:
+        ends = np.array([0.0, times[-1]])
+        asked = Curve(ends, np.full(2, 100 * ledger.required), VERMILION, "4 3")
+        grown = Curve(np.array(times), np.array(shares), BLUE, steps=True)
+        yield _plot("coverage acquired, %; dashed: asked", [asked, grown])
+
+
+def _few(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A curve of at most MOST_POINTS that keeps every least and greatest value."""
+    if len(x) <= MOST_POINTS:
+        return x, y
+    size = -(-2 * len(x) // MOST_POINTS)
+    kept = []
+    for begin in range(0, len(x), size):
+        part = y[begin : begin + size]
+        kept += sorted({begin + int(part.argmin()), begin + int(part.argmax())})
+    return x[kept], y[kept]
+
+
+def _plot(title: str, curves: Sequence[Curve]) -> str:
+    x = np.concatenate([curve.x for curve in curves])
+    y = np.concatenate([curve.y for curve in curves])
+    low, high = min(0.0, float(y.min())), max(0.0, float(y.max()))
+    scale = _Scale(float(x.min()), max(float(x.max()), float(x.min()) + 1e-9), low, max(high, low + 1e-9))
+    lines = [*_axes(scale), *(_curve(curve, scale) for curve in curves)]
+    picture = tag("svg", *lines, width=WIDTH, height=HEIGHT, viewBox=f"0 0 {WIDTH} {HEIGHT}")
+    return tag("figure", picture, tag("figcaption", shown(title)))
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """The range of a plot."""
+
+    left: float
+    right: float
+    low: float
+    high: float
+
+    def x(self, value: FloatArray) -> FloatArray:
+        return LEFT + (value - self.left) / (self.right - self.left) * (WIDTH - LEFT - RIGHT)
+
+    def y(self, value: FloatArray) -> FloatArray:
+        return HEIGHT - BOTTOM - (value - self.low) / (self.high - self.low) * (HEIGHT - BOTTOM - TOP)
+
+
+def _axes(scale: _Scale) -> Iterator[str]:
+    for value in (scale.low, 0.0, scale.high):
+        y = float(scale.y(np.array(value)))
+        yield tag("path", d=f"M{LEFT} {y:.1f}H{WIDTH - RIGHT}", stroke="#c9ccd2", stroke_width=1)
+    for value in {scale.low, scale.high}:
+        y = float(scale.y(np.array(value)))
+        yield tag("text", f"{value:.4g}".replace("-", "−"), x=LEFT - 4, y=f"{y + 4:.1f}", text_anchor="end",
+                  font_size=11, fill="#333")  # fmt: skip
+    for value, anchor in ((scale.left, "start"), (scale.right, "end")):
+        x = float(scale.x(np.array(value)))
+        yield tag(
+            "text", duration(value), x=f"{x:.1f}", y=HEIGHT - 5, text_anchor=anchor, font_size=11, fill="#333"
+        )
+    yield tag("path", d=f"M{LEFT} {TOP}V{HEIGHT - BOTTOM}", stroke=GREY, stroke_width=1)
+
+
+def _curve(curve: Curve, scale: _Scale) -> str:
+    points = list(zip(scale.x(curve.x).tolist(), scale.y(curve.y).tolist(), strict=True))
+    d = f"M{points[0][0]:.1f} {points[0][1]:.1f}"
+    for x, y in points[1:]:
+        d += f"H{x:.1f}V{y:.1f}" if curve.steps else f"L{x:.1f} {y:.1f}"
+    dash = {"stroke_dasharray": curve.dash} if curve.dash else {}
+    return tag("path", d=d, fill="none", stroke=curve.colour, stroke_width=1.5, **dash)

@@ -1,0 +1,373 @@
+"""The parts of the page, in the order of reading: the verdict, the numbers, the picture, the tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from mission.acquired import Acquired
+from mission.comparing.judging import judge
+from mission.comparison import Comparison, StopComparison
+from mission.document import Stop
+from mission.events import Scanned
+from mission.figures import Share, percent
+from mission.page import route_length
+from mission.schedule import schedule
+from mission.table import duration
+from recordings.page.picture import legend, line_sample, plan_picture
+from recordings.page.plots import plots
+from recordings.page.style import ANSWERS, BLUE, GREY, PURPLE, STATES, VERMILION, YELLOW
+from recordings.page.subject import ReportSubject
+from recordings.page.words import grid, number, row, section, shown, tag
+
+MOST_ELEMENTS = 40
+"""Elements that are listed: the ones least seen."""
+
+
+def body(subject: ReportSubject) -> str:
+    """Everything between <body> and </body>."""
+    runs = subject.comparisons
+    parts = [_title(subject), *_problems(subject)]
+    if not runs:
+        parts += [_plan_band(subject), _plan_tiles(subject), _pictured(subject, None), _plan_tables(subject)]
+    if len(runs) > 1:
+        parts += [_side_by_side(subject)]
+    parts += [
+        tag("div", *_run(subject, comparison, alone=len(runs) == 1), class_="run") for comparison in runs
+    ]
+    return "\n".join([*parts, _findings(subject), _alignments(subject), _sources(subject)])
+
+
+def _title(subject: ReportSubject) -> str:
+    mission = subject.mission
+    about = f"mission {mission.id[:12]}, revision {mission.revision}, floor {mission.origin.floor}"
+    return tag("h1", shown(mission.name), " ", tag("small", shown(about)))
+
+
+def _problems(subject: ReportSubject) -> Iterator[str]:
+    if subject.problems:
+        lines = "".join(tag("li", shown(problem)) for problem in subject.problems)
+        yield tag("div", tag("b", "Do not trust these files blindly."), tag("ul", lines), class_="band",
+                  style=f"background:{ANSWERS['no']}")  # fmt: skip
+
+
+# ---- a plan alone ----
+
+
+def _plan_band(subject: ReportSubject) -> str:
+    planned = None if subject.sight is None else subject.sight.planned
+    if planned is None:
+        return tag("div", tag("b", "Planned."), class_="band", style=f"background:{ANSWERS['unknown']}")
+    whole = planned.whole
+    asked = "" if whole.required is None else f"; {percent(whole.required)} was asked"
+    met = not planned.short
+    text = f" {percent(whole.coverage)} of what is visible will be scanned{asked}."
+    return tag("div", tag("b", "Planned." if met else "Planned, and too little."), shown(text), class_="band",
+               style=f"background:{ANSWERS['yes' if met else 'no']}")  # fmt: skip
+
+
+def _plan_tiles(subject: ReportSubject) -> str:
+    mission, times = subject.mission, schedule(subject.mission)
+    share = None if subject.sight is None else subject.sight.planned.whole
+    visible = "" if share is None else f"{percent(share.visible_share)} of all can be seen"
+    tiles = [
+        _tile("stops", str(len(mission.stops)), _bound(subject)),
+        _tile("coverage", percent(None if share is None else share.coverage), visible),
+        _tile("route", f"{route_length(mission):.1f} m", "back to the start" if mission.return_ else "open"),
+        _tile("run time", duration(times.total_s), f"of which scanning {duration(times.scan_s)}"),
+    ]
+    return tag("div", *tiles, class_="tiles")
+
+
+def _bound(subject: ReportSubject) -> str:
+    bound = subject.results.get("stops_bound")
+    return "" if bound is None else f"at least {bound} are needed"
+
+
+def _plan_tables(subject: ReportSubject) -> str:
+    mission = subject.mission
+    arrivals = schedule(mission).arrival_s.tolist()
+    rows = [row(_planned_cells(stop, s)) for stop, s in zip(mission.stops, arrivals, strict=True)]
+    stops = section("Stops", grid(("stop", "x m", "y m", "arrival", "sees units", "new"), rows))
+    if subject.sight is None:
+        return stops
+    planned = subject.sight.planned
+    tables = [
+        section("Rooms, worst first", _plan_shares(planned.rooms, "room")),
+        section("Kinds", _plan_shares(planned.kinds, "kind")),
+    ]
+    return tag("div", stops, tag("div", *tables), class_="columns")
+
+
+def _planned_cells(stop: Stop, arrival_s: float) -> list[str]:
+    places = (number(stop.x, digits=3), number(stop.y, digits=3))
+    return [shown(stop.id), *places, duration(arrival_s), str(stop.sees.units), str(stop.sees.new_units)]
+
+
+def _plan_shares(shares: Sequence[Share], what: str) -> str:
+    return _share_grid([(share, share) for share in shares], what, alone=True)
+
+
+# ---- a run ----
+
+
+def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iterator[str]:
+    if not alone:
+        yield tag("h2", shown(f"Run {comparison.run_id or 'without a name'}"))
+    judgement = judge(comparison)
+    words = shown(" " + " ".join(judgement.sentences))
+    yield tag("div", tag("b", shown(f"{judgement.headline}.")), words, class_="band",
+              style=f"background:{ANSWERS[judgement.answer]}")  # fmt: skip
+    yield tag("div", *_tiles(comparison), class_="tiles")
+    yield _states(comparison)
+    yield _pictured(subject, comparison)
+    yield section("Stops", tag("div", _stop_grid(comparison), class_="scroll"))
+    if comparison.acquired is not None:
+        yield tag("div", *_coverage_tables(comparison.acquired), class_="columns")
+    yield section("On the way", plots(comparison))
+
+
+def _tiles(comparison: Comparison) -> Iterator[str]:
+    away, beside = comparison.greatest_deviation_m, comparison.beside.greatest_m
+    driven = "not ended" if comparison.driven_s is None else duration(comparison.driven_s)
+    tolerance = max((stop.tolerance_m for stop in comparison.mission.stops), default=0.0)
+    paused, held = (sum(span.state == state for span in comparison.spans) for state in ("PAUSED", "HELD"))
+    yield _tile(
+        "stops scanned", f"{comparison.scanned} / {len(comparison.asked)}", f"robot {comparison.log.robot}"
+    )
+    if comparison.acquired is not None:
+        shares, planned = comparison.acquired.shares, comparison.acquired.planned
+        asked = percent(shares.whole.required)
+        planned_text = f"asked {asked}, planned {percent(planned.whole.coverage)}"
+        yield _tile("coverage acquired", percent(shares.whole.coverage), planned_text)
+    yield _tile("run time", driven, f"planned {duration(comparison.planned_s)}")
+    yield _tile("greatest offset at a stop", _millimetres(away), f"tolerance {1000 * tolerance:.0f} mm")
+    yield _tile("off the route, worst", _millimetres(beside), f"{comparison.log.poses.length_m:.1f} m driven")
+    stood = comparison.stood_s("PAUSED", "HELD")
+    yield _tile("stood still", duration(stood), f"paused {paused}, held {held}")
+
+
+def _millimetres(metres: float | None) -> str:
+    return "–" if metres is None else f"{1000 * metres:.1f} mm"
+
+
+def _tile(name: str, value: str, note: str = "") -> str:
+    return tag("div", shown(name), tag("b", shown(value)), tag("small", shown(note)), class_="tile")
+
+
+def _states(comparison: Comparison) -> str:
+    whole = sum(span.seconds for span in comparison.spans)
+    if not whole:
+        return ""
+    parts = []
+    for span in comparison.spans:
+        back, ink = STATES.get(span.state, (GREY, "#fff"))
+        title = f"{span.state} from {duration(span.begin_s)} to {duration(span.end_s)} {span.why}"
+        look = f"width:{100 * span.seconds / whole:.3f}%;background:{back};color:{ink}"
+        parts.append(tag("div", span.state, style=look, title=title))
+    return tag("div", *parts, class_="states")
+
+
+def _pictured(subject: ReportSubject, comparison: Comparison | None) -> str:
+    seen = "planned" if comparison is None else "scanned"
+    marks = [(line_sample(BLUE, 2.4), seen), (line_sample(GREY, 1.2, "4 3"), "never planned")]
+    if comparison is not None:
+        marks.insert(1, (line_sample(VERMILION, 5), "planned, not scanned (thick)"))
+    marks.append((line_sample("#444", 1.1, "6 4"), "planned way"))
+    if comparison is not None:
+        diamond = tag("path", d="M13 1L18 6L13 11L8 6Z", fill=YELLOW, stroke="#111")
+        cross = tag("path", d="M8 1H18V11H8ZM10 3L16 9M10 9L16 3", fill=VERMILION, stroke="#111")
+        marks += [(line_sample(PURPLE, 2), "driven way"), (cross, "not scanned"), (diamond, "stood still")]
+    return legend(marks) + plan_picture(subject, comparison)
+
+
+STOP_HEADER = (
+    *(
+        "stop",
+        "outcome",
+        "planned",
+        "arrived",
+        "late s",
+        "along mm",
+        "across mm",
+        "heading °",
+        "settle s",
+        "tries",
+    ),
+    "coverage lost",
+)
+
+
+def _stop_grid(comparison: Comparison) -> str:
+    missing = {item.stop for item in comparison.missing}
+    rows = [
+        row(_stop_cells(item), **({"class_": "missing"} if item.stop in missing else {}))
+        for item in comparison.stops
+    ]
+    return grid(STOP_HEADER, rows)
+
+
+def _stop_cells(item: StopComparison) -> list[str]:
+    reason = f": {item.reason}" if item.reason else ""
+    return [
+        *(shown(item.stop), shown(item.outcome + reason), _clock(item.planned_s), _clock(item.arrived_s)),
+        *(number(item.late_s, sign=True), number(item.along_m, 1000, sign=True)),
+        *(number(item.across_m, 1000, sign=True), number(item.heading_rad, 180 / math.pi, sign=True)),
+        *(number(item.settle_s), str(item.tries)),
+        "" if item.lost is None else f"−{number(item.lost, 100)} %",
+    ]
+
+
+def _clock(seconds: float | None) -> str:
+    return "" if seconds is None else duration(seconds)
+
+
+def _coverage_tables(acquired: Acquired) -> Iterator[str]:
+    yield section("Rooms, worst first", _share_grid(acquired.rooms, "room"))
+    yield section("Kinds", _share_grid(acquired.kinds, "kind"))
+    ledger = acquired.sight.ledger
+    planned = {item.name: item for item in ledger.by_element(acquired.sight.all_seen)}
+    pairs = [(planned[item.name], item) for item in acquired.elements if item.visible]
+    worst = sorted(pairs, key=lambda pair: (pair[1].seen - pair[0].seen, pair[1].name))
+    short = [pair for pair in worst if pair[1].seen < pair[0].seen]
+    if short:
+        title = f"Elements that lost most ({min(len(short), MOST_ELEMENTS)} of {len(short)})"
+        yield section(title, _share_grid(short[:MOST_ELEMENTS], "element"))
+
+
+def _share_grid(pairs: Sequence[tuple[Share, Share]], what: str, *, alone: bool = False) -> str:
+    """Rows of planned and acquired shares; `alone` where there is only a plan."""
+    rows = [row(_share_cells(planned, share, alone=alone)) for planned, share in pairs]
+    header = (what, "planned", "") if alone else (what, "planned", "got", "")
+    return grid(header, rows) if rows else ""
+
+
+def _share_cells(planned: Share, share: Share, *, alone: bool) -> list[str]:
+    name = shown(share.name) + (tag("small", shown(f" {share.why}")) if share.why else "")
+    got = [] if alone else [tag("b", percent(share.coverage)) + ("" if share.met else " !")]
+    return [name, percent(planned.coverage), *got, _bar(share)]
+
+
+def _bar(share: Share) -> str:
+    """How much is seen, and a mark at what was asked."""
+    if share.coverage is None:
+        return ""
+    colour = BLUE if share.met else VERMILION
+    asked = "" if share.required is None else tag("i", style=f"left:{100 * share.required:.1f}%")
+    inner = tag("div", style=f"width:{100 * share.coverage:.1f}%;background:{colour}")
+    return tag("div", inner, asked, class_="bar")
+
+
+# ---- several runs ----
+
+
+def _side_by_side(subject: ReportSubject) -> str:
+    runs = subject.comparisons
+    header = ["", *(shown(run.run_id or "without a name") for run in runs)]
+    rows = [row([tag("b", name), *(figure(run) for run in runs)]) for name, figure in _ROWS]
+    stops = dict.fromkeys(item.stop for run in runs for item in run.stops)
+    by_stop = [{item.stop: item for item in run.stops} for run in runs]
+    cells = [row([shown(stop), *(_outcome(items.get(stop)) for items in by_stop)]) for stop in stops]
+    return (
+        section("Runs", tag("div", grid(header, rows), class_="scroll"))
+        + section("Stops of every run", tag("div", grid(header, cells), class_="scroll"))
+        + section("Rooms of every run", tag("div", _rooms_of(runs, header), class_="scroll"))
+    )
+
+
+def _outcome(item: StopComparison | None) -> str:
+    if item is None:
+        return ""
+    late = "" if item.late_s is None else f", {number(item.late_s, sign=True)} s"
+    away = "" if item.deviation_m is None else f", {number(item.deviation_m, 1000)} mm"
+    return shown(item.outcome) + late + away
+
+
+def _rooms_of(runs: Sequence[Comparison], header: list[str]) -> str:
+    """Rooms by their order in the plan; runs of which nothing is known have no shares."""
+    known = [run.acquired for run in runs]
+    first = next((item for item in known if item is not None), None)
+    if first is None:
+        return ""
+    names = [share.name for share in first.sight.ledger.rooms_seen(first.seen)]
+    columns = [[] if item is None else item.sight.ledger.rooms_seen(item.seen) for item in known]
+    return grid(header, [
+        row([shown(name), *(percent(column[k].coverage) if k < len(column) else "" for column in columns)])
+        for k, name in enumerate(names)
+    ])  # fmt: skip
+
+
+_ROWS = (
+    ("verdict", lambda run: shown(judge(run).headline)),
+    ("robot", lambda run: shown(run.log.robot)),
+    ("stops scanned", lambda run: f"{run.scanned} / {len(run.asked)}"),
+    ("coverage", lambda run: "" if run.acquired is None else percent(run.acquired.shares.whole.coverage)),
+    ("run time", lambda run: _clock(run.driven_s)),
+    ("greatest offset at a stop", lambda run: _millimetres(run.greatest_deviation_m)),
+    ("off the route, worst", lambda run: _millimetres(run.beside.greatest_m)),
+    ("stood still", lambda run: duration(run.stood_s("PAUSED", "HELD"))),
+)
+"""Rows of the table of runs."""
+
+
+# ---- what it stands on ----
+
+
+def _findings(subject: ReportSubject) -> str:
+    found = subject.found
+    left = [
+        tag("li", shown(f"{room} ({area:.1f} m²) is not entered: {why}"))
+        for room, area, why in found.unreached
+    ]
+    told = [tag("li", tag("b", shown(code)), " ", shown(message)) for _, code, message in found.findings]
+    return section("Findings", tag("ul", *left, *told)) if left or told else ""
+
+
+def _alignments(subject: ReportSubject) -> str:
+    lines = [
+        tag("li", shown(f"{_run_name(run)}: {_aligned(run)}. {_read(run)}")) for run in subject.comparisons
+    ]
+    return section("Alignment", tag("ul", *lines)) if lines else ""
+
+
+def _run_name(run: Comparison) -> str:
+    return f"run {run.run_id or 'without a name'}"
+
+
+def _aligned(run: Comparison) -> str:
+    fit = run.log.alignment
+    if fit is None:
+        return "recorded in the mission's frame"
+    turn, shift = math.degrees(fit.heading), f"({fit.x:.3f}, {fit.y:.3f}) m"
+    how = f"{fit.how}: turned by {turn:.3f}°, shifted by {shift}, times by {fit.time_offset_ns / 1e9:+.3f} s"
+    if fit.residual_rms_m is None:
+        return how
+    rms, most = 1000 * fit.residual_rms_m, 1000 * (fit.residual_max_m or 0.0)
+    return f"{how}; of {fit.pairs} pairs {rms:.1f} mm rms are left, {most:.1f} mm at most"
+
+
+def _read(run: Comparison) -> str:
+    source = run.log.source
+    notes = "".join(f"; {note}" for note in source.notes)
+    return f"{source.name} ({source.format}): {source.messages} messages read, {source.lost} lost{notes}"
+
+
+def _sources(subject: ReportSubject) -> str:
+    missions = [
+        tag("li", shown(f"mission {item.id} revision {item.revision}: "), tag("code", shown(item.digest)))
+        for item in subject.missions
+    ]
+    floor = subject.mission.origin
+    missions.append(tag("li", shown(f"floor {floor.floor}: "), tag("code", shown(floor.floor_digest))))
+    files = [tag("li", shown(f"{item.name}: "), tag("code", shown(item.digest))) for item in subject.sources]
+    events = [event for run in subject.comparisons for event in run.log.events]
+    scans = [
+        tag(
+            "li",
+            shown(f"{event.stop} {event.file}, {event.points} points: "),
+            tag("code", shown(event.sha256)),
+        )
+        for event in events
+        if isinstance(event, Scanned)
+    ]
+    return section("Digests (sha256)", tag("ul", *missions, *files, *scans))

@@ -1,0 +1,43 @@
+"""What a report is of: a mission with its plan, and any number of its runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from mission.comparison import Comparison
+from mission.document import Mission
+from mission.run_log import LogSource
+from mission.sight import Sight
+from recordings.carried.findings import CarriedFindings
+from recordings.carried.floor_lines import FloorLines
+
+
+@dataclass(frozen=True, eq=False)
+class ReportSubject:
+    """One mission; what is not known of it is empty or None."""
+
+    missions: tuple[Mission, ...]
+    """Its revisions, in ascending order; at least one."""
+    comparisons: tuple[Comparison, ...] = ()
+    """Its runs, the one begun first before others."""
+    sight: Sight | None = None
+    """What its newest plan's stops see."""
+    floor: FloorLines | None = None
+    results: dict[str, Any] = field(default_factory=dict)
+    """What the stages of the plan came to, by name."""
+    found: CarriedFindings = field(default_factory=CarriedFindings)
+    sources: tuple[LogSource, ...] = ()
+    """The files that it was made from."""
+    problems: tuple[str, ...] = ()
+    """What of these files is missing or contradicts itself."""
+
+    @property
+    def mission(self) -> Mission:
+        """The newest revision."""
+        return self.missions[-1]
+
+    @property
+    def title(self) -> str:
+        what = "plan" if not self.comparisons else "run" if len(self.comparisons) == 1 else "runs"
+        return f"{self.mission.name}: {what}"

@@ -1,0 +1,145 @@
+"""report.html: one file that needs nothing beside it, holds what was computed, and lets no text act."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import msgspec
+import pytest
+
+from mission.__main__ import main
+from mission.comparing.compare import compare
+from mission.comparing.judging import judge
+from mission.document import Mission, sealed
+from mission.events import Finished, Paused, Resumed, Skipped
+from mission.run_log import Alignment
+from recordings.page import ReportSubject, report_html
+from recordings.page.from_recordings import subject_of
+from recordings.page.words import number, shown
+from recordings.review import review
+from tests.mission.comparing.test_compare import START, planned, run, visit
+from tests.mission.comparing.told import told
+
+NASTY = '<script>alert(1)</script> "&\x1b[31m\x00'
+
+
+def tree(page: bytes) -> ElementTree.Element:
+    """The page's body; it is written so that it is XML too."""
+    text = page.decode()
+    return ElementTree.fromstring(text[text.index("<body>") : text.index("</body>") + len("</body>")])
+
+
+def words(page: bytes) -> str:
+    return " ".join(" ".join(tree(page).itertext()).split())
+
+
+def skipping() -> ReportSubject:
+    mission, sight = planned()
+    events = (
+        *visit("S1", 0, 1, 1),
+        (Paused, 64.0, {"reason": NASTY}),
+        (Resumed, 80.0, {"commander": "ann"}),
+        (Skipped, 85.0, {"stop": "S2", "reason": NASTY}),
+        (Finished, 90.0, {}),
+    )
+    log = told(mission, START, *events, poses=[(0, 1, 1), (70, 2, 1.01), (85, 3.2, 1)])
+    return ReportSubject((mission,), (compare(log, [mission], [sight]),), sight)
+
+
+def test_a_run_tells_its_verdict_and_every_figure() -> None:
+    subject = skipping()
+    text = words(report_html(subject))
+    assert "Not acquired. 57.1 % of what is visible was scanned; 70.0 % was asked, 78.5 % planned." in text
+    assert "stops scanned 1 / 2" in text
+    assert "−21.4 %" in text
+    assert "off the route, worst 10.0 mm" in text
+    assert "stood still 0:16 paused 1, held 0" in text
+
+
+def test_a_plan_alone_has_a_page() -> None:
+    mission, sight = planned()
+    text = words(report_html(ReportSubject((mission,), sight=sight)))
+    assert "Planned. 78.5 % of what is visible will be scanned; 70.0 % was asked." in text
+    assert "stops 2" in text
+
+
+def test_several_runs_stand_in_columns() -> None:
+    whole = run(*visit("S1", 0, 1, 1), *visit("S2", 70, 3.2, 1), (Finished, 133.0, {}))
+    subject = skipping()
+    both = replace(subject, comparisons=(*subject.comparisons, whole))
+    page = tree(report_html(both))
+    (table, *_) = page.iter("table")
+    rows = [["".join(cell.itertext()) for cell in line] for line in table.iter("tr")]
+    assert ["verdict", "Not acquired", "Acquired"] in rows
+    assert ["coverage", "57.1 %", "78.5 %"] in rows
+
+
+def test_text_from_outside_stays_text(mission: Mission) -> None:
+    subject = skipping()
+    nasty = sealed(msgspec.structs.replace(subject.mission, name=NASTY))
+    page = report_html(replace(subject, missions=(nasty,), problems=(NASTY,)))
+    assert b"<script" not in page
+    assert not re.search(rb"[\x00-\x08\x0b-\x1f]", page)
+    assert "<script>alert(1)</script>" in words(page)
+
+
+def test_nothing_is_fetched_and_nothing_runs() -> None:
+    page = report_html(skipping()).decode()
+    assert not re.findall(r"\bsrc=|href=|url\(|@import|https?:", page)
+    assert "default-src 'none'" in page
+
+
+def test_the_same_subject_gives_the_same_page() -> None:
+    assert report_html(skipping()) == report_html(skipping())
+
+
+def test_what_was_lost_is_thicker_than_what_was_seen_and_what_is_missing_has_a_shape_of_its_own() -> None:
+    page = tree(report_html(skipping()))
+    paths = [item.attrib for item in page.iter("path") if "stroke-width" in item.attrib]
+    width = {item["stroke"]: float(item["stroke-width"]) for item in paths if "vector-effect" in item}
+    assert width["#D55E00"] > width["#0072B2"]
+    names = {item.findtext("title") for item in page.iter("rect")}
+    assert names == {"S2 skipped"}
+
+
+def test_alignment_and_losses_of_a_log_are_told() -> None:
+    subject = skipping()
+    (comparison,) = subject.comparisons
+    fit = Alignment("fitted to 2 stops", 1.0, 2.0, 0.1, residual_rms_m=0.012, residual_max_m=0.02, pairs=2)
+    source = replace(comparison.log.source, name="robot.bag", format="rosbag", messages=9, lost=3)
+    log = replace(comparison.log, alignment=fit, source=source)
+    text = words(report_html(replace(subject, comparisons=(replace(comparison, log=log),))))
+    assert "fitted to 2 stops: turned by 5.730°, shifted by (1.000, 2.000) m" in text
+    assert "of 2 pairs 12.0 mm rms are left, 20.0 mm at most" in text
+    assert "robot.bag (rosbag): 9 messages read, 3 lost" in text
+
+
+def test_a_command_writes_it_from_recordings(sighted: Path, skipping: Path, tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    assert main(["review", str(sighted), str(skipping), "--html", str(page)]) == 1
+    text = words(page.read_bytes())
+    assert "Room 1" in text
+    assert "narrow_door" in text or "Findings" not in text
+    subject = subject_of(review([sighted, skipping]))
+    assert judge(subject.comparisons[0]).text in text
+    assert subject.floor is not None
+    assert len(subject.floor.kinds["walls"]) == 5
+
+
+def test_recordings_of_two_missions_are_no_one_report(
+    sighted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = review([sighted])
+    (item,) = found.recordings
+    contents = replace(item.recording.contents, recording_id="f" * 32)
+    other = replace(item, recording=replace(item.recording, contents=contents))
+    with pytest.raises(Exception, match="a report is of one mission"):
+        subject_of(replace(found, recordings=(item, other)))
+
+
+def test_numbers_have_one_minus_and_none_before_zero() -> None:
+    assert (number(-0.04, sign=True), number(-1.26, sign=True), number(None)) == ("+0.0", "−1.3", "")
+    assert shown('<a b="c">') == "&lt;a b=&quot;c&quot;&gt;"
