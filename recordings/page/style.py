@@ -50,5 +50,8 @@ ul { margin: 0; padding-left: 20px; } code { font-size: 12px; word-break: break-
   h2 { break-after: avoid; } tr, .tile, .band, figure, svg.plan { break-inside: avoid; }
   thead { display: table-header-group; }
   .run { break-before: page; } .run:first-of-type { break-before: auto; }
-  svg.plan { max-height: 170mm; } .scroll { overflow: visible; } }
+  svg.plan { max-height: 170mm; } .scroll { overflow: visible; } code { font-size: 6.5px; }
+  .band { font-size: 13px; padding: 8px 12px; } .tile { min-width: 0; padding: 4px 8px; }
+  .tile b { font-size: 14px; } .plots svg { width: 58mm; height: auto; } .plots { gap: 3mm; }
+  .columns { gap: 0 8mm; } .bar { width: 90px; } h2 { font-size: 13px; margin: 12px 0 4px; } }
 """
