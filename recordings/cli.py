@@ -99,6 +99,12 @@ def replay(
     frame: Annotated[
         str | None, typer.Option(help="Take the poses in this frame from transforms (tf).")
     ] = None,
+    floor: Annotated[
+        Path | None, typer.Option(help="The floor it was planned on: tells what the robot saw of it.")
+    ] = None,
+    top_up: Annotated[
+        Path | None, typer.Option(help="With --floor: further mission to write that sees the rest (.json).")
+    ] = None,
     csv: Annotated[Path | None, typer.Option(help="Table of stops to write (.csv).")] = None,
     json_: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> int:
@@ -116,7 +122,9 @@ def replay(
     from recordings.replay.judged import judged
     from recordings.replay.replaying import replay as laid
 
-    for path in (out, csv):
+    if top_up is not None and floor is None:
+        raise InputError(f"--top-up {top_up}: is planned on the floor; give its file with --floor")
+    for path in (out, csv, top_up):
         if path is not None:
             must_be_writable(path)
     if csv is not None and len(read) > 1:
@@ -124,9 +132,37 @@ def replay(
     driven = _mission(mission, read)
     how = _placing(map_, align, time_offset, poses, robot_name)
     replays = [laid(log, driven, how) for log in read]
+    if floor is not None:
+        replays = _seen(replays, floor, top_up)
     _write_replays(replays, out, csv)
     _tell_replays(replays, as_json=json_)
     return max(judged(item).exit_code for item in replays)
+
+
+def _seen(replays: list[Replay], floor: Path, top_up: Path | None) -> list[Replay]:
+    """With what was in sight from where the robot stood, in all runs together; and the further mission."""
+    import numpy as np
+
+    from planner.further import as_driven, planned_floor
+    from planner.further import top_up as further
+
+    planned = planned_floor(floor, replays[0].mission)
+    told = [item.with_sight(as_driven(planned, item.scanned_from)) for item in replays]
+    if top_up is not None:
+        places = np.concatenate([item.scanned_from for item in replays])
+        evidence = " ".join(item.log.digest for item in replays)
+        _write_further(further(planned, places, evidence=evidence), top_up)
+    return told
+
+
+def _write_further(mission: Mission | None, path: Path) -> None:
+    from mission.files.mission_json import write
+
+    if mission is None:
+        typer.echo(f"{path}: not written: all that was asked for was in sight", err=True)
+        return
+    write(mission, path)
+    typer.echo(f"{path}: {len(mission.stops)} further stops", err=True)
 
 
 def _read(path: Path, stamps: str, frame: str | None) -> FieldLog:

@@ -7,6 +7,7 @@ of rows that no selection goes below.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -71,6 +72,29 @@ def select(visibility: Visibility) -> Selection:
     return _selection(visibility, whole, chosen, len(fixed) + bound, method)
 
 
+def select_further(visibility: Visibility, done: IntArray) -> Selection:
+    """As few candidates as see what the rows `done` leave of what is asked for; none where that is nothing.
+
+    Raises
+    ------
+    AnswerIsNo
+        When it cannot be reached.
+    """
+    settings = visibility.candidates.space.settings
+    method = variant("selector", settings.selector, METHODS)
+    whole = cover_of(visibility, demands_of(visibility))
+    problem = whole.after(done).offering(np.setdiff1d(np.arange(whole.rows), done))
+    rows, bound = _solved(method, problem, settings)
+    both = np.concatenate([done, in_greedy_order(problem, rows)]).astype(np.int64)
+    made = _selection(visibility, whole, both, len(done) + bound, method)
+    return replace(
+        made,
+        chosen=frozen(both[len(done) :], np.int64),
+        coverage_steps=frozen(made.coverage_steps[len(done) :]),
+        bound=bound,
+    )
+
+
 def _solved(method: Variant[Selector], problem: Cover, settings: Settings) -> tuple[IntArray, int]:
     """The rows and the bound that a method gives, if they are some and meet every demand."""
     given, told = method.several(method.called(problem, settings), "rows, bound")
@@ -115,4 +139,4 @@ def _coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
     return np.array(steps)
 
 
-__all__ = ["METHODS", "Selector", "select"]
+__all__ = ["METHODS", "Selector", "select", "select_further"]

@@ -64,6 +64,12 @@ def _journal() -> LogReader:
     return read_journal
 
 
+def _recording() -> LogReader:
+    from recordings.logs.own_recording import read_run_recording
+
+    return read_run_recording
+
+
 SQLITE = b"SQLite format 3\0"
 ZSTD = b"\x28\xb5\x2f\xfd"
 READERS = (
@@ -72,6 +78,7 @@ READERS = (
     LogFormat("ROS 2 SQLite", (".db3",), (SQLITE,), _ros),
     LogFormat("ROS 2, compressed", (".zstd",), (ZSTD,), _ros),
     LogFormat("stopgo journal", (".sqlite",), (SQLITE,), _journal),
+    LogFormat("stopgo recording", (".rrd",), (b"RRF2",), _recording),
     LogFormat("ArduPilot BIN", (".bin",), (b"\xa3\x95",), _dataflash),
     LogFormat("PX4 ULog", (".ulg",), (b"ULog\x01\x12\x35",), _ulog),
     LogFormat("MAVLink telemetry", (".tlog",), (), _telemetry),

@@ -11,6 +11,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from mission.document import Mission, Stop
 from mission.events import AnyEvent, Arrived, Failed, Finished, Pose, Settled, Skipped, Started, Unconfirmed
 from mission.run_log import Track
@@ -40,7 +42,7 @@ def events_of(
     """The events of a run that drove as the halts say; it is over if the last stop was visited."""
     began, ended = _begin(track, matches, remarks), int(track.ns[-1])
     told = [Happening(began, Started, {"commander": "not told by the log"})]
-    told += sorted(_told(matches, mission, remarks), key=lambda item: item.ns)
+    told += sorted(_told(matches, mission, track, remarks), key=lambda item: item.ns)
     if len(mission.stops) - 1 in {match.stop for match in matches}:
         told.append(Happening(ended, Finished, {}))
     about = {
@@ -67,14 +69,18 @@ DRIVES = ("AUTO", "MISSION")
 """Modes in which a vehicle follows its mission."""
 
 
-def _told(matches: Sequence[Match], mission: Mission, remarks: Sequence[Remark]) -> Iterator[Happening]:
-    farthest = -1
+def _told(
+    matches: Sequence[Match], mission: Mission, track: Track, remarks: Sequence[Remark]
+) -> Iterator[Happening]:
+    farthest, left_ns = -1, int(track.ns[0])
     for match in matches:
         if match.stop is None:
             continue
         for passed in range(farthest + 1, match.stop):
-            yield _passed(mission.stops[passed], match.standing.begin_ns)
-        farthest = max(farthest, match.stop)
+            left_ns = _passing_ns(mission.stops[passed], track, left_ns, match.standing.begin_ns)
+            reason = "no halt there in the log"
+            yield Happening(left_ns, Skipped, {"stop": mission.stops[passed].id, "reason": reason})
+        farthest, left_ns = max(farthest, match.stop), match.standing.end_ns
         yield from _visit(mission.stops[match.stop], match.standing, remarks)
 
 
@@ -93,8 +99,12 @@ def _of_scan(trigger: Remark | None, halt: Standing, remarks: Sequence[Remark]) 
     return f"{trigger.text}, then waited {(items[1].ns - waits[0].ns) / 1e9:.2f} s"
 
 
-def _passed(stop: Stop, before_ns: int) -> Happening:
-    return Happening(before_ns - 1, Skipped, {"stop": stop.id, "reason": "no halt there in the log"})
+def _passing_ns(stop: Stop, track: Track, after_ns: int, before_ns: int) -> int:
+    """When the robot was nearest to a stop that it left out, on its way to the next halt."""
+    poses = track.between(after_ns + 1, before_ns - 1)
+    if not len(poses):
+        return after_ns + 1
+    return int(poses.ns[int(np.hypot(*(poses.xy - (stop.x, stop.y)).T).argmin())])
 
 
 def _visit(stop: Stop, halt: Standing, remarks: Sequence[Remark]) -> Iterator[Happening]:

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from mission.acquired import Certainty
 from mission.comparing.judging import Judgement, named
 from mission.comparison import StopComparison
+from mission.figures import percent
 from recordings.replay.replayed import Replay
 
 VISITED = ("scanned", "unconfirmed")
 
 
 def judged(replay: Replay) -> Judgement:
-    """Yes, if the robot stood at every stop within its tolerance for as long as its scan takes."""
-    lines = tuple(_sentences(replay))
-    return Judgement("no" if missing(replay) or outside(replay) else "yes", lines)
+    """Yes, if the robot stood at every stop within its tolerance for as long as its scan takes.
+
+    Where the floor is known, all that was asked for must have been in sight as well.
+    """
+    unseen = replay.sight is not None and not replay.sight.enough
+    answer: Certainty = "no" if missing(replay) or outside(replay) or unseen else "yes"
+    return Judgement(answer, tuple(_sentences(replay)))
 
 
 def missing(replay: Replay) -> list[StopComparison]:
@@ -39,6 +45,12 @@ def _sentences(replay: Replay) -> Iterator[str]:
     for item in outside(replay):
         far, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
         yield f"{item.stop} was missed by {far:.0f} mm ({limit:.0f} mm are tolerated)."
+    if replay.sight is not None:
+        whole = replay.sight.shares.whole
+        short = [share for share in replay.sight.shares.short if share is not whole]
+        for share in (whole, *short):
+            name, least = share.name if share is not whole else "what is visible", percent(share.required)
+            yield f"Of {name}, {percent(share.coverage)} was in sight; {least} was asked."
     if replay.extra:
         yield f"The robot halted {len(replay.extra)} times at no stop."
     if replay.inferred:

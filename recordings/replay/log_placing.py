@@ -23,6 +23,9 @@ Align = Literal["first", "stops"]
 FAR_M = 20_000.0
 """A log that lies farther from the mission's site than this is of another site."""
 
+FIRST_NS = 3 * 10**8
+"""A robot that halts as soon after a log's beginning has its first pose where it halted, noise apart."""
+
 
 @dataclass(frozen=True)
 class Placing:
@@ -133,7 +136,7 @@ def _transform(
     if how.to_map is not None:
         return _from_map(how.to_map, "given by --map")
     if how.align == "first":
-        return _first(track, mission)
+        return _first(track, turns, mission)
     if how.align == "stops":
         fit = fitted(standings(track, speed=mission.robot.speed, turns=turns), mission)
         return _of_fit(fit)
@@ -155,10 +158,14 @@ def _from_map(to_map: Transform, how: str) -> Alignment:
     return Alignment(how=how, x=float(x), y=float(y), heading=-to_map.heading)
 
 
-def _first(track: Track, mission: Mission) -> Alignment:
-    """So that the first pose is the mission's start."""
-    heading = math.remainder(mission.start.heading - float(track.heading[0]), math.tau)
-    x, y = np.array([mission.start.x, mission.start.y]) - turning(heading) @ track.xy[0]
+def _first(track: Track, turns: bool, mission: Mission) -> Alignment:
+    """So that the first pose, as far as noise lets it be known, is the mission's start."""
+    halts = standings(track, speed=mission.robot.speed, turns=turns)
+    place, turn = track.xy[0], float(track.heading[0])
+    if halts and halts[0].begin_ns - int(track.ns[0]) <= FIRST_NS:
+        place, turn = np.array(halts[0].xy), halts[0].heading
+    heading = math.remainder(mission.start.heading - turn, math.tau)
+    x, y = np.array([mission.start.x, mission.start.y]) - turning(heading) @ place
     return Alignment(
         how="first pose at the mission's start", x=float(x), y=float(y), heading=heading, pairs=1
     )

@@ -7,9 +7,11 @@ import io
 import math
 from typing import Any
 
+from mission.as_driven import AsDriven
 from mission.comparing.telling import comparison_json, comparison_table
+from mission.figures import percent
 from mission.run_log import Alignment
-from mission.table import printable
+from mission.table import printable, table
 from recordings.logs.field_log import FieldLog
 from recordings.replay.judged import HEADLINES, judged
 from recordings.replay.replayed import Replay
@@ -33,6 +35,7 @@ def as_text(replay: Replay) -> str:
         *_truth(replay),
         *_way(replay),
         *(f"  time lost  {item.seconds:+7.1f} s  {item.where}" for item in lost_times(replay)[:MOST_LOST]),
+        *_sight(replay),
         f"{HEADLINES[judgement.answer]}. {' '.join(judgement.sentences)}",
     ]
     return "\n".join(printable(line) for line in lines)
@@ -87,6 +90,24 @@ def _way(replay: Replay) -> list[str]:
     return lines
 
 
+def _sight(replay: Replay) -> list[str]:
+    """What was in sight, least seen first, beside the plan."""
+    if replay.sight is None:
+        return []
+    rows = [
+        (
+            share.name,
+            *(
+                percent(value).removesuffix(" %")
+                for value in (planned.coverage, share.coverage, share.required)
+            ),
+        )
+        for planned, share in replay.sight.pairs
+    ]
+    lines = table(("in sight", "planned %", "as driven %", "asked %"), rows).split("\n")
+    return ["", *(f"  {line}" for line in lines), ""]
+
+
 def as_json(replay: Replay) -> dict[str, Any]:
     """Everything, for programs: metres, radians and seconds."""
     judgement, alignment = judged(replay), replay.run.alignment
@@ -105,8 +126,21 @@ def as_json(replay: Replay) -> dict[str, Any]:
         "time_lost": [vars(item) for item in lost_times(replay)],
         "halts": [_halt_json(replay, k) for k in range(len(replay.matches))],
         "true_offset_m": {stop.id: replay.true_offset_m(k) for k, stop in enumerate(replay.mission.stops)},
+        "coverage": None if replay.sight is None else _sight_json(replay.sight),
         "run": comparison_json(replay.comparison),
     }
+
+
+def _sight_json(sight: AsDriven) -> dict[str, Any]:
+    shares = {
+        share.name: {
+            "planned": planned.coverage, "as_driven": share.coverage,
+            "asked": share.required, "met": share.met,
+        }
+        for planned, share in sight.pairs
+    }  # fmt: skip
+    elements = [{"id": item.name, "visible": item.visible, "seen": item.seen} for item in sight.elements]
+    return {"shares": shares, "elements": elements}
 
 
 def _halt_json(replay: Replay, number: int) -> dict[str, Any]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from mission.as_driven import AsDriven
 from mission.comparison import Comparison
 from mission.document import Mission
+from mission.events import Scanned, Unconfirmed
 from mission.geometry import FloatArray
 from mission.run_log import RunLog
 from recordings.logs.field_log import FieldLog
@@ -33,6 +35,20 @@ class Replay:
     """How the missions in the log differ from this one, a line each."""
     inferred: bool
     """Whether the run's events were inferred from halts, and not told by the log."""
+
+    sight: AsDriven | None = None
+    """What was in sight from where the robot stood; None without the floor."""
+
+    def with_sight(self, sight: AsDriven) -> Replay:
+        """The same, with what was in sight."""
+        return replace(self, sight=sight)
+
+    @cached_property
+    def scanned_from(self) -> FloatArray:
+        """x, y and heading of every place where a scan was made, or where the robot stood as long as one
+        takes (n, 3)."""
+        own = [event.pose for event in self.run.events if isinstance(event, Scanned | Unconfirmed)]
+        return np.array([(pose.x, pose.y, pose.heading) for pose in own if pose is not None]).reshape(-1, 3)
 
     @cached_property
     def extra(self) -> tuple[Match, ...]:

@@ -83,7 +83,7 @@ def driven(mission: Mission, odd: Odd = Odd(), seed: int = 1) -> Drive:
     pace = {"speed": robot.speed, "turn_rate": robot.turn_rate}
     for k, item in enumerate(mission.stops):
         pieces = list(pairwise(item.approach))
-        longest = max(range(len(pieces)), key=lambda n: math.dist(*pieces[n]))
+        longest = max(range(len(pieces)), key=lambda n: math.dist(*pieces[n]), default=0)
         for n, (a, b) in enumerate(pieces):
             if k in odd.extra_before and n == longest:
                 drive.go(((a[0] + b[0]) / 2, (a[1] + b[1]) / 2), **pace)

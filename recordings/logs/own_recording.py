@@ -1,0 +1,29 @@
+"""A run's recording (field.rrd) as a log: the newest run in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mission.errors import InputError
+from recordings.carried.reading import read_recording
+from recordings.logs.field_log import FieldLog, Reading, poses_of
+from recordings.logs.own import SITE, own_log
+
+
+def read_run_recording(path: Path, reading: Reading) -> FieldLog:
+    """Read a recording to its end.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, or tells of no run.
+    """
+    recording = read_recording(path)
+    if not recording.logs:
+        raise InputError(f"{path}: tells of no run; is it a plan's recording?")
+    run = recording.logs[-1]
+    track = run.poses
+    poses = (
+        poses_of("robot", SITE, track.ns, track.xy, track.heading, robot=run.robot) if len(track) else None
+    )
+    return own_log(path, "stopgo recording", run.events, recording.missions, poses)

@@ -1,0 +1,107 @@
+"""What a robot saw from where it really stood, and the further mission that sees the rest."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mission.__main__ import main
+from mission.errors import InputError
+from mission.files.mission_json import read
+from mission.geometry import Polygon
+from planner.further import PlannedFloor, as_driven, planned_floor, top_up
+from tests.planner.test_command import drawn
+from tests.recordings.replay.driving import Odd, driven, logged
+
+PLAN = ["--range", "3", "--coverage", "0.9", "--settle", "1", "--scan-time", "8", "--no-refine"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A planned floor of two rooms."""
+    path = tmp_path_factory.mktemp("floor")
+    assert main(["plan", str(drawn(path / "floor.dxf")), "-o", str(path), *PLAN]) == 0
+    return path
+
+
+@pytest.fixture(scope="module")
+def planned(folder: Path) -> PlannedFloor:
+    return planned_floor(folder / "floor.dxf", read(folder / "mission.json"))
+
+
+def places(planned: PlannedFloor, *left_out: int) -> np.ndarray:
+    stops = [(stop.x, stop.y, stop.heading) for stop in planned.mission.stops]
+    return np.array([place for k, place in enumerate(stops) if k not in left_out]).reshape(-1, 3)
+
+
+def test_a_robot_that_stood_at_every_stop_saw_what_was_planned(planned: PlannedFloor) -> None:
+    seen = as_driven(planned, places(planned))
+    assert (seen.driven == seen.planned).all()
+    assert seen.enough
+    assert top_up(planned, places(planned)) is None
+
+
+def test_without_its_last_stop_less_was_seen_and_the_top_up_brings_the_rest(planned: PlannedFloor) -> None:
+    last = len(planned.mission.stops) - 1
+    left = places(planned, last)
+    seen = as_driven(planned, left)
+    assert not seen.enough
+    further = top_up(planned, left)
+    assert further is not None
+    assert further.id != planned.mission.id
+    more = np.array([(stop.x, stop.y, stop.heading) for stop in further.stops])
+    assert len(more) <= 1 + last
+    assert as_driven(planned, np.concatenate([left, more])).enough
+
+
+def test_nothing_seen_needs_no_more_stops_than_the_plan(planned: PlannedFloor) -> None:
+    further = top_up(planned, np.empty((0, 3)))
+    assert further is not None
+    assert len(further.stops) <= len(planned.mission.stops) + 1
+    assert not as_driven(planned, np.empty((0, 3))).driven.any()
+
+
+def test_a_top_up_keeps_clear_of_what_the_plan_did_not_know(planned: PlannedFloor) -> None:
+    stop = planned.mission.stops[-1]
+    heap = Polygon.of(
+        [(stop.x + dx, stop.y + dy) for dx, dy in ((-0.2, -0.2), (0.2, -0.2), (0.2, 0.2), (-0.2, 0.2))]
+    )
+    further = top_up(planned, places(planned, len(planned.mission.stops) - 1), obstacles=[heap])
+    assert further is not None
+    for item in further.stops:
+        assert max(abs(item.x - stop.x), abs(item.y - stop.y)) >= 0.2 + 0.69
+
+
+def test_the_command_tells_coverage_and_writes_the_top_up(
+    folder: Path, planned: PlannedFloor, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mission = planned.mission
+    last = len(mission.stops) - 1
+    track = logged(driven(mission, Odd(skipped=frozenset({last}))))
+    rows = zip(track.ns.tolist(), track.xy.tolist(), track.heading.tolist(), strict=True)
+    table = "".join(f"{ns},{x},{y},{heading}\n" for ns, (x, y), heading in rows)
+    (folder / "run.csv").write_text("time_ns,x,y,heading\n" + table)
+    given = [str(folder / "run.csv"), "--mission", str(folder / "mission.json"), "--align", "first", "--json"]
+    floor = ["--floor", str(folder / "floor.dxf"), "--top-up", str(folder / "next.json")]
+    assert main(["replay", *given, *floor]) == 1
+    told = json.loads(capsys.readouterr().out)
+    whole = told["coverage"]["shares"]["all"]
+    seen = as_driven(planned, places(planned, last)).shares.whole
+    assert whole["as_driven"] == pytest.approx(seen.coverage, abs=0.005)
+    assert whole["planned"] > whole["as_driven"]
+    assert main(["check", str(folder / "next.json"), "--floor", str(folder / "floor.dxf")]) == 0
+
+
+def test_a_floor_of_another_mission_is_refused(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = drawn(tmp_path / "other.dxf", door=1.1)
+    (tmp_path / "run.csv").write_text("time,x,y\n0,0,0\n")
+    mission = ["--mission", str(folder / "mission.json"), "--align", "first"]
+    assert main(["replay", str(tmp_path / "run.csv"), *mission, "--top-up", str(tmp_path / "n.json")]) == 2
+    assert "--floor" in capsys.readouterr().err
+    with pytest.raises(InputError, match="is not the floor"):
+        planned_floor(other, read(folder / "mission.json"))
