@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from types import MappingProxyType
 
 from mission.floor_source import FloorSource
 from mission.geometry import FloatArray, Polygon
@@ -22,7 +24,7 @@ class Rank(IntEnum):
 
 GRAVE = (
     *("walls_missing", "little_reached", "stray_element", "leg_over_ignored", "units_doubtful"),
-    *("no_geometry", "kernel_crashed"),
+    *("no_geometry", "kernel_crashed", "schedule_unrelated"),
     *("open_outline", "missing_block", "no_outline", "bad_coordinates"),
 )
 NOTES = (
@@ -67,6 +69,8 @@ class Element:
     occludes: bool = False
     obstacle: bool = False
     target: bool = False
+    to_scan: bool = True
+    """False where it is no target whatever its kind: it is being built, or was scanned before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +136,8 @@ class FloorPlan:
     level: str | None = None
     georeference: Georeference | None = None
     findings: tuple[Finding, ...] = ()
+    status: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+    """Elements on this floor by construction status, on the day in `source`; empty without one."""
     ignored: tuple[IgnoredLine, ...] = ()
     """Lines that no plan may cross unsaid: nobody knows what they stand for."""
 
@@ -147,5 +153,5 @@ class FloorPlan:
 
     def with_targets(self, kinds: tuple[str, ...]) -> FloorPlan:
         """The same floor, where exactly the elements of `kinds` are to be scanned."""
-        elements = tuple(replace(item, target=item.kind in kinds) for item in self.elements)
+        elements = tuple(replace(item, target=item.to_scan and item.kind in kinds) for item in self.elements)
         return replace(self, elements=elements)

@@ -8,6 +8,7 @@ docs/planning.md tells what each one does.
 
 from __future__ import annotations
 
+import datetime
 import json
 import tomllib
 from dataclasses import dataclass, fields, replace
@@ -47,6 +48,23 @@ class Settings:
     ] = None
     robot_height: Annotated[
         float | None, _floor("Robot's height", "m", above=0.1, below=10, undecided="scan_height")
+    ] = None
+    date: Annotated[str | None, _floor("Day whose construction status counts", "YYYY-MM-DD")] = None
+    since: Annotated[str | None, _floor("Scan only what was finished after this day", "YYYY-MM-DD")] = None
+    schedule: Annotated[str | None, _floor("CSV of GlobalIds with start and finish of their tasks")] = None
+    schedule_columns: Annotated[
+        tuple[str, ...],
+        _floor(
+            "Which column of the schedule is guid, task, start or finish",
+            form="WHAT=COLUMN",
+            example="guid=GlobalId",
+            read=str,
+            option="schedule_column",
+        ),
+    ] = ()
+    in_progress: Annotated[
+        Literal["obstacle", "target"] | None,
+        _floor("What is being built: in the way only, or scanned too", undecided="obstacle"),
     ] = None
     candidates: Annotated[str, _plan("grid, triangulation, or module:function")] = "grid"
     visibility: Annotated[str, _plan("exact or bresenham")] = "exact"
@@ -290,6 +308,7 @@ def check_settings(settings: Settings) -> None:
     for key, parameter in PARAMETERS.items():
         parameter.check(getattr(settings, key))
     _check_together(settings)
+    _check_days(settings)
     _check_lists(settings)
 
 
@@ -306,6 +325,29 @@ def _check_together(settings: Settings) -> None:
         raise InputError(f"refine = true: is not done with {other}; leave one of them out")
     if settings.tour == "closed" and settings.end is not None:
         raise InputError("tour = closed and end are both given; a closed tour ends where it starts")
+
+
+def _check_days(settings: Settings) -> None:
+    for key in ("date", "since"):
+        day = getattr(settings, key)
+        try:
+            if day is not None and datetime.date.fromisoformat(day).isoformat() != day:
+                raise ValueError
+        except ValueError:
+            raise InputError(
+                f"{key} = {day}: is no day; write it as YYYY-MM-DD, such as 2024-05-31"
+            ) from None
+    for key in ("since", "schedule", "in_progress"):
+        if getattr(settings, key) is not None and settings.date is None:
+            raise InputError(f"{key} = {getattr(settings, key)}: says nothing without a day; give --date too")
+    if settings.since is not None and settings.date is not None and settings.since >= settings.date:
+        raise InputError(f"since = {settings.since}: must lie before date = {settings.date}")
+    for entry in settings.schedule_columns:
+        what, _, column = entry.partition("=")
+        if what.strip() not in ("guid", "task", "start", "finish") or not column.strip():
+            raise InputError(
+                f"schedule_columns = {entry}: write WHAT=COLUMN; known: guid, task, start, finish"
+            )
 
 
 def _check_lists(settings: Settings) -> None:

@@ -110,6 +110,7 @@ class PlanReport:
             "reached_m2": self.figures.reached_m2,
             "rooms": len(floor.rooms),
             "openings": len(floor.openings),
+            **({"status": dict(floor.status)} if floor.status else {}),
             "findings": [
                 {"rank": f.rank.name.lower(), "code": f.code, "message": f.message}
                 | {"element": f.element, "at": f.at}

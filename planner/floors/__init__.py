@@ -32,7 +32,12 @@ READERS: tuple[Reader, ...] = (
         suffixes=(".ifc", ".ifczip"),
         holds=lambda data: b"ISO-10303-21" in data[:1024] or _is_zipped_model(data),
         module="planner.floors.ifc",
-        takes=frozenset({"storey", "level", "scan_height", "robot_height"}),
+        takes=frozenset(
+            {
+                *("storey", "level", "scan_height", "robot_height", "date", "since", "schedule"),
+                *("schedule_columns", "in_progress"),
+            }
+        ),
     ),
 )
 """Every kind of file that floors are read from."""
@@ -74,7 +79,15 @@ def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
 def options_of(settings: Settings) -> FloorOptions:
     """What a plan's settings tell a reader."""
     told = {name: getattr(settings, name) for name in FLOOR_PARAMETERS}
-    return FloorOptions(d_dis=settings.d_dis, layers=settings.layer_roles, **told)
+    columns = (entry.partition("=") for entry in told.pop("schedule_columns"))
+    schedule = told.pop("schedule")
+    return FloorOptions(
+        d_dis=settings.d_dis,
+        layers=settings.layer_roles,
+        schedule=None if schedule is None else Path(schedule),
+        schedule_columns={what.strip(): column.strip() for what, _, column in columns},
+        **told,
+    )
 
 
 def _opened(path: Path, options: FloorOptions | None) -> tuple[FloorFile, Variant[Reader], FloorOptions]:
@@ -110,7 +123,7 @@ def _reader_of(file: FloorFile) -> Variant[Reader]:
 
 def _option(name: str) -> str:
     """How the command line calls an option."""
-    return {"layers": "layer"}.get(name, name.replace("_", "-"))
+    return {"layers": "layer", "schedule_columns": "schedule-column"}.get(name, name.replace("_", "-"))
 
 
 def _listed(names: Iterable[str]) -> str:

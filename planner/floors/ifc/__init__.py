@@ -6,30 +6,20 @@ import shlex
 from collections import Counter
 from dataclasses import replace
 
-import numpy as np
-import shapely
-
 from mission.errors import InputError
-from mission.floor import Finding, FloorPlan
-from mission.geometry import bounds, frozen
+from mission.floor import FloorPlan
+from mission.geometry import bounds
 from mission.kinds import KINDS
-from planner.floors.ifc.areas import Space, derived_rooms, floor_area, modelled_rooms
-from planner.floors.ifc.doors import doors_on
 from planner.floors.ifc.levels import Level, chosen_level, levels_of, walked, with_uses
 from planner.floors.ifc.loading import load
 from planner.floors.ifc.model import Model
-from planner.floors.ifc.passages import passages
-from planner.floors.ifc.solids import Heights, Solid, solids_on
-from planner.floors.parts import in_order, parts_of
+from planner.floors.ifc.storey_plan import floor_on, odd_products
+from planner.floors.parts import in_order
 from planner.floors.reader import FloorFile, FloorOptions
-from planner.floors.rings import Region
-from planner.floors.strokes import Stroke, Word
 from planner.floors.survey import FloorChoice, LayerUse, Survey
 
 WORKED_OUT = ("floor_from_rooms", "floor_from_walls", "rooms_derived", "spaces_overlap", "off_floor")
 """Findings about what the model does not say and was worked out."""
-BESIDE = 1.0
-"""What stands farther than this from the floor is not part of its plan, metres."""
 
 
 def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
@@ -109,111 +99,3 @@ def _classes(model: Model) -> tuple[LayerUse, ...]:
         LayerUse(name, role, "its class", taken=found[name, role], ignored=bare[name, role])
         for name, role in sorted({*found, *bare})
     )
-
-
-def odd_products(model: Model) -> list[Finding]:
-    """Products that could not be shaped, each by name."""
-    return [
-        *(Finding("no_geometry", f"{name} has no shape that can be made") for name in model.described.failed),
-        *(
-            Finding("kernel_crashed", f"{name} crashed the geometry kernel")
-            for name in model.described.crashed
-        ),
-    ]
-
-
-def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions) -> FloorPlan:
-    """The floor plan of one level."""
-    strokes, words, findings = drawn_on(level, model, file, options)
-    parts = parts_of(strokes, words, source=file.path, layers=())
-    findings += [item for item in parts.findings if item.code != "unknown_layer"]
-    return FloorPlan(
-        name=f"{file.path.stem} {level.name}".strip(),
-        source=file.source(storey=level.name, options=_told(options)),
-        outline=parts.outline,
-        rooms=parts.rooms,
-        openings=parts.openings,
-        elements=parts.elements,
-        level=level.name,
-        ignored=parts.ignored,
-        findings=in_order(
-            (
-                *odd_products(model),
-                *findings,
-                *(item for item in parts.findings if item.code != "unknown_layer"),
-            )
-        ),
-    )
-
-
-def _told(options: FloorOptions) -> dict[str, float]:
-    names = ("scan_height", "robot_height")
-    return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-
-
-def drawn_on(
-    level: Level, model: Model, file: FloorFile, options: FloorOptions
-) -> tuple[list[Stroke], list[Word], list[Finding]]:
-    """A level as the strokes and words of a layered drawing, and what is odd about it."""
-    heights = Heights(options.scan_height or Heights.scan, options.robot_height)
-    solids = solids_on(level, model, heights)
-    walls = {item.product.global_id: item.region for item in solids if item.kind == "walls"}
-    doors = doors_on(level, model, walls)
-    rooms, findings = modelled_rooms(level, model, heights.scan)
-    floor, odd_floor = floor_area(level, model, rooms, solids, doors)
-    findings += odd_floor
-    if floor.is_empty:
-        raise InputError(
-            f"{file.path}: no floor at '{level.name}' ({level.z:+.2f} m): no slab, no rooms, no walls that "
-            "enclose any; choose another storey or --level"
-        )
-    if not rooms:
-        rooms = derived_rooms(floor, solids, doors)
-        findings.append(
-            Finding("rooms_derived", f"the model has no spaces there; {len(rooms)} rooms are worked out")
-        )
-    solids, odd_solids = _near_the_floor(solids, floor)
-    findings += [*odd_solids, *_unknown(solids)]
-    strokes = [
-        *_rings("FLOOR", floor),
-        *(ring for room in rooms for ring in _rings("ROOMS", room.region, room.global_id)),
-        *(ring for item in solids for ring in _rings(item.kind.upper(), item.region, item.product.global_id)),
-        *(Stroke(frozen(door.line), "DOORS", "doors", global_id=door.product.global_id) for door in doors),
-        *(Stroke(frozen(line), "PASSAGES", "passages") for line in passages(floor, rooms, solids, doors)),
-    ]
-    return strokes, _names(rooms), findings
-
-
-def _unknown(solids: list[Solid]) -> list[Finding]:
-    """Products without a class of their own: nobody knows what the laser makes of them."""
-    count = sum(item.kind == "other" for item in solids)
-    text = f"{count} IfcBuildingElementProxy stand in the robot's way, hide nothing and are not scanned"
-    return [Finding("proxies", text)] if count else []
-
-
-def _near_the_floor(solids: list[Solid], floor: Region) -> tuple[list[Solid], list[Finding]]:
-    """Without what stands beside the floor, such as on the roof of a lower wing."""
-    near = [item for item in solids if item.region.distance(floor) <= BESIDE]
-    if len(near) == len(solids):
-        return near, []
-    text = f"{len(solids) - len(near)} elements more than {BESIDE:g} m beside the floor are left out"
-    return near, [Finding("off_floor", text)]
-
-
-def _rings(layer: str, region: Region, global_id: str | None = None) -> list[Stroke]:
-    """The rings of a region: outer ones counter-clockwise, holes clockwise."""
-    found = []
-    for part in shapely.get_parts(shapely.orient_polygons(region)):
-        for ring in (part.exterior, *part.interiors):
-            points = np.round(shapely.get_coordinates(ring)[:-1] / 1e-4) * 1e-4
-            found.append(Stroke(frozen(points), layer, layer.lower(), closed=True, global_id=global_id))
-    return found
-
-
-def _names(rooms: list[Space]) -> list[Word]:
-    words = []
-    for room in rooms:
-        if room.name:
-            x, y = shapely.get_coordinates(room.region.point_on_surface())[0].tolist()
-            words.append(Word(room.name, "ROOMS", "rooms", ((x, y),)))
-    return words

@@ -33,9 +33,16 @@ def tasks_by_product(model: ifcopenshell.file) -> dict[int, tuple[Task, ...]]:
     """Tasks of each product by its number in the file; what is assembled of parts hands its tasks to them."""
     found: dict[int, list[Task]] = defaultdict(list)
     for entity, task in (*_of_tasks(model), *_of_properties(model)):
-        for part in (entity, *ifcopenshell.util.element.get_decomposition(entity)):
+        for part in _with_parts(entity):
             found[part.id()].append(task)
     return {key: tuple(sorted(set(tasks), key=_order)) for key, tasks in found.items()}
+
+
+def _with_parts(entity: Any) -> Iterator[Any]:
+    """A product and what it is assembled of; a door in its opening is no part of the wall."""
+    yield entity
+    for part in ifcopenshell.util.element.get_parts(entity):
+        yield from _with_parts(part)
 
 
 def _order(task: Task) -> tuple:

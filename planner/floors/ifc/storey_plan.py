@@ -1,0 +1,164 @@
+"""One storey of a model as a floor plan: drawn as a layered drawing is, for good or as of a day."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import shapely
+
+from mission.errors import InputError
+from mission.floor import Element, Finding, FloorPlan
+from mission.geometry import frozen
+from planner.floors.ifc.areas import Space, derived_rooms, floor_area, modelled_rooms
+from planner.floors.ifc.doors import doors_on
+from planner.floors.ifc.levels import Level
+from planner.floors.ifc.model import Model
+from planner.floors.ifc.passages import passages
+from planner.floors.ifc.solids import Heights, Solid, solids_on
+from planner.floors.ifc.status import Statuses, on_day, statuses
+from planner.floors.ifc.timetable import read_timetable
+from planner.floors.parts import in_order, parts_of
+from planner.floors.reader import FloorFile, FloorOptions
+from planner.floors.rings import Region
+from planner.floors.strokes import Stroke, Word
+
+BESIDE = 1.0
+"""What stands farther than this from the floor is not part of its plan, metres."""
+
+
+def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions) -> FloorPlan:
+    """The floor plan of one level, as it stands on the day that the options name.
+
+    Raises
+    ------
+    InputError
+        When there is no floor, or none on that day.
+    """
+    found, digest = _statuses(model, options)
+    there, odd, status = on_day(model, found, level) if found else (model, [], {})
+    strokes, words, worked_out = drawn_on(level, there, file, options)
+    parts = parts_of(strokes, words, source=file.path, layers=())
+    known = (item for item in parts.findings if item.code != "unknown_layer")
+    told = {**_told(options), **({"schedule": digest} if digest else {})}
+    return FloorPlan(
+        name=" ".join(filter(None, (file.path.stem, level.name, options.date))),
+        source=file.source(storey=level.name, date=options.date, since=options.since, options=told),
+        outline=parts.outline,
+        rooms=parts.rooms,
+        openings=parts.openings,
+        elements=tuple(_as_of(item, found, options) for item in parts.elements) if found else parts.elements,
+        level=level.name,
+        status=status,
+        ignored=parts.ignored,
+        findings=in_order((*odd_products(model), *odd, *worked_out, *known)),
+    )
+
+
+def _statuses(model: Model, options: FloorOptions) -> tuple[Statuses | None, str]:
+    """What is built on the day of the options, and the digest of the schedule it is from."""
+    if options.date is None:
+        return None, ""
+    schedule = None
+    if options.schedule is not None:
+        schedule = read_timetable(options.schedule, options.schedule_columns)
+    tasks = schedule.tasks if schedule else {}
+    found = statuses(model, day=options.date, since=options.since, schedule=tasks)
+    return found, schedule.digest if schedule else ""
+
+
+def _as_of(item: Element, found: Statuses, options: FloorOptions) -> Element:
+    """An element as a target on the day: not while it is being built, unless told, nor once it was scanned.
+
+    What is being built stands in the way and may hide what is behind it.
+    """
+    guid = item.global_id or ""
+    begun = found.on.get(guid) == "in_progress" and options.in_progress != "target"
+    if not begun and guid not in found.standing and not (found.since and guid in found.without_task):
+        return item
+    return replace(item, target=False, to_scan=False)
+
+
+def odd_products(model: Model) -> list[Finding]:
+    """Products that could not be shaped, each by name."""
+    return [
+        *(Finding("no_geometry", f"{name} has no shape that can be made") for name in model.described.failed),
+        *(
+            Finding("kernel_crashed", f"{name} crashed the geometry kernel")
+            for name in model.described.crashed
+        ),
+    ]
+
+
+def _told(options: FloorOptions) -> dict[str, Any]:
+    names = ("scan_height", "robot_height", "in_progress")
+    return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+
+
+def drawn_on(
+    level: Level, model: Model, file: FloorFile, options: FloorOptions
+) -> tuple[list[Stroke], list[Word], list[Finding]]:
+    """A level as the strokes and words of a layered drawing, and what is odd about it."""
+    heights = Heights(options.scan_height or Heights.scan, options.robot_height)
+    solids = solids_on(level, model, heights)
+    walls = {item.product.global_id: item.region for item in solids if item.kind == "walls"}
+    doors = doors_on(level, model, walls)
+    rooms, findings = modelled_rooms(level, model, heights.scan)
+    floor, odd_floor = floor_area(level, model, rooms, solids, doors)
+    findings += odd_floor
+    if floor.is_empty:
+        raise InputError(
+            f"{file.path}: no floor at '{level.name}' ({level.z:+.2f} m): no slab, no rooms, no walls that "
+            "enclose any; choose another storey or --level"
+        )
+    if not rooms:
+        rooms = derived_rooms(floor, solids, doors)
+        findings.append(
+            Finding("rooms_derived", f"the model has no spaces there; {len(rooms)} rooms are worked out")
+        )
+    solids, odd_solids = _near_the_floor(solids, floor)
+    findings += [*odd_solids, *_unknown(solids)]
+    strokes = [
+        *_rings("FLOOR", floor),
+        *(ring for room in rooms for ring in _rings("ROOMS", room.region, room.global_id)),
+        *(ring for item in solids for ring in _rings(item.kind.upper(), item.region, item.product.global_id)),
+        *(Stroke(frozen(door.line), "DOORS", "doors", global_id=door.product.global_id) for door in doors),
+        *(Stroke(frozen(line), "PASSAGES", "passages") for line in passages(floor, rooms, solids, doors)),
+    ]
+    return strokes, _names(rooms), findings
+
+
+def _unknown(solids: list[Solid]) -> list[Finding]:
+    """Products without a class of their own: nobody knows what the laser makes of them."""
+    count = sum(item.kind == "other" for item in solids)
+    text = f"{count} IfcBuildingElementProxy stand in the robot's way, hide nothing and are not scanned"
+    return [Finding("proxies", text)] if count else []
+
+
+def _near_the_floor(solids: list[Solid], floor: Region) -> tuple[list[Solid], list[Finding]]:
+    """Without what stands beside the floor, such as on the roof of a lower wing."""
+    near = [item for item in solids if item.region.distance(floor) <= BESIDE]
+    if len(near) == len(solids):
+        return near, []
+    text = f"{len(solids) - len(near)} elements more than {BESIDE:g} m beside the floor are left out"
+    return near, [Finding("off_floor", text)]
+
+
+def _rings(layer: str, region: Region, global_id: str | None = None) -> list[Stroke]:
+    """The rings of a region: outer ones counter-clockwise, holes clockwise."""
+    found = []
+    for part in shapely.get_parts(shapely.orient_polygons(region)):
+        for ring in (part.exterior, *part.interiors):
+            points = np.round(shapely.get_coordinates(ring)[:-1] / 1e-4) * 1e-4
+            found.append(Stroke(frozen(points), layer, layer.lower(), closed=True, global_id=global_id))
+    return found
+
+
+def _names(rooms: list[Space]) -> list[Word]:
+    words = []
+    for room in rooms:
+        if room.name:
+            x, y = shapely.get_coordinates(room.region.point_on_surface())[0].tolist()
+            words.append(Word(room.name, "ROOMS", "rooms", ((x, y),)))
+    return words

@@ -1,0 +1,202 @@
+"""What is built on a day stands and is scanned, what is begun is in the way, what is to come is not there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import ifcopenshell.api.pset
+import ifcopenshell.api.sequence
+import pytest
+
+from mission.errors import InputError
+from mission.floor import FloorPlan, Rank
+from planner.floors.ifc.model import Task
+from planner.floors.ifc.status import status_on
+from tests.planner.floors.ifc.conftest import Read
+from tests.planner.floors.ifc.house import House, two_rooms
+
+WORK = {
+    "slab": ("2024-01-01", "2024-01-31"),
+    **{name: ("2024-02-01", "2024-02-28") for name in ("south", "north", "west", "east")},
+    "middle": ("2024-03-01", "2024-03-31"),
+    "column": ("2024-03-15", "2024-04-15"),
+    "door": ("2024-05-01", "2024-05-02"),
+}
+"""Start and finish of what is built; the window and the beam have no task."""
+
+
+def scheduled(house: House, work: dict[str, tuple[str, str]], *, assigned: str = "product") -> House:
+    """The house with an IfcTask for each of its things, related as IFC4 allows in two ways."""
+    schedule = ifcopenshell.api.sequence.add_work_schedule(house.model, name="work")
+    for name, (start, finish) in work.items():
+        task = ifcopenshell.api.sequence.add_task(house.model, work_schedule=schedule, name=f"build {name}")
+        time = ifcopenshell.api.sequence.add_task_time(house.model, task=task)
+        if assigned == "product":
+            ifcopenshell.api.sequence.assign_product(
+                house.model, relating_product=house.things[name], related_object=task
+            )
+        else:
+            ifcopenshell.api.sequence.assign_process(
+                house.model, relating_process=task, related_object=house.things[name]
+            )
+        time.ScheduleStart, time.ScheduleFinish = f"{start}T08:00:00", f"{finish}T17:00:00"
+    return house
+
+
+def targets(floor: FloorPlan, house: House) -> set[str]:
+    names = {thing.GlobalId: name for name, thing in house.things.items()}
+    return {names[item.global_id or ""] for item in floor.elements if item.target}
+
+
+def there(floor: FloorPlan, house: House) -> set[str]:
+    names = {thing.GlobalId: name for name, thing in house.things.items()}
+    return {names[item.global_id] for item in (*floor.elements, *floor.openings) if item.global_id}
+
+
+@pytest.mark.parametrize("assigned", ["product", "process"])
+def test_three_days_give_three_floors(read: Read, assigned: str) -> None:
+    house = scheduled(two_rooms(), WORK, assigned=assigned)
+    early, middle, late = (read(house, date=f"2024-0{month}-20") for month in (2, 3, 5))
+    assert dict(early.status) == {
+        "built": 3, "in_progress": 4, "not_started": 3, "removed": 0, "without_task": 2
+    }  # fmt: skip
+    assert there(early, house) == {"south", "north", "west", "east", "window", "beam"}
+    assert targets(early, house) == {"beam"}
+    assert (middle.status["built"], middle.status["in_progress"]) == (7, 2)
+    assert targets(middle, house) == {"south", "north", "west", "east", "beam"}
+    assert {item.kind for item in middle.openings} == {"passage"}  # the door is not hung yet
+    assert late.status["built"] == 10
+    assert {item.kind for item in late.openings} == {"door"}
+
+
+def test_what_is_begun_is_in_the_way_and_a_target_only_if_told(read: Read) -> None:
+    house = scheduled(two_rooms(), WORK)
+    (column,) = [item for item in read(house, date="2024-03-20").elements if item.kind == "columns"]
+    assert (column.obstacle, column.target) == (True, False)
+    assert "column" in targets(read(house, date="2024-03-20", in_progress="target"), house)
+
+
+def test_since_leaves_exactly_what_was_finished_after_that_day(read: Read) -> None:
+    house = scheduled(two_rooms(), WORK)
+    floor = read(house, date="2024-04-20", since="2024-02-28")
+    assert targets(floor, house) == {"middle", "column"}
+    assert {item.kind for item in floor.elements if item.occludes} >= {"walls", "columns"}
+    assert targets(floor.with_targets(("walls", "beams")), house) == {"middle"}
+    assert floor.status["built_before"] == 7
+
+
+def test_a_day_before_the_slab_has_no_floor(read: Read) -> None:
+    house = scheduled(two_rooms(), WORK)
+    said = r"date 2024-01-15: no floor at 'EG' on that day: slab \S+ 'slab' is in progress; choose a later"
+    with pytest.raises(InputError, match=said):
+        read(house, date="2024-01-15")
+
+
+def test_a_model_without_any_day_is_not_planned_for_one(read: Read) -> None:
+    with pytest.raises(InputError, match="no product of the model has a task or a day"):
+        read(two_rooms(), date="2024-01-15")
+
+
+def test_days_may_stand_in_properties(read: Read) -> None:
+    house = two_rooms()
+    for name, key in (("middle", "InstallationDate"), ("column", "Finish Date")):
+        made = ifcopenshell.api.pset.add_pset(house.model, product=house.things[name], name="Site")
+        ifcopenshell.api.pset.edit_pset(house.model, pset=made, properties={key: "2024-06-01"})
+    before = read(house, date="2024-05-31")
+    assert not there(before, house) & {"middle", "column"}
+    assert there(read(house, date="2024-06-01"), house) >= {"middle", "column"}
+    assert "no_task" in {item.code for item in before.findings}
+
+
+def test_ifc2x3_tells_days_by_schedule_time_controls(read: Read) -> None:
+    house = two_rooms("IFC2X3")
+    model = house.model
+    day = model.create_entity("IfcCalendarDate", DayComponent=1, MonthComponent=6, YearComponent=2024)
+    owner = model.by_type("IfcOwnerHistory")[0]
+    rooted: dict[str, Any] = {"OwnerHistory": owner}
+    works: dict[str, Any] = {}
+    task = model.create_entity("IfcTask", "1" * 22, **rooted, TaskId="1", IsMilestone=False)
+    time = model.create_entity(
+        "IfcScheduleTimeControl", "2" * 22, **rooted, ScheduleStart=day, ScheduleFinish=day
+    )
+    work = model.create_entity(
+        "IfcWorkSchedule", "3" * 22, **rooted, Identifier="w", CreationDate=day, StartTime=day
+    )
+    works |= {"RelatingControl": work, "TimeForTask": time}
+    model.create_entity(
+        "IfcRelAssignsTasks",
+        "4" * 22,
+        **rooted,
+        RelatedObjects=[task],
+        RelatingControl=work,
+        TimeForTask=time,
+    )
+    model.create_entity(
+        "IfcRelAssignsToProcess",
+        "5" * 22,
+        **rooted,
+        RelatedObjects=[house.things["column"]],
+        RelatingProcess=task,
+    )
+    assert "column" not in there(read(house, date="2024-05-31"), house)
+    assert "column" in there(read(house, date="2024-06-01"), house)
+
+
+def test_a_schedule_beside_the_model_names_products_by_global_id(read: Read, tmp_path: Path) -> None:
+    house, path = two_rooms(), tmp_path / "work.csv"
+    guid = house.things["column"].GlobalId
+    path.write_text(f"GUID;Task;Start;Finish\n{guid};cast;3-1-2024;28-2-2024\n;;;\n{guid};strip;;15-3-2024\n")
+    assert "column" not in there(read(house, date="2024-01-02", schedule=path), house)
+    half = read(house, date="2024-03-01", schedule=path)
+    assert (half.status["in_progress"], "column" in targets(half, house)) == (1, False)
+    done = read(house, date="2024-03-15", schedule=path)
+    assert "column" in targets(done, house)
+    assert done.source.options["schedule"] == half.source.options["schedule"]
+    assert done.source.basis != half.source.basis
+
+
+def test_a_schedule_of_another_model_is_told_as_a_warning(read: Read, tmp_path: Path) -> None:
+    path = tmp_path / "work.csv"
+    path.write_text("guid,finish\nsomewhere-else,2024-01-01\n")
+    floor = read(two_rooms(), date="2024-03-01", schedule=path)
+    (told,) = [item for item in floor.findings if item.code == "schedule_unrelated"]
+    assert told.rank == Rank.GRAVE
+    assert "none of the schedule's 1 GlobalIds is in the model" in told.message
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a,b\n1,2\n", "no column for the guid; say which with --schedule-column guid=NAME"),
+        ("guid,task\n1,2\n", "no column for the finish; say which with"),
+        ("guid,finish\nx,soon\n", "line 2: finish = 'soon' is no day; write days as YYYY-MM-DD"),
+        ("guid,finish\nx,31-13-2024\n", "line 2: finish = '31-13-2024' is no day"),
+        ("guid,finish\nx,3/4/2024\n", "'3/4/2024' may be day/month or month/day"),
+        ("guid,finish\n,2024-01-01\n", "no row has a GlobalId"),
+        ("", "is empty; give a CSV"),
+    ],
+)
+def test_a_schedule_that_cannot_be_used_is_refused_by_line(
+    text: str, said: str, read: Read, tmp_path: Path
+) -> None:
+    path = tmp_path / "work.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said):
+        read(two_rooms(), date="2024-03-01", schedule=path)
+
+
+def test_tasks_are_read_as_of_the_end_of_the_day() -> None:
+    build = Task("build", "2024-03-01", "2024-03-31")
+    assert status_on("2024-02-29", (build,)) == "not_started"
+    assert status_on("2024-03-01", (build,)) == "in_progress"
+    assert status_on("2024-03-31", (build,)) == "built"
+    assert status_on("2024-03-31", (build, Task("paint", "2024-05-01", "2024-05-02"))) == "in_progress"
+    assert status_on("2024-01-01", ()) == "built"
+
+
+def test_a_removal_ends_what_stands() -> None:
+    tear_down = Task("tear down", "2024-03-01", "2024-03-31", removes=True)
+    assert status_on("2024-02-01", (tear_down,)) == "built"
+    assert status_on("2024-03-02", (tear_down,)) == "in_progress"
+    assert status_on("2024-03-31", (tear_down,)) == "removed"
