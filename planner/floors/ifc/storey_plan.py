@@ -13,6 +13,7 @@ from mission.floor import Element, Finding, FloorPlan
 from mission.geometry import frozen
 from planner.floors.ifc.areas import Space, derived_rooms, floor_area, modelled_rooms
 from planner.floors.ifc.doors import doors_on
+from planner.floors.ifc.georeference import georeference_of
 from planner.floors.ifc.levels import Level
 from planner.floors.ifc.model import Model
 from planner.floors.ifc.passages import passages
@@ -41,6 +42,7 @@ def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions)
     strokes, words, worked_out = drawn_on(level, there, file, options)
     parts = parts_of(strokes, words, source=file.path, layers=())
     known = (item for item in parts.findings if item.code != "unknown_layer")
+    georeference, odd_place = georeference_of(model.described.place, level=level.z)
     told = {**_told(options), **({"schedule": digest} if digest else {})}
     return FloorPlan(
         name=" ".join(filter(None, (file.path.stem, level.name, options.date))),
@@ -50,9 +52,10 @@ def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions)
         openings=parts.openings,
         elements=tuple(_as_of(item, found, options) for item in parts.elements) if found else parts.elements,
         level=level.name,
+        georeference=georeference,
         status=status,
         ignored=parts.ignored,
-        findings=in_order((*odd_products(model), *odd, *worked_out, *known)),
+        findings=in_order((*odd_products(model), *odd, *odd_place, *worked_out, *known)),
     )
 
 
