@@ -36,6 +36,8 @@ class Parameter:
     least: float | None = None
     below: float | None = None
     most: float | None = None
+    farthest: float = FARTHEST
+    """What several numbers may be at most, either way."""
     why: str = ""
     """Why the limits are as they are, or an example."""
     undecided: str = "none"
@@ -104,7 +106,7 @@ class Parameter:
 
     def check(self, value: Any) -> None:
         """Refuse a value beyond the limits, naming the parameter and the value."""
-        limit = FARTHEST if isinstance(value, tuple) else LARGEST
+        limit = self.farthest if isinstance(value, tuple) else LARGEST
         for number in _numbers_in(value):
             if not math.isfinite(number) or abs(number) > limit:
                 raise InputError(f"{self.name} = {number}: must be a finite number below {limit:g}")

@@ -22,8 +22,8 @@ from mission.parameter import Parameter, words
 
 LEAST_SHARE = 0.7
 """Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""
-LAYER_ROLES = ("floor", "rooms", "doors", "passages", *KINDS, "ignore")
-"""What a layer of a drawing can stand for."""
+LAYER_ROLES = ("floor", "rooms", "names", "doors", "openings", "passages", *KINDS, "furniture", "ignore")
+"""What a layer of a drawing can stand for; names are of rooms, openings are doors and windows alike."""
 
 _floor, _plan, _robot, _scanner, _policy = (
     partial(Parameter, table) for table in ("floor", "plan", "robot", "scanner", "policy")
@@ -65,6 +65,30 @@ class Settings:
     in_progress: Annotated[
         Literal["obstacle", "target"] | None,
         _floor("What is being built: in the way only, or scanned too", undecided="obstacle"),
+    ] = None
+    units: Annotated[
+        str | None, _floor("A drawing's unit, such as mm, m or inch", undecided="as it fits walls and doors")
+    ] = None
+    drawing: Annotated[
+        int | None, _floor("Which of several drawings in a file, from 1", least=1, undecided="its only plan")
+    ] = None
+    region: Annotated[
+        tuple[float, float, float, float] | None,
+        _floor(
+            "The part of a drawing to read, in its own unit",
+            undecided="all",
+            form="X0,Y0,X1,Y1",
+            example="0,0,30,20",
+            farthest=1e12,
+        ),
+    ] = None
+    layer_map: Annotated[
+        str | None,
+        _floor(
+            "File of stopgo floors --write-map: what layers stand for",
+            option="layers",
+            undecided="by their names",
+        ),
     ] = None
     candidates: Annotated[str, _plan("grid, triangulation, or module:function")] = "grid"
     visibility: Annotated[str, _plan("exact or bresenham")] = "exact"
@@ -310,6 +334,7 @@ def check_settings(settings: Settings) -> None:
     _check_together(settings)
     _check_days(settings)
     _check_lists(settings)
+    _check_region(settings)
 
 
 def _check_together(settings: Settings) -> None:
@@ -365,6 +390,15 @@ def _check_lists(settings: Settings) -> None:
         raise InputError(f"targets is empty; known: {', '.join(KINDS)}")
     if settings.origin is not None and not (abs(settings.origin[0]) <= 90 and abs(settings.origin[1]) <= 180):
         raise InputError(f"origin = {settings.origin}: latitude must be within ±90, longitude ±180")
+
+
+def _check_region(settings: Settings) -> None:
+    if settings.region is None:
+        return
+    x0, y0, x1, y1 = settings.region
+    if not (x0 < x1 and y0 < y1):
+        told = _shown(settings.region)
+        raise InputError(f"region = {told}: the second corner must lie right of and above the first")
 
 
 def settings_toml(settings: Settings) -> str:

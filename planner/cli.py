@@ -42,7 +42,9 @@ def add_commands(app: typer.Typer) -> None:
 def plan_command(
     floor: Annotated[
         Path | None,
-        typer.Argument(help="The floor: a layered .dxf; an .ifc or .ifczip.", show_default=False),
+        typer.Argument(
+            help="The floor: a .dxf, layered or as drawn; an .ifc or .ifczip.", show_default=False
+        ),
     ] = None,
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")] = Path(),
     parameters: Annotated[

@@ -26,24 +26,34 @@ def floors_command(
     file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf, an .ifc or an .ifczip.")],
     *,
     svg: Annotated[Path | None, typer.Option(help="Draw what was read, and what was left out.")] = None,
+    write_map: Annotated[
+        Path | None, typer.Option(help="Write what each layer was taken for, to be corrected.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
     **given: Any,
 ) -> int:
-    """Tell what a file holds that a plan can be made of, what it was taken for, and what is odd about it."""
+    """Tell what a file holds that a plan can be made of, what it was taken for, and what is odd about it.
+
+    Exit code 1: no floor can be made of it as it is; the last line says why, and the way out.
+    """
+    from mission.files.atomic import write_atomic
     from mission.settings import read_settings
     from mission.table import printable_lines
     from planner.floors import options_of, survey_floor
+    from planner.floors.layer_map import layer_map
     from planner.options import values_of
 
     options = options_of(read_settings(None, values_of(given)))
     found = survey_floor(file, options)
     if svg is not None:
         _draw(svg, file, found, options)
+    if write_map is not None:
+        write_atomic(write_map, layer_map(found).encode("utf-8"))
     if as_json:
         typer.echo(json.dumps(found.as_json(), ensure_ascii=False))
     else:
         typer.echo(printable_lines("\n".join(survey_lines(found))))
-    return 0
+    return 0 if found.refusal is None else 1
 
 
 def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:
@@ -53,7 +63,11 @@ def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:
     from mission.files.atomic import write_atomic
     from mission.files.floor_svg import floor_svg
     from planner.floors import read_floor
+    from planner.floors.survey_picture import survey_svg
 
+    if found.lines:
+        write_atomic(out, survey_svg(found.lines, found.floor, title=found.file))
+        return
     names = [item.name for item in found.floors if not item.aside]
     if any(item.chosen for item in found.floors) or not names:
         floors = [read_floor(file, options)]
@@ -74,6 +88,7 @@ def survey_lines(found: Survey) -> list[str]:
         *(f"  inferred    {text}" for text in found.inferred),
         *(f"  left out    {text}" for text in found.ignored),
         *finding_lines(found.findings),
+        *([f"  no floor    {found.refusal}"] if found.refusal else []),
     ]
 
 

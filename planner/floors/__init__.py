@@ -16,6 +16,7 @@ from mission.floor import FloorPlan
 from mission.plugins import Variant
 from mission.settings import FLOOR_PARAMETERS, Settings
 from planner.floors.foreign import foreign_readers, sound
+from planner.floors.layer_map import read_layer_map
 from planner.floors.reader import FloorFile, FloorOptions, Reader
 from planner.floors.survey import Survey
 
@@ -25,7 +26,7 @@ READERS: tuple[Reader, ...] = (
         suffixes=(".dxf",),
         holds=lambda data: data.startswith(b"AutoCAD Binary DXF") or b"\nSECTION" in data[:4096],
         module="planner.floors.dxf",
-        takes=frozenset({"layers"}),
+        takes=frozenset({"layers", "layer_map", "drawing", "region", "units"}),
     ),
     Reader(
         kind="building model",
@@ -81,6 +82,7 @@ def options_of(settings: Settings) -> FloorOptions:
     told = {name: getattr(settings, name) for name in FLOOR_PARAMETERS}
     columns = (entry.partition("=") for entry in told.pop("schedule_columns"))
     schedule = told.pop("schedule")
+    told["layer_map"] = read_layer_map(Path(settings.layer_map)) if settings.layer_map else {}
     return FloorOptions(
         d_dis=settings.d_dis,
         layers=settings.layer_roles,
@@ -123,7 +125,9 @@ def _reader_of(file: FloorFile) -> Variant[Reader]:
 
 def _option(name: str) -> str:
     """How the command line calls an option."""
-    return {"layers": "layer", "schedule_columns": "schedule-column"}.get(name, name.replace("_", "-"))
+    return {"layers": "layer", "layer_map": "layers", "schedule_columns": "schedule-column"}.get(
+        name, name.replace("_", "-")
+    )
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -55,9 +55,13 @@ METRES: dict[int, tuple[str, float]] = {
 
 _LIKELY = (6, 4, 5, 1, 2)
 _LIKELY_IMPERIAL = (1, 2, 6, 4, 5)
+Limits = tuple[float, float]
+"""Least and greatest, in metres."""
+
 _FLOOR_EXTENT = (3.0, 400.0)
 _HEADER_EXTENT = (1.0, 2000.0)
 _DOOR_WIDTH = (0.4, 4.0)
+_LEAF_WIDTH = (0.5, 1.7)
 
 
 def open_drawing(data: bytes, *, source: Path) -> tuple[Drawing, list[Finding]]:
@@ -150,7 +154,7 @@ def legible(text: str, *, most: int = 120) -> str:
 
 
 def metres_per_unit(
-    drawing: Drawing, *, floor: FloatArray, doors: Sequence[float]
+    drawing: Drawing, *, floor: FloatArray, doors: Sequence[float], leaves: bool = False
 ) -> tuple[float, list[Finding]]:
     """Length of one drawing unit, from the header unless the floor's size contradicts it.
 
@@ -160,20 +164,53 @@ def metres_per_unit(
         Points of the layer FLOOR in drawing units.
     doors
         Lengths of the lines across openings in drawing units.
+    leaves
+        Whether these are the widths of single leaves, which say more.
     """
+    widths = _LEAF_WIDTH if leaves else _DOOR_WIDTH
     extent = float(np.ptp(floor, axis=0).max()) if len(floor) else 0.0
     door = float(np.median(doors)) if len(doors) else None
     code = _header_integer(drawing, "$INSUNITS")
     named = METRES.get(code)
-    if named and _fits_header(extent * named[1], door and door * named[1]):
+    if named and _fits_header(extent * named[1], door and door * named[1], widths):
         return named[1], []
     likely = _LIKELY_IMPERIAL if _header_integer(drawing, "$MEASUREMENT", 1) == 0 else _LIKELY
     fitting = [
-        METRES[item] for item in likely if _fits(extent * METRES[item][1], door and door * METRES[item][1])
+        METRES[item]
+        for item in likely
+        if _fits(extent * METRES[item][1], door and door * METRES[item][1], widths)
     ]
     if not fitting:
         return _as_written(named, extent=extent)
     return _as_measured(named, fitting[0], code=code, extent=extent)
+
+
+def told_unit(name: str, extent: FloatArray, *, source: Path) -> tuple[float, list[Finding]]:
+    """Length of a unit that a person names, such as `mm`.
+
+    Raises
+    ------
+    InputError
+        When there is no such unit, or it makes no building of what is drawn.
+    """
+    code = _NAMED.get(name.strip().lower())
+    if code is None:
+        raise InputError(f"{source}: --units {legible(name)}: no such unit; known: {', '.join(_NAMED)}")
+    word, factor = METRES[code]
+    size = float(np.ptp(extent, axis=0).max()) * factor if len(extent) else None
+    if size is not None and not _HEADER_EXTENT[0] <= size <= _HEADER_EXTENT[1]:
+        raise InputError(
+            f"{source}: --units {legible(name)} makes the drawing {size:.4g} m across; name another unit, "
+            "or leave it out and stopgo looks at doors and walls"
+        )
+    return factor, [Finding("units_as_told", f"one unit is a {word}, as told")]
+
+
+_NAMED = {
+    **{"mm": 4, "cm": 5, "dm": 14, "m": 6, "km": 7, "in": 1, "ft": 2, "yd": 10},
+    **{name: code for code, (name, _) in METRES.items()},
+}
+"""How a unit may be named, and its $INSUNITS code."""
 
 
 def _header_integer(drawing: Drawing, name: str, default: int = 0) -> int:
@@ -181,14 +218,14 @@ def _header_integer(drawing: Drawing, name: str, default: int = 0) -> int:
     return int(value) if isinstance(value, int | float) and math.isfinite(value) else default
 
 
-def _fits(extent: float, door: float | None, limits: tuple[float, float] = _FLOOR_EXTENT) -> bool:
-    door_fits = door is None or _DOOR_WIDTH[0] <= door <= _DOOR_WIDTH[1]
+def _fits(extent: float, door: float | None, widths: Limits, limits: Limits = _FLOOR_EXTENT) -> bool:
+    door_fits = door is None or widths[0] <= door <= widths[1]
     return door_fits and limits[0] <= extent <= limits[1]
 
 
-def _fits_header(extent: float, door: float | None) -> bool:
+def _fits_header(extent: float, door: float | None, widths: Limits) -> bool:
     """The header is believed for a rather small or large floor too, if doors of usual width bear it out."""
-    return _fits(extent, door) or (door is not None and _fits(extent, door, _HEADER_EXTENT))
+    return _fits(extent, door, widths) or (door is not None and _fits(extent, door, widths, _HEADER_EXTENT))
 
 
 def _as_written(named: tuple[str, float] | None, *, extent: float) -> tuple[float, list[Finding]]:

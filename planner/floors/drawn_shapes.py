@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,18 +16,9 @@ from ezdxf.xclip import XClip
 
 from mission.errors import InputError
 from mission.floor import Finding
-from mission.kinds import KINDS
 from planner.floors.drawing import BROKEN_INPUT, legible
-
-ROLES: dict[str, str] = {
-    "FLOOR": "floor",
-    "ROOMS": "rooms",
-    "DOORS": "doors",
-    "PASSAGES": "passages",
-    **{kind.upper(): kind for kind in KINDS if kind != "other"},
-}
-"""What the shapes of a layer are; a layer that is not here is `other`."""
-IGNORE = "ignore"
+from planner.floors.layer_names import LayerReading
+from planner.floors.layers import IGNORE, ROLES, Layers
 
 _PREFIX = re.compile(r"^.*(\$\d+\$|\|)")
 _NOT_DRAWN = {"ATTDEF", "VIEWPORT", "SEQEND", "POINT", "WIPEOUT", "XLINE", "RAY"}
@@ -50,6 +41,8 @@ class Shape:
     role: str
     matrix: Matrix44 | None = None
     global_id: str | None = None
+    why: str = ""
+    """What says that it has this role."""
 
     @property
     def is_text(self) -> bool:
@@ -84,31 +77,43 @@ class _Placement:
 
 
 def shapes_of(
-    drawing: Drawing, *, source: Path, layers: Mapping[str, str] | None = None
+    drawing: Drawing, *, source: Path, layers: Layers | None = None
 ) -> tuple[list[Shape], list[Finding]]:
     """All shapes of the model space, and a finding for each hidden layer and each thing not followed.
 
-    `layers` says what layers of other names stand for; those to ignore are left out.
+    Shapes of layers to ignore are left out.
 
     Content of a block on layer 0 lies on its insert's layer. A hidden layer counts only if its name is known.
     """
-    walk = _Walk(drawing, source=source, layers=layers or {})
+    walk = _Walk(drawing, source=source, layers=layers or Layers())
     shapes = list(walk.through(drawing.modelspace(), _Placement()))
     return shapes, walk.findings()
+
+
+def ignored_in(drawing: Drawing, *, source: Path, layers: Layers) -> list[tuple[str, LayerReading, int]]:
+    """Each layer to ignore with what says so, and how many entities it holds."""
+    walk = _Walk(drawing, source=source, layers=layers)
+    for _ in walk.through(drawing.modelspace(), _Placement()):
+        pass
+    return [(layer, reading, count) for (layer, reading), count in sorted(walk.left_out.items(), key=str)]
+
+
+_BUILT = frozenset({*ROLES.values(), "openings"})
+"""Roles for which a layer that is hidden counts all the same."""
 
 
 class _Walk:
     """One pass over a drawing, with what it met on the way."""
 
-    def __init__(self, drawing: Drawing, *, source: Path, layers: Mapping[str, str]) -> None:
+    def __init__(self, drawing: Drawing, *, source: Path, layers: Layers) -> None:
         self._source = source
         self._met = 0
         self._hidden = {layer.dxf.name.upper(): layer.is_frozen() for layer in _hidden_layers(drawing)}
-        self._roles = {**ROLES, **layers}
-        self._told = set(layers)
+        self._layers = layers
         self._as_told: Counter[tuple[str, str]] = Counter()
         self._used: Counter[str] = Counter()
         self._odd: Counter[tuple[str, str]] = Counter()
+        self.left_out: Counter[tuple[str, LayerReading]] = Counter()
 
     def through(self, entities: Iterable[DXFEntity], placed: _Placement) -> Iterator[Shape]:
         for entity in entities:
@@ -169,22 +174,24 @@ class _Walk:
     def _shape(self, entity: DXFEntity, placed: _Placement) -> Iterator[Shape]:
         layer = _layer(entity, placed)
         plain = legible(_PREFIX.sub("", layer))
-        role = self._role(plain)
-        if role == IGNORE or plain.upper() == "DEFPOINTS":
+        reading = self._reading(plain, placed.blocks)
+        if reading.role == IGNORE or plain.upper() == "DEFPOINTS":
+            self.left_out[plain, reading] += 1
             return
         if placed.frozen or layer.upper() in self._hidden:
-            if role == "other":
+            if reading.role not in _BUILT:
+                self.left_out[plain, LayerReading(reading.role, "frozen or off")] += 1
                 return
             self._used[layer] += 1
         global_id = _global_id(entity) or placed.global_id
-        yield Shape(entity, plain, role, matrix=placed.matrix, global_id=global_id)
+        yield Shape(entity, plain, reading.role, placed.matrix, global_id, reading.why)
 
-    def _role(self, layer: str) -> str:
+    def _reading(self, layer: str, blocks: tuple[str, ...]) -> LayerReading:
         """What a layer stands for, and that the user has said so."""
-        role = self._roles.get(layer.upper(), "other")
-        if layer.upper() in self._told:
-            self._as_told[layer, role] += 1
-        return role
+        reading = self._layers.reading(layer, blocks)
+        if layer.upper() in self._layers.told:
+            self._as_told[layer, reading.role] += 1
+        return reading
 
     def findings(self) -> list[Finding]:
         told = [
@@ -201,7 +208,7 @@ class _Walk:
 
     def _absent(self) -> list[Finding]:
         """Layers that the user names and the drawing does not have."""
-        absent = self._told - {layer.upper() for layer, _ in self._as_told}
+        absent = set(self._layers.told) - {layer.upper() for layer, _ in self._as_told}
         return [
             Finding("no_such_layer", f"layer {legible(name)} is not in the drawing")
             for name in sorted(absent)

@@ -1,27 +1,29 @@
-"""Reads a layered DXF: one floor, its layers named FLOOR, ROOMS, WALLS and so on.
+"""Reads a DXF: one floor, on layers named FLOOR, ROOMS, WALLS and so on, or as an architect drew it.
 
 The bytes become a drawing, the drawing shapes on layers, these strokes in metres, the strokes a floor plan.
+What no layer shows is derived from the line work.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 from ezdxf.document import Drawing
 
+from mission.errors import InputError
 from mission.floor import Finding, FloorPlan
 from mission.floor_source import FloorSource
 from mission.geometry import bounds
-from planner.floors.drawing import metres_per_unit, open_drawing
-from planner.floors.drawn_shapes import Shape, shapes_of
+from planner.floors.drawing import METRES, open_drawing
+from planner.floors.drawn_shapes import ignored_in
+from planner.floors.dxf_sheet import DxfSheet, drawings_told, sheet_of
+from planner.floors.linework import Derived, completed, derived
 from planner.floors.parts import in_order, parts_of
 from planner.floors.reader import FloorFile, FloorOptions
-from planner.floors.strokes import sketch, strokes_of
-from planner.floors.survey import FloorChoice, LayerUse, Survey
+from planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine
 
 
 def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
@@ -30,27 +32,165 @@ def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
     Raises
     ------
     InputError
-        When the bytes are no complete DXF, or no closed outline lies on layer FLOOR.
+        When the bytes are no complete DXF, when they show no floor, or several and none is chosen.
     """
     drawing, odd_file = open_drawing(file.data, source=file.path)
-    floor = floor_in(
-        drawing, source=file.path, digest=file.digest, d_dis=options.d_dis, layers=options.layers
-    )
+    sheet = sheet_of(drawing, options, source=file.path)
+    floor = _floor_of(sheet, file.path, _source(file, options))
     return replace(floor, findings=in_order((*odd_file, *floor.findings)))
 
 
+def _source(file: FloorFile, options: FloorOptions) -> FloorSource:
+    more = {"layer_map": dict(sorted(options.layer_map.items()))} if options.layer_map else {}
+    return file.source(drawing=options.drawing, region=options.region, units=options.units, options=more)
+
+
+def floor_in(drawing: Drawing, *, source: Path, digest: str, d_dis: float) -> FloorPlan:
+    """The floor drawn in the model space of a drawing, whatever file it is from."""
+    sheet = sheet_of(drawing, FloorOptions(d_dis=d_dis), source=source)
+    return _floor_of(sheet, source, FloorSource(source.name, digest))
+
+
+def _floor_of(sheet: DxfSheet, path: Path, source: FloorSource) -> FloorPlan:
+    made = _derived(sheet, path)
+    parts = parts_of(
+        made.strokes,
+        made.words,
+        source=path,
+        layers=[shape.layer for shape in sheet.shapes],
+        known=_known(sheet),
+        skipped=_skipped(sheet.findings),
+    )
+    return FloorPlan(
+        name=path.stem,
+        source=source,
+        outline=parts.outline,
+        rooms=parts.rooms,
+        openings=parts.openings,
+        elements=parts.elements,
+        ignored=parts.ignored,
+        findings=in_order((*sheet.findings, *made.findings, *parts.findings)),
+    )
+
+
+def _derived(sheet: DxfSheet, path: Path) -> Derived:
+    """Strokes and words of a layered drawing, whatever kind of drawing it is."""
+    if sheet.layered:
+        return Derived(sheet.strokes, sheet.words, [])
+    roles = {stroke.role for stroke in sheet.strokes}
+    if not sheet.outlined and "walls" not in roles:
+        raise InputError(f"{path}: {_no_walls(sheet)}")
+    if sheet.outlined:
+        return completed(sheet.strokes, sheet.words)
+    if len(sheet.drawings) > 1 and sheet.chosen is None:
+        count = len(sheet.drawings)
+        told = drawings_told(sheet.drawings)
+        raise InputError(f"{path}: {count} drawings side by side, choose one with --drawing N{told}")
+    made = derived(sheet.strokes, sheet.words)
+    if made.cells >= _PATTERN:
+        raise InputError(
+            f"{path}: what was taken for walls encloses {made.cells} cells smaller than a room: that is a "
+            "pattern, no walls; put the walls on a layer of their own, or ask for such an export"
+        )
+    if not any(stroke.role == "floor" for stroke in made.strokes):
+        walls = _listed(sorted({stroke.layer for stroke in sheet.strokes if stroke.role == "walls"}))
+        raise InputError(
+            f"{path}: the walls on {walls} enclose no floor; draw its outline on a layer FLOOR, "
+            "close the walls, or say which layer holds more of them (--layer NAME=walls)"
+        )
+    return made
+
+
+_PATTERN = 150
+"""So many small cells among the lines of walls are a pattern of tiles or a hatch."""
+
+
+def _no_walls(sheet: DxfSheet) -> str:
+    """Why nothing can be made of a drawing in which no layer is known, and the way out."""
+    layers = sorted({shape.layer for shape in sheet.shapes}, key=str.casefold)
+    why = (
+        f"no closed outline on layer FLOOR, and no layer that shows walls; layers present: {_listed(layers)}"
+    )
+    if len(layers) < 2:
+        return f"{why} (nothing tells walls from other lines; ask for an export with layers)"
+    return f"{why} (say which one holds the walls, such as --layer {layers[0]}=walls)"
+
+
+def _listed(names: Sequence[str], *, most: int = 20) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return (", ".join(names[:most]) or "none") + more
+
+
+def _known(sheet: DxfSheet) -> frozenset[str]:
+    """Layers of which it is known what they are, though it is no kind of element."""
+    return frozenset(
+        shape.layer for shape in sheet.shapes if shape.role in ("furniture", "names", "openings")
+    )
+
+
+def metres_in(drawing: Drawing, *, source: Path) -> float:
+    """Length of one drawing unit in metres, as `read` takes it: what is drawn over a floor needs it."""
+    return sheet_of(drawing, FloorOptions(), source=source).scale
+
+
 def survey(file: FloorFile, options: FloorOptions) -> Survey:
-    """What a layered DXF holds: one floor, and what each of its layers stands for."""
+    """What a DXF holds: its drawings, what each layer stands for, what was worked out and what left out."""
     drawing, _ = open_drawing(file.data, source=file.path)
-    floor = read(file, options)
+    sheet = sheet_of(drawing, options, source=file.path)
+    try:
+        floor, refusal = read(file, options), None
+    except InputError as error:
+        floor, refusal = None, str(error)
     return Survey(
         file=file.path.name,
         kind=f"DXF drawing, {drawing.dxfversion}",
         digest=file.digest,
-        floors=(_choice(floor),),
-        layers=_layers(drawing, source=file.path, told=options.layers),
-        findings=floor.findings,
+        units=_unit(sheet),
+        floors=tuple(_choices(sheet, floor)),
+        layers=tuple(_layers(drawing, sheet, file.path)),
+        inferred=_told(floor, "inferred_"),
+        ignored=_told(floor, "not_a_wall"),
+        findings=tuple(
+            item for item in (floor or sheet).findings if not item.code.startswith(_TOLD_ELSEWHERE)
+        ),
+        lines=tuple(SurveyLine(item.points, item.role not in _LEFT, item.closed) for item in sheet.strokes),
+        floor=floor,
+        refusal=refusal,
     )
+
+
+def _unit(sheet: DxfSheet) -> str:
+    """The unit's name and what says so."""
+    name = next((word for word, factor in METRES.values() if factor == sheet.scale), f"{sheet.scale:g} m")
+    why = next((item.message for item in sheet.findings if item.code.startswith("units_")), "")
+    return f"{name} ({why})" if why else f"{name}, as the header says"
+
+
+_LEFT = ("other", "ignore")
+_TOLD_ELSEWHERE = ("inferred_", "layer_", "units_", "drawings_found", "not_a_wall")
+"""Codes of findings that a survey tells in lines of their own."""
+
+
+def _told(floor: FloorPlan | None, code: str) -> tuple[str, ...]:
+    findings = floor.findings if floor else ()
+    return tuple(item.message for item in findings if item.code.startswith(code))
+
+
+def _not_told(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    return tuple(item for item in findings if not item.code.startswith(_TOLD_ELSEWHERE))
+
+
+def _choices(sheet: DxfSheet, floor: FloorPlan | None) -> Iterable[FloorChoice]:
+    """The drawings side by side, or the one floor there is."""
+    if floor is not None and len(sheet.drawings) < 2:
+        yield _choice(floor)
+        return
+    for number, item in enumerate(sheet.drawings, start=1):
+        option = f"--drawing {number}" if len(sheet.drawings) > 1 else ""
+        if floor is not None and item is sheet.chosen:
+            yield replace(_choice(floor), name=f"drawing {number}", option=option, notes=(item.told,))
+        else:
+            yield FloorChoice(f"drawing {number}", option, bounds=item.box, notes=(item.told,))
 
 
 def _choice(floor: FloorPlan) -> FloorChoice:
@@ -65,51 +205,14 @@ def _choice(floor: FloorPlan) -> FloorChoice:
     )
 
 
-def _layers(drawing: Drawing, *, source: Path, told: Mapping[str, str]) -> tuple[LayerUse, ...]:
+def _layers(drawing: Drawing, sheet: DxfSheet, source: Path) -> Iterable[LayerUse]:
     """What each layer that holds anything was taken for."""
-    shapes, _ = shapes_of(drawing, source=source, layers=told)
-    counts = Counter((shape.layer, shape.role) for shape in shapes)
-    return tuple(
-        LayerUse(layer, role, "as told" if layer.upper() in told else "its name", taken=count)
-        if role != "other"
-        else LayerUse(layer, role, "no known name", ignored=count)
-        for (layer, role), count in sorted(counts.items())
-    )
-
-
-def floor_in(
-    drawing: Drawing, *, source: Path, digest: str, d_dis: float, layers: Mapping[str, str] | None = None
-) -> FloorPlan:
-    """The floor drawn in the model space of a drawing, whatever file it is from."""
-    shapes, odd_shapes = shapes_of(drawing, source=source, layers=layers or {})
-    scale, odd_units = _scale(drawing, shapes)
-    strokes, words, odd_strokes = strokes_of(shapes, scale=scale, chord=d_dis)
-    present = [shape.layer for shape in shapes]
-    parts = parts_of(strokes, words, source=source, layers=present, skipped=_skipped(odd_strokes))
-    return FloorPlan(
-        name=source.stem,
-        source=FloorSource(source.name, digest),
-        outline=parts.outline,
-        rooms=parts.rooms,
-        openings=parts.openings,
-        elements=parts.elements,
-        ignored=parts.ignored,
-        findings=in_order((*odd_units, *odd_shapes, *odd_strokes, *parts.findings)),
-    )
-
-
-def metres_in(drawing: Drawing, *, source: Path) -> float:
-    """Length of one drawing unit in metres, as `read` takes it: what is drawn over a floor needs it."""
-    shapes, _ = shapes_of(drawing, source=source)
-    return _scale(drawing, shapes)[0]
-
-
-def _scale(drawing: Drawing, shapes: Sequence[Shape]) -> tuple[float, list[Finding]]:
-    floor = sketch(shape for shape in shapes if shape.role == "floor" and not shape.is_text)
-    doors = sketch(shape for shape in shapes if shape.role == "doors" and shape.entity.dxftype() == "LINE")
-    widths = [float(np.hypot(*(line[-1] - line[0]))) for line in doors]
-    points = np.vstack(floor) if floor else np.empty((0, 2))
-    return metres_per_unit(drawing, floor=points, doors=[width for width in widths if width > 0])
+    counts = Counter((shape.layer, shape.role, shape.why) for shape in sheet.shapes)
+    for (layer, role, why), count in sorted(counts.items()):
+        known = role != "other"
+        yield LayerUse(layer, role, why, taken=count if known else 0, ignored=0 if known else count)
+    for layer, reading, count in ignored_in(drawing, source=source, layers=sheet.layers):
+        yield LayerUse(layer, reading.role, reading.why, ignored=count)
 
 
 def _skipped(findings: Sequence[Finding]) -> str:

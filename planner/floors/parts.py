@@ -37,6 +37,7 @@ def parts_of(
     *,
     source: Path,
     layers: Iterable[str],
+    known: frozenset[str] = frozenset(),
     skipped: str = "",
 ) -> FloorParts:
     """The parts that strokes and words on the known layers draw.
@@ -47,7 +48,7 @@ def parts_of(
         When nothing on layer FLOOR is closed; it names the `layers` that are present and what was `skipped`.
     """
     on = _drawn_by_role(strokes)
-    outline, odd_outline = _outline(on["floor"])
+    outline, odd_outline = outline_of(on["floor"])
     if outline.is_empty:
         why = f"{_why_no_outline(on['floor'])}{skipped}; layers present: {_listed(layers)}"
         raise InputError(f"{source}: {why} (draw the outline there as a closed polyline)")
@@ -55,7 +56,7 @@ def parts_of(
     openings, odd_openings = openings_of(doors=on["doors"], passages=on["passages"])
     elements, left_out, odd_elements = elements_of(on, outline=outline, rooms=rooms)
     ignored = (*left_out, *(IgnoredLine(line.layer, line.points) for line in on["other"].open))
-    odd_layers = [*_unknown_layers(on["other"], words), *_dropped(on)]
+    odd_layers = [*_unknown_layers(on["other"], words, known), *_dropped(on)]
     findings = (*odd_outline, *odd_rooms, *odd_openings, *odd_elements, *odd_layers)
     return FloorParts(canonical_region(outline), rooms, openings, elements, ignored, findings)
 
@@ -70,7 +71,7 @@ def _drawn_by_role(strokes: Iterable[Stroke]) -> defaultdict[str, Drawn]:
     return on
 
 
-def _outline(floor: Drawn) -> tuple[Region, list[Finding]]:
+def outline_of(floor: Drawn) -> tuple[Region, list[Finding]]:
     """The region on layer FLOOR: rings in rings are holes, parts that overlap or nearly touch are one."""
     faces, findings = outline_faces(floor.open, layer="FLOOR", merge=True)
     rings = (*floor.closed, *faces)
@@ -100,7 +101,7 @@ def _word_key(word: Word) -> tuple:
     return (word.at, word.text)
 
 
-def _unknown_layers(other: Drawn, words: Iterable[Word]) -> list[Finding]:
+def _unknown_layers(other: Drawn, words: Iterable[Word], known: frozenset[str]) -> list[Finding]:
     closed = Counter(shape.layer for shape in other.closed)
     lines = Counter(line.layer for line in other.open)
     texts = Counter(word.layer for word in words if word.role == "other")
@@ -111,7 +112,7 @@ def _unknown_layers(other: Drawn, words: Iterable[Word]) -> list[Finding]:
             f"{lines[layer]} open lines and {texts[layer]} texts or dimensions are ignored "
             f"(--layer {layer}=KIND says what it is)",
         )
-        for layer in sorted({*closed, *lines, *texts})
+        for layer in sorted({*closed, *lines, *texts} - known)
     ]
 
 

@@ -41,6 +41,8 @@ class FloorOptions:
     """Curves are cut by Eq. 1 for units of this length in metres; every reader takes it."""
     layers: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     """What layers of other names stand for: names in capitals, kinds as in LAYER_ROLES."""
+    layer_map: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    """The same, from a file that `stopgo floors --write-map` wrote."""
     drawing: int | None = None
     """Number of the drawing, of several in one model space, from 1."""
     region: tuple[float, float, float, float] | None = None

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from mission.floor import Finding
+from mission.floor import Finding, FloorPlan
+from mission.geometry import FloatArray
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,16 @@ class LayerUse:
     """Entities that were not."""
 
 
+@dataclass(frozen=True, eq=False)
+class SurveyLine:
+    """A line of a drawing, for a picture of what was taken and what was ignored."""
+
+    points: FloatArray
+    """(n, 2) in metres."""
+    taken: bool
+    closed: bool = False
+
+
 @dataclass(frozen=True)
 class Survey:
     """What is in a floor's file, told before anybody plans."""
@@ -63,6 +74,12 @@ class Survey:
     ignored: tuple[str, ...] = ()
     """What is in the file and was left out, one sentence each."""
     findings: tuple[Finding, ...] = ()
+    lines: tuple[SurveyLine, ...] = ()
+    """What is drawn, where the file is a drawing …"""
+    floor: FloorPlan | None = None
+    """… and the floor that was made of it; none where that cannot be done."""
+    refusal: str | None = None
+    """Why no floor can be made of it with these options, and the way out."""
 
     def as_json(self) -> dict[str, Any]:
         """The object that `stopgo floors --json` prints."""
@@ -72,6 +89,7 @@ class Survey:
             "digest": self.digest,
             "units": self.units,
             "floors": [_as_json(item) for item in self.floors],
+            "refusal": self.refusal,
             "layers": [dict(vars(item)) for item in self.layers],
             "inferred": list(self.inferred),
             "ignored": list(self.ignored),

@@ -32,6 +32,11 @@ OTHER: dict[str, Any] = {
     "coverage": 0.8,
     "fov": 180.0,
     "battery_min": 0.2,
+    "drawing": 2,
+    "region": (0.0, 0.0, 30.0, 20.0),
+    "level": 3.2,
+    "scan_height": 1.5,
+    "robot_height": 1.8,
 }
 
 
@@ -127,7 +132,7 @@ def test_a_refusal_says_what_would_be_right(name: str) -> None:
 
 
 def test_a_parameter_that_is_none_is_named() -> None:
-    with pytest.raises(InputError, match=r"^colour: no such parameter; known: candidates, "):
+    with pytest.raises(InputError, match=r"^colour: no such parameter; known: storey, "):
         stopgo.settings(colour="red")
 
 

@@ -139,12 +139,13 @@ def test_damaged_bytes_never_end_in_a_traceback(tmp_path: Path, at: int, span: i
 
 def test_the_layers_that_are_present_are_named(tmp_path: Path) -> None:
     drawing = new_drawing()
-    rectangle(drawing.modelspace(), "A-WALL", 0, 0, 5, 5)
-    drawing.modelspace().add_line((0, 0), (5, 0), dxfattribs={"layer": "A-DOOR"})
+    rectangle(drawing.modelspace(), "PLAN-2", 0, 0, 5, 5)
+    drawing.modelspace().add_line((0, 0), (5, 0), dxfattribs={"layer": "PLAN-1"})
     path = tmp_path / "office.dxf"
     drawing.saveas(path)
     message = refusal(path)
-    assert "no closed outline on layer FLOOR; layers present: A-DOOR, A-WALL" in message
+    assert "no closed outline on layer FLOOR, and no layer that shows walls" in message
+    assert "layers present: PLAN-1, PLAN-2 (say which one holds the walls, such as --layer PLAN-1=" in message
 
 
 def test_a_floor_of_open_lines_says_so(tmp_path: Path) -> None:

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 from floor_drawings import codes
+from shapely import Polygon, union_all
+from shapely.affinity import translate
+from shapely.geometry.base import BaseGeometry
 
 from mission.errors import InputError
+from mission.floor import FloorPlan, Room
+from mission.geometry import FloatArray
 from planner.floors import read_floor
 from tests.faults.sizes import FULL
 
@@ -65,3 +72,30 @@ def test_a_drawing_from_the_wild_is_a_floor_or_one_line(path: Path) -> None:
         assert "\n" not in str(error)
     else:
         assert plan.outline
+
+
+@real
+def test_an_architects_export_has_the_rooms_of_its_model() -> None:
+    """Open double lines, doors in mirrored blocks, survey coordinates; its truth is the layered office."""
+    truth = read_floor(DATA / "layered/office-l1.dxf")
+    true = [room_shape(room) for room in truth.rooms]
+    floor = read_floor(DATA / "dxf/office-l1-messy.dxf")
+    rooms = [room_shape(room) for room in floor.rooms]
+    off = lowest(truth) - lowest(floor)
+    found = [translate(room, *off) for room in rooms]
+    overlaps = [
+        max(room.intersection(other).area / room.union(other).area for other in found) for room in true
+    ]
+    assert sum(overlap > 0.5 for overlap in overlaps) >= 58
+    assert sum(overlap > 0.85 for overlap in overlaps) >= 52
+    assert Counter(item.kind for item in floor.openings)["door"] == 66
+
+
+def lowest(floor: FloorPlan) -> FloatArray:
+    """The lower left corner of all walls (2,)."""
+    solids = [solid.exterior for item in floor.elements if item.kind == "walls" for solid in item.solids]
+    return np.concatenate(solids).min(axis=0)
+
+
+def room_shape(room: Room) -> BaseGeometry:
+    return union_all([Polygon(part.exterior, part.holes) for part in room.polygons])

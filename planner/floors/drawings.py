@@ -1,0 +1,140 @@
+"""Tells the drawings in one model space apart: plans, elevations and sections that lie side by side."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from mission.geometry import FloatArray, polyline_length
+from planner.floors.linework.swings import swings_of
+from planner.floors.strokes import Stroke
+
+DrawingBox = tuple[float, float, float, float]
+"""x0, y0, x1, y1 in metres."""
+
+APART = 2.0
+"""Drawings lie at least this far apart, in metres."""
+_SMALLEST = 3.0
+"""What is smaller than this, in metres, is no storey."""
+_MUCH = 5.0
+"""A drawing with this many times as much wall as any other is the plan; the others are details."""
+_NOT_BUILT = ("ignore", "names", "other")
+
+
+@dataclass(frozen=True)
+class DrawingFound:
+    """One drawing in a model space."""
+
+    box: DrawingBox
+    walls_m: float
+    """Length of the lines on walls' layers."""
+    swings: int
+    """Door swings in it: only plans show them."""
+    strokes: Mapping[str, int]
+    """Strokes by role."""
+
+    @property
+    def told(self) -> str:
+        """Its size and what is in it, in words."""
+        x0, y0, x1, y1 = self.box
+        doors = f", {self.swings} door swings" if self.swings else ", no door swing"
+        return f"{x1 - x0:.1f} x {y1 - y0:.1f} m, {self.walls_m:.0f} m of wall lines{doors}"
+
+
+def drawings_in(strokes: Sequence[Stroke]) -> list[DrawingFound]:
+    """The drawings that hold walls, from left to right and bottom to top."""
+    built = [item for item in strokes if item.role not in _NOT_BUILT]
+    groups = _groups(built)
+    found = [_drawing([built[k] for k in group]) for group in groups]
+    storeys = [item for item in found if item.walls_m > 0 and max(_size(item.box)) >= _SMALLEST]
+    return sorted(storeys, key=lambda item: tuple(np.round(item.box, 3)))
+
+
+def chosen_of(drawings: Sequence[DrawingFound]) -> DrawingFound | None:
+    """The drawing that is plainly the plan; None where a person has to say."""
+    if len(drawings) < 2:
+        return drawings[0] if drawings else None
+    swinging = [item for item in drawings if item.swings]
+    if len(swinging) == 1:
+        return swinging[0]
+    by_walls = sorted(drawings, key=lambda item: -item.walls_m)
+    if len(swinging) == 0 and len(by_walls) > 1 and by_walls[0].walls_m >= _MUCH * by_walls[1].walls_m:
+        return by_walls[0]
+    return None
+
+
+def is_in(points: FloatArray, box: DrawingBox, *, margin: float = 0.0) -> bool:
+    """Whether the middle of what is drawn lies in a box, or this near to it."""
+    x, y = (points.min(axis=0) + points.max(axis=0)) / 2
+    return bool(box[0] - margin <= x <= box[2] + margin and box[1] - margin <= y <= box[3] + margin)
+
+
+def _size(box: DrawingBox) -> tuple[float, float]:
+    return box[2] - box[0], box[3] - box[1]
+
+
+def _drawing(strokes: Sequence[Stroke]) -> DrawingFound:
+    points = np.concatenate([item.points for item in strokes])
+    (x0, y0), (x1, y1) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    walls = [item for item in strokes if item.role == "walls"]
+    doors = [item.points for item in strokes if item.role in ("doors", "openings", "walls")]
+    return DrawingFound(
+        (x0, y0, x1, y1),
+        sum(polyline_length(item.points) for item in walls),
+        len(swings_of(doors)),
+        dict(sorted(Counter(item.role for item in strokes).items())),
+    )
+
+
+def _groups(strokes: Sequence[Stroke]) -> list[list[int]]:
+    """Indices of the strokes that hang together over gaps below APART, or whose boxes overlap."""
+    if not strokes:
+        return []
+    cells, owner = _cells(strokes)
+    pairs = cKDTree(cells).query_pairs(APART, p=np.inf, output_type="ndarray")
+    label = _connected(len(cells), pairs)
+    label = _overlapping(label, cells)
+    group = np.empty(len(strokes), dtype=np.int64)
+    group[owner[:, 0]] = label[owner[:, 1]]
+    return [np.flatnonzero(group == k).tolist() for k in np.unique(group)]
+
+
+def _cells(strokes: Sequence[Stroke]) -> tuple[FloatArray, np.ndarray]:
+    """Cells of 1 m that strokes pass through (n, 2), and pairs of a stroke and one cell of it."""
+    sampled = [_sampled(item.points) for item in strokes]
+    number = np.repeat(np.arange(len(strokes)), [len(points) for points in sampled])
+    cells, place = np.unique(np.floor(np.concatenate(sampled)), axis=0, return_inverse=True)
+    # A stroke hangs together itself: its cells are linked by their distance alone, being 1 m apart at most.
+    return cells, np.stack([number, place.reshape(-1)], axis=1)
+
+
+def _sampled(points: FloatArray) -> FloatArray:
+    """Points along a polyline, at most 1 m apart, and no more than a building has."""
+    steps = np.diff(points, axis=0)
+    counts = np.clip(np.ceil(np.hypot(*steps.T)), 1, 10_000).astype(int)
+    pieces = [points[k] + steps[k] * (np.arange(count)[:, None] / count) for k, count in enumerate(counts)]
+    return np.concatenate([*pieces, points[-1:]])
+
+
+def _connected(count: int, pairs: np.ndarray) -> np.ndarray:
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1])
+
+
+def _overlapping(label: np.ndarray, cells: FloatArray) -> np.ndarray:
+    """Labels in which groups whose boxes overlap are one."""
+    while True:
+        names = np.unique(label)
+        low = np.array([cells[label == k].min(axis=0) for k in names])
+        high = np.array([cells[label == k].max(axis=0) for k in names])
+        over = (low[:, None] <= high[None]).all(axis=-1) & (high[:, None] >= low[None]).all(axis=-1)
+        merged = _connected(len(names), np.argwhere(np.triu(over, 1)))
+        if len(np.unique(merged)) == len(names):
+            return label
+        label = merged[np.searchsorted(names, label)]

@@ -1,0 +1,118 @@
+"""Parts a space that several rooms' names stand in, at its narrowest places between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import shapely
+
+from mission.geometry import FloatArray
+from planner.floors.rings import polygons_of
+
+WIDEST = 4.0
+"""No place wider than this, in metres, parts two rooms."""
+_TURN = np.sin(np.radians(20))
+_LEAST = 1.0
+"""Least area in m² of a part."""
+_MOST_CORNERS = 500
+_DETAIL = 0.03
+"""Corners of this size, in metres, are no corners of a room."""
+_KERF = 0.01
+
+
+def parted_by_labels(
+    rooms: Sequence[shapely.Polygon], places: Sequence[FloatArray]
+) -> tuple[list[shapely.Polygon], list[FloatArray]]:
+    """The rooms, parted where a narrow place lies between two labels, and the lines (2, 2) drawn there."""
+    labels = shapely.points(np.array(places).reshape(-1, 2))
+    parted: list[shapely.Polygon] = []
+    cuts: list[FloatArray] = []
+    for room in rooms:
+        parts = [room]
+        if _labelled(room, labels) > 1:
+            for cut in _narrow_places(room):
+                parts, used = _cut(parts, cut, labels)
+                if used:
+                    cuts.append(cut)
+                if all(_labelled(part, labels) <= 1 for part in parts):
+                    break
+        parted += parts
+    return parted, cuts
+
+
+def _labelled(part: shapely.Polygon, labels: Sequence[shapely.Point]) -> int:
+    return int(np.count_nonzero(shapely.intersects(part, labels)))
+
+
+def _cut(
+    parts: Sequence[shapely.Polygon], cut: FloatArray, labels: Sequence[shapely.Point]
+) -> tuple[list[shapely.Polygon], bool]:
+    """The parts with one of them cut in two, if both halves have a label."""
+    middle = shapely.Point(cut.mean(axis=0))
+    for k, part in enumerate(parts):
+        if not part.intersects(middle) or _labelled(part, labels) < 2:
+            continue
+        halves = _halves(part, cut)
+        if len(halves) == 2 and all(_labelled(half, labels) for half in halves):
+            return [*parts[:k], *halves, *parts[k + 1 :]], True
+    return list(parts), False
+
+
+def _halves(part: shapely.Polygon, cut: FloatArray) -> list[shapely.Polygon]:
+    """What a cut parts; it may run along walls' faces, so it has a width of its own."""
+    way = (cut[1] - cut[0]) / np.hypot(*(cut[1] - cut[0]))
+    line = shapely.LineString([cut[0] - 3 * _DETAIL * way, cut[1] + 3 * _DETAIL * way])
+    pieces = polygons_of(part.difference(line.buffer(_KERF / 2, cap_style="flat")))
+    halves = [piece for piece in pieces if piece.area >= _LEAST]
+    if len(halves) != 2:
+        return halves
+    first = part.intersection(halves[0].buffer(_KERF, join_style="mitre"))
+    return [
+        piece
+        for half in (first, part.difference(first))
+        for piece in polygons_of(half)
+        if piece.area >= _LEAST
+    ]
+
+
+def _narrow_places(room: shapely.Polygon) -> Iterator[FloatArray]:
+    """Lines (2, 2) across a space from its inner corners, the shortest first."""
+    plain = room.buffer(-_DETAIL, join_style="mitre").buffer(_DETAIL, join_style="mitre").simplify(_DETAIL)
+    rings = [ring for part in polygons_of(plain) for ring in (part.exterior, *part.interiors)]
+    if not rings:
+        return
+    corners = np.concatenate([_inner_corners(shapely.get_coordinates(ring)[:-1]) for ring in rings])
+    if not 0 < len(corners) <= _MOST_CORNERS:
+        return
+    edges = np.concatenate([_edges(shapely.get_coordinates(ring)) for ring in rings])
+    feet = _feet(corners, edges)
+    begin = np.repeat(corners, len(edges), axis=0)
+    lines = np.stack([begin, feet.reshape(-1, 2)], axis=1)
+    length = np.hypot(*(lines[:, 1] - lines[:, 0]).T)
+    near = np.flatnonzero((length > 0.3) & (length <= WIDEST))
+    inside = shapely.covers(room.buffer(2 * _DETAIL), shapely.linestrings(lines[near])) if len(near) else []
+    near = near[inside]
+    for k in near[np.lexsort((*lines[near].reshape(-1, 4).T, np.round(length[near], 4)))].tolist():
+        yield lines[k]
+
+
+def _inner_corners(ring: FloatArray) -> FloatArray:
+    """Corners (n, 2) of a ring at which walls stick into the space, which lies to the ring's left."""
+    turned = ring if shapely.LinearRing(ring).is_ccw else ring[::-1]
+    before, after = turned - np.roll(turned, 1, axis=0), np.roll(turned, -1, axis=0) - turned
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    size = np.hypot(*before.T) * np.hypot(*after.T)
+    return turned[np.abs(cross) > _TURN * size]
+
+
+def _edges(ring: FloatArray) -> FloatArray:
+    return np.stack([ring[:-1], ring[1:]], axis=1)
+
+
+def _feet(points: FloatArray, edges: FloatArray) -> FloatArray:
+    """For each point the nearest point (n, m, 2) of each edge."""
+    way = edges[:, 1] - edges[:, 0]
+    size = np.maximum(np.einsum("ij,ij->i", way, way), 1e-12)
+    t = np.einsum("nij,ij->ni", points[:, None, :] - edges[None, :, 0], way) / size
+    return np.asarray(edges[None, :, 0] + np.clip(t, 0.0, 1.0)[..., None] * way[None])
