@@ -31,7 +31,7 @@ class Recorder(Protocol):
 def watch_by(recording: Recorder) -> Callable[..., None]:
     """The command that follows a run, and records it by `recording`."""
 
-    @with_connection(without=("who",))
+    @with_connection()
     def watch(
         connection: Connection,
         *,

@@ -68,7 +68,8 @@ def router_access_control(holders: Sequence[Holder], site: str | None) -> dict[s
         keys = KeyExpressions(name, site)
         own = [
             *_served(_commanding(keys, f"robot {name}"), "egress", "ingress"),
-            *_served(_looking_for_twins(keys), "ingress", "egress"),
+            *_served(_looking_for_twins(keys, "twin of"), "ingress", "egress"),
+            *_served(_looking_for_twins(keys, "robot as twin"), "egress", "ingress"),
         ]
         rules += own
         subjects.append({"id": f"robot {name}", "cert_common_names": [f"robot:{name}"]})
@@ -79,7 +80,14 @@ def router_access_control(holders: Sequence[Holder], site: str | None) -> dict[s
 def _watching(keys: KeyExpressions, name: str) -> Flow:
     return Flow(
         f"{name} watch",
-        asked=(keys.info, keys.log, keys.poses, keys.mission("*", "part/*"), keys.mavlink("hello")),
+        asked=(
+            keys.info,
+            keys.keep,
+            keys.log,
+            keys.poses,
+            keys.mission("*", "part/*"),
+            keys.mavlink("hello"),
+        ),
         told=(f"{keys.root}/tel/*", keys.mavlink("down")),
         shown=(keys.alive, keys.mavlink("alive")),
         signed_in=(keys.watcher("*"),),
@@ -110,15 +118,15 @@ def _everything(keys: KeyExpressions) -> Flow:
 def _own_tunnel(keys: KeyExpressions) -> Flow:
     return Flow(
         "own tunnel",
-        asked=(keys.mavlink("hello"), keys.info),
+        asked=(keys.mavlink("hello"),),
         told=(keys.mavlink("down"),),
         said=(keys.mavlink("up"),),
         shown=(keys.mavlink("alive"),),
     )
 
 
-def _looking_for_twins(keys: KeyExpressions) -> Flow:
-    return Flow(f"robot {keys.robot} twin", asked=(keys.info,), shown=(keys.alive,))
+def _looking_for_twins(keys: KeyExpressions, name: str) -> Flow:
+    return Flow(f"{name} {keys.robot}", asked=(keys.boot,), shown=(keys.alive,))
 
 
 def _served(flow: Flow, inward: str, outward: str) -> list[dict[str, Any]]:

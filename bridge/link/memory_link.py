@@ -11,7 +11,7 @@ from bridge.link.seals import NO_SEALS, SealedAnswering, SealedHearing, Seals
 
 
 @dataclass(frozen=True)
-class CarriedMessage:
+class SealedMessage:
     """A message as whoever carries it sees it."""
 
     kind: Literal["question", "answer", "told"]
@@ -40,23 +40,23 @@ class Switchboard:
     def link(self, seals: Seals = NO_SEALS) -> MemoryLink:
         return MemoryLink(self, seals)
 
-    def carried(self, packet: CarriedMessage) -> Iterable[CarriedMessage]:
+    def carried(self, packet: SealedMessage) -> Iterable[SealedMessage]:
         """What becomes of a message on its way: it arrives, unless the line is cut."""
         return () if self.cut else (packet,)
 
-    def answers(self, question: CarriedMessage) -> list[CarriedMessage]:
+    def answers(self, question: SealedMessage) -> list[SealedMessage]:
         """What all who serve its key answer to a question, as it arrives where it was asked."""
         if self.failure is not None:
             raise self.failure
-        arrived: list[CarriedMessage] = []
+        arrived: list[SealedMessage] = []
         for asked in self.carried(question):
             request = Request(asked.key, asked.payload, asked.parameters, asked.seal)
             for answer in [answer for _, key, answer in self.serving if matches(key, asked.key)]:
                 payload, seal = answer(request)
-                arrived += self.carried(CarriedMessage("answer", asked.key, payload, seal))
+                arrived += self.carried(SealedMessage("answer", asked.key, payload, seal))
         return arrived
 
-    def tell(self, packet: CarriedMessage) -> None:
+    def tell(self, packet: SealedMessage) -> None:
         """Let everybody hear what was published, as it arrives there."""
         for arrived in self.carried(packet):
             for pattern, heard in list(self.hearing):
@@ -82,7 +82,7 @@ class MemoryLink:
 
     def publisher(self, key: str, *, bulk: bool = False) -> Publish:
         return lambda payload: self._board.tell(
-            CarriedMessage("told", key, payload, self._seals.telling(key, payload))
+            SealedMessage("told", key, payload, self._seals.telling(key, payload))
         )
 
     def announce(self, key: str) -> None:
@@ -107,7 +107,7 @@ class MemoryLink:
 
     def _answers(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> list[bytes]:
         question = self._seals.question(key, payload, parameters)
-        arrived = self._board.answers(CarriedMessage("question", key, payload, question.seal, parameters))
+        arrived = self._board.answers(SealedMessage("question", key, payload, question.seal, parameters))
         opened = (self._seals.opened(question, packet.payload, packet.seal) for packet in arrived)
         return [payload for payload in opened if payload is not None]
 

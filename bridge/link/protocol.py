@@ -52,6 +52,8 @@ class KeyExpressions:
             raise InputError(
                 f"site {self.site!r}: use letters, digits, '_', '.', '-', with '/' between parts"
             )
+        if self.site is not None and "sx" in self.site.split("/"):
+            raise InputError(f"site {self.site!r}: no part of it can be 'sx', as robots' keys begin")
 
     @property
     def root(self) -> str:
@@ -84,6 +86,16 @@ class KeyExpressions:
     @property
     def event(self) -> str:
         return f"{self.root}/tel/event"
+
+    @property
+    def keep(self) -> str:
+        """Asked every few seconds by whoever watches, who keeps the lease by it if it is theirs."""
+        return f"{self.root}/keep"
+
+    @property
+    def boot(self) -> str:
+        """Asked to find out whether a name is taken."""
+        return f"{self.root}/boot"
 
     def watcher(self, name: str) -> str:
         """Token of a station that watches the robot."""
@@ -127,6 +139,18 @@ class Info(Tagged, frozen=True):
     """Scan profiles the scanner knows; `None` if it takes any."""
     to_map: Transform | None
     """Site to map, if the robot was told; else each mission's `frame.to_map` counts."""
+
+
+class Watching(Tagged, frozen=True):
+    """Somebody watches the robot, and keeps the lease if it is theirs; answered with `Info`."""
+
+    commander: ShortText
+
+
+class Booted(Tagged, frozen=True):
+    """Which start of a robot's program answers."""
+
+    boot_id: str
 
 
 class Manifest(Tagged, frozen=True):
@@ -224,7 +248,19 @@ class PosePage(Tagged, frozen=True):
     poses: tuple[PoseReport, ...]
 
 
-Reply = Info | Ready | ChunkHeld | Accepted | Rejected | Answer | LogPage | PosePage | MissionPart | Malformed
+Reply = (
+    Info
+    | Booted
+    | Ready
+    | ChunkHeld
+    | Accepted
+    | Rejected
+    | Answer
+    | LogPage
+    | PosePage
+    | MissionPart
+    | Malformed
+)
 """Everything a robot answers with."""
 
 M = TypeVar("M")
@@ -242,6 +278,22 @@ def encode(message: Any) -> bytes:
 def decode(payload: bytes, kind: type[M]) -> M:
     """The message in `payload`; raises `msgspec.ValidationError` or `DecodeError` with the JSON path."""
     return msgspec.json.decode(payload, type=kind)
+
+
+_PLACE = re.compile(rf"(?P<root>(?:.+?/)?sx/{VERSION}/(?P<robot>[^/]+))/(?P<rest>[^\n]*)")
+
+
+def place_of(key: str) -> tuple[str, str, str]:
+    """Root, robot and rest of a robot's key; raises `ValueError` if it is none."""
+    found = _PLACE.fullmatch(key)
+    if found is None:
+        raise ValueError(f"{key[:80]!r} is no robot's key")
+    return found["root"], found["robot"], found["rest"]
+
+
+def parts_of(key: str) -> list[str]:
+    """What comes after the robot's name in one of its keys, part by part."""
+    return place_of(key)[2].split("/")
 
 
 def count_of(text: str) -> int:

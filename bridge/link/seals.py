@@ -9,7 +9,6 @@ believed. An end without keys seals nothing and believes everything, which is go
 from __future__ import annotations
 
 import hashlib
-import re
 import secrets
 import threading
 import time
@@ -22,7 +21,7 @@ import msgspec
 
 from bridge.link.keys import Certificates, HeldKeys, Holder, Untrusted, now_utc
 from bridge.link.link import Answering, Hearing, Request
-from bridge.link.protocol import VERSION, encode, untrusted
+from bridge.link.protocol import VERSION, encode, place_of, untrusted
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -33,7 +32,6 @@ OLDEST_S: Final = 10.0
 """What was said longer ago is not believed: a slow line beside a push holds a message for seconds."""
 AHEAD_S: Final = 1.0
 """By so much two clocks may run apart before they are compared anew."""
-_PLACE = re.compile(rf"(?P<root>(?:.+?/)?sx/{VERSION}/(?P<robot>[^/]+))/(?P<end>mavlink(?=/)|)[^\n]*")
 
 
 class Seal(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -307,10 +305,11 @@ def _read(seal: bytes) -> Seal:
 
 def _place(key: str) -> tuple[str, str]:
     """The robot that a key names, and its end there: the robot's own, or its tunnel's."""
-    found = _PLACE.fullmatch(key)
-    if found is None:
-        raise Untrusted(f"{key} is no robot's key")
-    return found["robot"], f"{found['root']}/{found['end']}"
+    try:
+        root, robot, rest = place_of(key)
+    except ValueError as error:
+        raise Untrusted(str(error)) from None
+    return robot, f"{root}/mavlink" if rest.startswith("mavlink/") else root
 
 
 def _must_be_robot(holder: Holder, robot: str) -> None:

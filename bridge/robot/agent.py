@@ -6,10 +6,11 @@ least every second, its pose many times a second, and every event as soon as the
 
 from __future__ import annotations
 
+import sqlite3
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TypeVar
 
 import msgspec
@@ -21,11 +22,13 @@ from bridge.link.protocol import (
     CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
     VERSION,
+    Booted,
     Commit,
     Info,
     KeyExpressions,
     Malformed,
     Reply,
+    Watching,
     decode,
     encode,
     untrusted,
@@ -37,11 +40,15 @@ from bridge.robot.runner import Position, Runner, state_report
 from mission import __version__
 from mission.document import Transform
 from mission.events import PoseReport, StateReport
-from mission.run.lease import Lease
+from mission.run.lease import Lease, kept
 from mission.run.orders import Order
 
 STATE_EVERY_S = 1.0
 POSE_EVERY_S = 0.05
+TWIN_S = 5.0
+"""How often a robot behind a router looks whether another answers to its name."""
+TOKEN_S = 15.0
+"""How long a station's token counts after its last sealed question; whoever watches asks every 5 s."""
 LEAST_POSE_PAUSE_S = 0.02
 """However fast the simulated clock runs, poses go out at most fifty times a second."""
 
@@ -66,6 +73,30 @@ def check_ordering(request: Request, commander: str | None = None) -> None:
         raise Untrusted(f"signed by {holder.name}, not by {commander}")
 
 
+def others_of(link: Link, keys: KeyExpressions, boot_id: str, *, timeout_s: float = 1.0) -> tuple[str, ...]:
+    """The boots of other robots that answer to this robot's name."""
+    answers = link.ask_all(keys.boot, timeout_s=timeout_s)
+    boots = {boot.boot_id for boot in map(_boot_in, answers) if boot is not None}
+    return tuple(sorted(boots - {boot_id}))
+
+
+def _boot_in(answer: bytes) -> Booted | None:
+    try:
+        return decode(answer, Booted)
+    except msgspec.DecodeError:
+        return None
+
+
+def keep_lease(journal: Journal, commander: str, *, now_ns: int) -> None:
+    """Renew the lease if it is the commander's; a journal that takes nothing shows in what matters more."""
+    if kept(journal.fact("lease", Lease), commander, now_ns=now_ns) is None:
+        return
+    with suppress(sqlite3.OperationalError), journal.transaction():
+        lease = kept(journal.fact("lease", Lease), commander, now_ns=now_ns)  # nobody else's by now
+        if lease is not None:
+            journal.store_fact("lease", lease)
+
+
 class Agent:
     """One robot on a link."""
 
@@ -82,9 +113,15 @@ class Agent:
         speed_up: float = 1.0,
         to_map: Transform | None = None,
         failed: Callable[[Exception], None] = lambda error: None,
+        stand_still: Callable[[str], None] | None = None,
     ) -> None:
-        """`inbox` takes missions, if the robot does; `failed` is told what ended one of its works."""
+        """`inbox` takes missions, if the robot does; `failed` is told what ended one of its works.
+
+        `stand_still` is given the reason if another robot answers to this name; without it none can.
+        """
         self._keys = keys
+        self._stand_still = stand_still
+        self._looked_ns = command_clock.now_ns()
         self._link = link
         self._journal = journal
         self._runner = runner
@@ -105,11 +142,15 @@ class Agent:
         self._pose_seq = self._state_seq = 0
         self._stating = threading.Lock()
         self._heard_ns = command_clock.now_ns()
+        self._sealed_ns: int | None = None
+        """When a holder of keys last asked, if ends hold keys."""
 
     def serve(self) -> None:
         """Answer on every key."""
         keys, link = self._keys, self._link
         link.serve(keys.info, self._info)
+        link.serve(keys.keep, self._keep)
+        link.serve(keys.boot, lambda request: encode(Booted(boot_id=self._runner.boot_id)))
         link.serve(keys.log, self._log)
         link.serve(keys.poses, self._past_poses, bulk=True)
         link.serve(keys.mission("*", "**" if self._inbox else "part/*"), self._mission, bulk=True)
@@ -156,20 +197,29 @@ class Agent:
             thread.join()
 
     def _watcher(self, key: str, alive: bool) -> None:
-        self._contact()
         (self._watchers.add if alive else self._watchers.discard)(key)
+        if self._sealed_ns is None:
+            self._heard_ns = self._command_clock.now_ns()
 
-    def _contact(self) -> None:
-        self._heard_ns = self._command_clock.now_ns()
+    def _contact(self, request: Request) -> None:
+        """Somebody asks: just now, and not somebody else again what was asked long ago."""
+        if request.fresh:
+            self._heard_ns = self._command_clock.now_ns()
+            if request.holder is not None:
+                self._sealed_ns = self._heard_ns
 
     def _silent_s(self) -> float:
-        """How long no station has watched or asked."""
-        if self._watchers:
-            self._contact()
-        return (self._command_clock.now_ns() - self._heard_ns) / 1e9
+        """How long no station has watched or asked.
+
+        A token is no proof of a station where ends hold keys: it counts while its station asks now and then.
+        """
+        now_ns = self._command_clock.now_ns()
+        if self._watchers and (self._sealed_ns is None or now_ns - self._sealed_ns < TOKEN_S * 1e9):
+            self._heard_ns = now_ns
+        return (now_ns - self._heard_ns) / 1e9
 
     def _mission(self, request: Request) -> bytes:
-        self._contact()
+        self._contact(request)
         _, step = address_of(request.key)
         if step[:1] == ["commit"]:
             return self._ordered(request, Commit, self._commit)
@@ -199,8 +249,26 @@ class Agent:
             return encode(untrusted(error))
         return encode(carry_out(request, order))
 
+    def _keep(self, request: Request) -> bytes:
+        try:
+            watching = decode(request.payload, Watching)
+            check_ordering(request, watching.commander)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            return encode(Malformed(message=f"Watching: {error}"))
+        except Untrusted:
+            return self._info(request)  # viewers watch as well
+        if request.fresh:
+            self._keep_lease(watching.commander)
+        return self._info(request)
+
+    def _keep_lease(self, commander: str) -> None:
+        """During a run the lease of a commander who watches does not end."""
+        run, _ = self._runner.snapshot()
+        if not run.over:
+            keep_lease(self._journal, commander, now_ns=self._command_clock.now_ns())
+
     def _info(self, request: Request) -> bytes:
-        self._contact()
+        self._contact(request)
         info = Info(
             protocol=VERSION,
             stopgo=__version__,
@@ -217,7 +285,7 @@ class Agent:
         return encode(info)
 
     def _command(self, request: Request) -> bytes:
-        self._contact()
+        self._contact(request)
         return self._ordered(request, Order, self._obey)
 
     def _obey(self, request: Request, order: Order) -> Reply:
@@ -226,11 +294,11 @@ class Agent:
         return self._runner.obey(order)
 
     def _log(self, request: Request) -> bytes:
-        self._contact()
+        self._contact(request)
         return encode(events_page(self._journal, request))
 
     def _past_poses(self, request: Request) -> bytes:
-        self._contact()
+        self._contact(request)
         # A copy: meanwhile the robot goes on writing.
         return encode(poses_page(self._poses.copy(), self._poses_boot, request))
 
@@ -241,6 +309,7 @@ class Agent:
             self._news.wait(STATE_EVERY_S)
             self._news.clear()
             self._runner.hear_of_link(self._silent_s())
+            self._look_for_twin()
             for event in self._journal.events(since=told):
                 self._tell_event(encode(event))
                 told = event.number
@@ -253,6 +322,15 @@ class Agent:
                 self._runner, robot=self._keys.robot, seq=self._state_seq, ns=self._clock.now_ns(),
                 newest=self._journal.newest,
             )  # fmt: skip
+
+    def _look_for_twin(self) -> None:
+        """Stand still if another robot answers to this name, of which nobody knows which one they order."""
+        now_ns = self._command_clock.now_ns()
+        if self._stand_still is None or now_ns - self._looked_ns < TWIN_S * 1e9:
+            return
+        self._looked_ns = now_ns
+        if others_of(self._link, self._keys, self._runner.boot_id):
+            self._stand_still(f"another robot answers to the name {self._keys.robot}; end one of them")
 
     def _tell_poses(self) -> None:
         while not self._closing.wait(self._pose_pause_s):

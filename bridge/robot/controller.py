@@ -154,6 +154,12 @@ class Controller:
         if lease is not None:
             self._journal.store_fact("lease", lease)
 
+    def hold(self, reason: str) -> None:
+        """Stand still until somebody decides, if the robot is on its way."""
+        with self._lock:
+            if self._run.state in ("RUNNING", "HOMING"):
+                self._adopt(self._write(runs.held(self._run, reason)), ordered=True)
+
     def _situation(self) -> Situation:
         return situation_of(
             self._journal, self._mission, run=self._run, pose=self._base.pose(), now_ns=self._clock.now_ns(),

@@ -19,6 +19,7 @@ from bridge.link.protocol import (
     Rejected,
     Reply,
     count_of,
+    parts_of,
 )
 from bridge.robot.journal import Journal
 from mission.events import PoseReport
@@ -65,7 +66,6 @@ def part_page(journal: Journal, request: Request) -> Reply:
 
 
 def address_of(key: str) -> tuple[str, list[str]]:
-    """Mission id and step of `…/mission/<id>/<step…>`."""
-    parts = key.split("/")
-    at = len(parts) - 1 - parts[::-1].index("mission")
-    return parts[at + 1], parts[at + 2 :]
+    """Mission id and step of `…/sx/1/<robot>/mission/<id>/<step…>`."""
+    _, mission_id, *step = parts_of(key)
+    return mission_id, step

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,15 +17,21 @@ from bridge.link.access import access_control
 from bridge.link.clock import Clock, WallClock
 from bridge.link.link import Link
 from bridge.link.protocol import KeyExpressions
-from bridge.robot.agent import Agent, on_link
+from bridge.robot.agent import Agent, on_link, others_of
 from bridge.robot.bodies import OpenBody
 from bridge.robot.controller import Controller, new_boot_id
 from bridge.robot.inbox import Inbox
 from bridge.robot.journal import Journal, open_journal
 from bridge.robot.simulator import NO_FAULTS, Faults
 from mission.document import Transform
-from mission.errors import InputError
+from mission.errors import AnswerIsNo, InputError
 from mission.run.revision import RevisionPolicy
+
+LOOK_S = 1.5
+"""How long a robot that joins a router waits for what that one knows."""
+GONE_S = 5.0
+"""After this a token of a robot that does not answer is not waited for."""
+ASK_AGAIN_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -60,9 +68,43 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     boot_id = new_boot_id()
     guard = Guard(held, options.insecure, None if held is None else access_control(keys), boot_id)
     opened = joining(options.connect, guard) if options.connect else listening(options.listen, guard)
-    with opened as link, robot_on(link, keys, options, boot_id) as agent:
+    with opened as link:
+        if options.connect:
+            check_name_is_free(link, keys, options.connect)
+        _serve(link, keys, options, boot_id, ready)
+
+
+def _serve(
+    link: Link, keys: KeyExpressions, options: RobotOptions, boot_id: str, ready: Callable[[], None]
+) -> None:
+    with robot_on(link, keys, options, boot_id) as agent:
         ready()
         agent.wait()
+
+
+def check_name_is_free(link: Link, keys: KeyExpressions, router: str) -> None:
+    """Refuse to be a second robot of one name behind a router.
+
+    A token alone is that of a robot that has just ended, perhaps: it is gone when its lease is.
+
+    Raises
+    ------
+    AnswerIsNo
+        If a robot of this name answers.
+    """
+    shown, gone = threading.Event(), threading.Event()
+    link.watch_presence(keys.alive, lambda key, alive: (shown if alive else gone).set())
+    if not shown.wait(LOOK_S):
+        return
+    deadline = time.monotonic() + GONE_S
+    while not gone.is_set() and time.monotonic() < deadline:
+        others = others_of(link, keys, "")
+        if others:
+            raise AnswerIsNo(
+                f"robot {keys.robot}: is alive behind {router} already (boot {others[0]}); two of one name"
+                " cannot be told apart. End the other, or choose another --name"
+            )
+        gone.wait(ASK_AGAIN_S)
 
 
 @contextmanager
@@ -82,7 +124,7 @@ def robot_on(
             agent = Agent(
                 keys=keys, link=link, journal=journal, runner=controller, clock=clock, command_clock=wall,
                 inbox=Inbox(journal, controller, body.scanner.profiles), speed_up=options.speed_up,
-                to_map=options.to_map,
+                to_map=options.to_map, stand_still=controller.hold if options.connect else None,
             )  # fmt: skip
             with on_link(agent):
                 yield agent

@@ -11,12 +11,13 @@ from contextlib import suppress
 import msgspec
 
 from bridge.link.link import Link
-from bridge.link.protocol import POSE_PAGE, Info, KeyExpressions, LogPage, PosePage, decode
+from bridge.link.protocol import POSE_PAGE, KeyExpressions, LogPage, PosePage, decode
 from mission.events import Aborted, AnyEvent, Finished, PoseReport, Report, StateReport, event_of
 
 SILENCE_S = 1.0
 """After this long without a word the robot is asked."""
-ASK_S = 1.0
+KEEP_S = 5.0
+"""How often a robot is told that it is watched."""
 PAGE_S = 5.0
 """How long a page of events or poses is waited for: on a slow line it takes a second."""
 LAST_POSES_S = 1.0
@@ -33,10 +34,14 @@ Followed = Report | Silence
 """What is told of a run that is followed."""
 
 
-def reports(link: Link, keys: KeyExpressions) -> Iterator[Followed]:
-    """Everything of the robot's run, until it is over; first what was, then what comes."""
+def reports(link: Link, keys: KeyExpressions, keep: Callable[[], StateReport | None]) -> Iterator[Followed]:
+    """Everything of the robot's run, until it is over; first what was, then what comes.
+
+    `keep` tells the robot, every few seconds, that it is watched, and gives its state.
+    """
     link.announce(keys.watcher(uuid.uuid4().hex[:12]))
-    heard = _listen(link, keys)
+    heard = _listen(link, keys, keep)
+    kept = time.monotonic()
     follower = RunFollower(link, keys)
     last = time.monotonic()
     while not follower.ended:
@@ -47,7 +52,11 @@ def reports(link: Link, keys: KeyExpressions) -> Iterator[Followed]:
             yield from follower.poses.catch_up()
         if item is None and time.monotonic() - last >= SILENCE_S:
             yield Silence(seconds=time.monotonic() - last)
-            item = _asked_state(link, keys)
+            item = keep()
+        elif time.monotonic() - kept >= KEEP_S:
+            kept = time.monotonic()
+            state = keep()
+            yield from () if state is None else follower.take(state)
         if item is not None:
             yield from follower.take(item)
     yield from _late_poses(heard, follower)
@@ -167,13 +176,15 @@ def log_page(
     return None if reply is None else decode(reply, LogPage)
 
 
-def _listen(link: Link, keys: KeyExpressions) -> queue.SimpleQueue[Report]:
+def _listen(
+    link: Link, keys: KeyExpressions, keep: Callable[[], StateReport | None]
+) -> queue.SimpleQueue[Report]:
     """A queue that fills with what the robot tells; listening comes before asking, so no gap is left."""
     heard: queue.SimpleQueue[Report] = queue.SimpleQueue()
     link.hear(keys.event, lambda key, payload: _put(heard, payload, event_of))
     link.hear(keys.pose, lambda key, payload: _put(heard, payload, _POSE))
     link.hear(keys.state, lambda key, payload: _put(heard, payload, _STATE))
-    state = _asked_state(link, keys)
+    state = keep()
     if state is not None:
         heard.put(state)
     return heard
@@ -194,11 +205,6 @@ def _put(heard: queue.SimpleQueue[Report], payload: bytes, read: Callable[[bytes
 
 _POSE = msgspec.json.Decoder(PoseReport).decode
 _STATE = msgspec.json.Decoder(StateReport).decode
-
-
-def _asked_state(link: Link, keys: KeyExpressions) -> StateReport | None:
-    reply = link.ask(keys.info, timeout_s=ASK_S)
-    return None if reply is None else decode(reply, Info).state
 
 
 def _late_poses(heard: queue.SimpleQueue[Report], follower: RunFollower) -> Iterator[Report]:

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import msgspec
 
@@ -37,6 +37,7 @@ from bridge.link.protocol import (
     Ready,
     Rejected,
     Reply,
+    Watching,
     encode,
 )
 from bridge.link.tls_probe import why_no_link
@@ -191,17 +192,52 @@ class Station:
     def info(self, *, within_s: float | None = None) -> Info:
         """What the robot says of itself."""
         within_s = self.timeout_s if within_s is None else within_s
-        reply = self._insist(self.keys.info, b"", within_s)
-        if reply is None:
+        info = self._one_of(self._insist_all(self.keys.info, b"", within_s), "info")
+        if info is None:
             raise OutcomeUnknown(
                 f"{self.keys.robot} did not tell its state within {within_s:.1f} s{self._distrusted()}"
             )
-        info = self._answered(reply, Info, "info")
         if info.protocol != VERSION:
             raise InputError(
                 f"robot {info.robot} speaks protocol {info.protocol}, this stopgo {VERSION}; update the older"
             )
         return info
+
+    def keep(self) -> StateReport | None:
+        """Tell the robot that somebody watches, which keeps the lease if it is this station's; its state.
+
+        Raises
+        ------
+        AnswerIsNo
+            If two robots answer to its name.
+        """
+        watching = encode(Watching(commander=self.commander))
+        info = self._one_of(self.link.ask_all(self.keys.keep, watching, timeout_s=TRY_S), "watch")
+        return None if info is None else info.state
+
+    def _one_of(self, replies: list[bytes], what: str) -> Info | None:
+        """What the robot says, if it is one; two of one name are both stopped."""
+        infos = {info.boot_id: info for info in (self._answered(reply, Info, what) for reply in replies)}
+        if len(infos) > 1:
+            self._stop_twins(tuple(infos.values()))
+        return next(iter(infos.values()), None)
+
+    def _stop_twins(self, infos: tuple[Info, ...]) -> NoReturn:
+        """Let both stand still: an order would be carried out by one or the other."""
+        boots = " and ".join(sorted(info.boot_id for info in infos))
+        told = "viewers stop nobody: tell a station"
+        if self.held is None or self.held.holder.role == "station":
+            for info in infos:
+                pause = Order(
+                    cmd_id=uuid.uuid4().hex, verb="pause", commander=self.commander, boot_id=info.boot_id,
+                    issued_ns=info.clock_ns, valid_for_s=LONGEST_VALID_S,
+                )  # fmt: skip
+                self.link.ask_all(self.keys.command("pause"), encode(pause), timeout_s=TRY_S)
+            told = "both were told to pause"
+        raise AnswerIsNo(
+            f"two robots answer to the name {self.keys.robot} (boots {boots}); {told}. End one of them,"
+            " or start it under another --name"
+        )
 
     def status(self) -> StateReport:
         """The robot's state, with every stop that is done or skipped."""
@@ -390,7 +426,7 @@ class Station:
 
         If the robot's mission has not been run yet, the next run is waited for.
         """
-        return follow.reports(self.link, self.keys)
+        return follow.reports(self.link, self.keys, self.keep)
 
     def _part(self, mission_id: str, revision: int, number: int) -> MissionPart:
         key = self.keys.mission(mission_id, f"part/{number}")
@@ -429,6 +465,16 @@ class Station:
         """Why an answer that came was not taken for the robot's; empty if none came."""
         why = self.link.distrusted
         return f" (an answer came that is not {self.keys.robot}'s: {why})" if why else ""
+
+    def _insist_all(self, key: str, payload: bytes, within_s: float) -> list[bytes]:
+        """Ask all who serve a key until somebody has answered or the time is up."""
+        deadline = time.monotonic() + within_s
+        while (left := deadline - time.monotonic()) > 0:
+            replies = self.link.ask_all(key, payload, timeout_s=min(TRY_S, left))
+            if replies:
+                return replies
+            time.sleep(min(PAUSE_S, left))
+        return []
 
     def _answered(self, reply: bytes | None, kind: type[Any], what: str) -> Any:
         """The reply if it is of `kind`; every other is an error that says what it means."""

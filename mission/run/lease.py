@@ -1,4 +1,4 @@
-"""Who may command a robot: one identity at a time, for a minute after its last order.
+"""Who may command a robot: one identity at a time, while it watches its run and for a minute after.
 
 The lease belongs to an identity, not to a process, and outlives a reboot. Its fencing number grows with
 every change of hands, so that an order given under an older one is recognised however late it comes.
@@ -48,6 +48,16 @@ def claimed(
             f"{lease.commander} commands it for {left_s:.0f} s more; wait, or add --take-over",
         )
     return Lease(commander=commander, fence=lease.fence + 1, until_ns=now_ns + lasting_ns())
+
+
+def kept(lease: Lease | None, commander: str, *, now_ns: int) -> Lease | None:
+    """The lease renewed for the commander who watches the run; `None` if there is nothing to be renewed.
+
+    That is not worth writing down before half of it has passed.
+    """
+    if lease is None or lease.commander != commander or remaining_s(lease, now_ns) > LEASE_S / 2:
+        return None
+    return msgspec.structs.replace(lease, until_ns=now_ns + lasting_ns())
 
 
 def remaining_s(lease: Lease, now_ns: int) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 
 from bridge.link.authority import init_site, issue
 from bridge.link.keys import HolderRole, now_utc, read_keys
-from bridge.link.memory_link import CarriedMessage, Switchboard
+from bridge.link.memory_link import SealedMessage, Switchboard
 from bridge.link.seals import KeySeals
 from bridge.station.station import Station
 from tests.bridge.world import Field
@@ -32,10 +32,10 @@ class Router(Switchboard):
 
     def __init__(self) -> None:
         super().__init__()
-        self.seen: list[CarriedMessage] = []
-        self.meddle: Callable[[CarriedMessage], Iterable[CarriedMessage]] = lambda packet: (packet,)
+        self.seen: list[SealedMessage] = []
+        self.meddle: Callable[[SealedMessage], Iterable[SealedMessage]] = lambda packet: (packet,)
 
-    def carried(self, packet: CarriedMessage) -> Iterable[CarriedMessage]:
+    def carried(self, packet: SealedMessage) -> Iterable[SealedMessage]:
         self.seen.append(packet)
         return self.meddle(packet)
 

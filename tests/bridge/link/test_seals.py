@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.link.memory_link import CarriedMessage
+from bridge.link.memory_link import SealedMessage
 from bridge.link.seals import OLDEST_S, Seal
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from tests.bridge.guarded import GuardedField, keys_of_site
@@ -56,7 +56,7 @@ def test_an_answer_that_was_changed_or_meant_for_another_question_is_not_believe
     first = station.info()
     old = next(packet for packet in field.router.seen if packet.kind == "answer")
 
-    def shifted(packet: CarriedMessage) -> Iterable[CarriedMessage]:
+    def shifted(packet: SealedMessage) -> Iterable[SealedMessage]:
         if packet.kind != "answer":
             return (packet,)
         told = json.loads(packet.payload)
@@ -79,7 +79,7 @@ def test_an_answer_that_was_changed_or_meant_for_another_question_is_not_believe
 def test_a_question_is_bound_to_its_parameters_and_its_robot(site: Path) -> None:
     field = ready(site)
 
-    def elsewhere(packet: CarriedMessage) -> Iterable[CarriedMessage]:
+    def elsewhere(packet: SealedMessage) -> Iterable[SealedMessage]:
         if packet.kind == "question" and packet.parameters:
             return (replace(packet, parameters={"since": "7"}),)
         return (packet,)
@@ -106,9 +106,9 @@ def told(field: GuardedField, key: str, number: int) -> list[bytes]:
 def test_what_a_robot_tells_is_heard_once_and_in_order(site: Path) -> None:
     field = ready(site)
     assert told(field, field.keys.state, 3) == [b"state 0", b"state 1", b"state 2"]
-    kept: list[CarriedMessage] = []
+    kept: list[SealedMessage] = []
 
-    def twice(packet: CarriedMessage) -> Iterable[CarriedMessage]:
+    def twice(packet: SealedMessage) -> Iterable[SealedMessage]:
         kept.append(packet)
         return (packet, packet, *kept) if packet.kind == "told" else (packet,)
 
@@ -121,7 +121,7 @@ def test_what_a_robot_told_long_ago_or_before_its_reboot_is_not_heard(site: Path
     station = field.guarded_station()
     heard: list[bytes] = []
     station.link.hear(field.keys.state, lambda key, payload: heard.append(payload))
-    held: list[CarriedMessage] = []
+    held: list[SealedMessage] = []
     station.info()
     tell = field.link.publisher(field.keys.state)
     tell(b"now")
@@ -155,7 +155,7 @@ def test_an_impostor_is_not_heard(site: Path) -> None:
 def test_fields_of_a_seal_that_are_not_known_are_passed_over(site: Path) -> None:
     field = ready(site)
 
-    def newer(packet: CarriedMessage) -> Iterable[CarriedMessage]:
+    def newer(packet: SealedMessage) -> Iterable[SealedMessage]:
         return (replace(packet, seal=json.dumps(json.loads(packet.seal) | {"later": 1}).encode()),)
 
     field.router.meddle = newer
@@ -200,11 +200,11 @@ def test_a_seal_is_small() -> None:
     assert len(msgspec.json.encode(seal)) < 200
 
 
-def held_back(field: GuardedField) -> list[CarriedMessage]:
+def held_back(field: GuardedField) -> list[SealedMessage]:
     """From now on every order is withheld, and kept."""
-    kept: list[CarriedMessage] = []
+    kept: list[SealedMessage] = []
 
-    def withhold(packet: CarriedMessage) -> Iterable[CarriedMessage]:
+    def withhold(packet: SealedMessage) -> Iterable[SealedMessage]:
         if "/cmd/" in packet.key:
             kept.append(packet)
             return ()
@@ -233,9 +233,9 @@ def test_an_order_that_a_station_has_given_up_is_never_carried_out(site: Path, l
 
 def test_a_commit_that_was_held_back_over_a_reboot_is_never_taken(site: Path) -> None:
     field = ready(site)
-    kept: list[CarriedMessage] = []
+    kept: list[SealedMessage] = []
 
-    def withhold(packet: CarriedMessage) -> Iterable[CarriedMessage]:
+    def withhold(packet: SealedMessage) -> Iterable[SealedMessage]:
         if packet.key.endswith("/commit"):
             kept.append(packet)
             return ()

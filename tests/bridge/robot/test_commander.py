@@ -190,3 +190,42 @@ def test_a_state_is_small_whatever_the_mission_and_status_tells_every_stop() -> 
         field.order("skip")
     assert station.info().state.skipped == names[-STOPS_LISTED:]
     assert station.status().skipped == names
+
+
+def watched(field: Field, who: str, *, seconds: float) -> None:
+    """The robot works, and somebody tells it every 5 s that they watch."""
+    station = field.station(commander=who)
+    for _ in range(round(seconds / 5)):
+        field.clock.wait(5.0)
+        assert station.keep() is not None
+
+
+def test_whoever_runs_a_mission_keeps_it_by_watching() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    watched(field, "test", seconds=600)
+    assert field.order("skip", commander="bob").reason == "not_the_commander"
+    assert field.order("skip", commander="bob", take_over=True).outcome == "ok"
+
+
+def test_others_who_watch_keep_nobody_s_lease_and_a_run_that_is_over_keeps_none() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    watched(field, "bob", seconds=LEASE_S + 5)
+    assert field.order("pause", commander="bob").outcome == "ok"
+    assert field.order("resume", commander="bob").outcome == "ok"
+    field.work()
+    watched(field, "bob", seconds=LEASE_S + 5)
+    assert field.order("start", commander="carl", again=True).reason != "not_the_commander"
+
+
+def test_watching_writes_the_lease_down_twice_a_minute() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    written: list[str] = []
+    field.journal.edge = written.append
+    watched(field, "test", seconds=300)
+    assert written.count("committed") == 10

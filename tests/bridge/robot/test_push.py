@@ -162,3 +162,12 @@ def test_an_accepted_answer_says_what_was_accepted() -> None:
     mission = corridor()
     accepted = Field().station().push(mission)
     assert accepted == Accepted(mission_id=mission.id, revision=1, digest=mission.digest, already=False)
+
+
+@pytest.mark.parametrize("mission_id", ["mission", "sx", "cmd", "part", "commit"])
+def test_a_mission_of_any_name_can_be_pushed(mission_id: str) -> None:
+    field = Field()
+    named = sealed(msgspec.structs.replace(corridor(), id=mission_id))
+    station = field.station()
+    assert station.push(named).mission_id == mission_id
+    assert station.mission(mission_id, 1) == named

@@ -9,8 +9,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 from bridge.commands.spawn import end_robot, free_port, start_robot
 from bridge.station.station import connect
+from mission.errors import RobotUnreachable
 from mission.events import Finished, PoseReport, Scanned
 from tests.bridge.world import corridor
 from tests.called import stopgo
@@ -86,3 +89,16 @@ def test_a_killed_router_is_found_again_and_no_event_is_lost(tmp_path: Path) -> 
         with router(endpoint):
             events += [report.stop for report in reports if isinstance(report, Scanned)]
     assert events == ["s1", "s2", "s3"]
+
+
+def test_a_robot_that_finds_its_name_alive_does_not_start(tmp_path: Path) -> None:
+    """And starts once the other has ended, also if that one was killed."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    extra = ("--connect", endpoint)
+    with router(endpoint):
+        first = start_robot("r1", tmp_path / "a", listen=None, extra=extra)
+        with pytest.raises(RobotUnreachable, match=r"r1: is alive behind .*--name"):
+            start_robot("r1", tmp_path / "b", listen=None, extra=extra)
+        first.kill()
+        first.wait()
+        end_robot(start_robot("r1", tmp_path / "b", listen=None, extra=extra))

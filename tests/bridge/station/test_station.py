@@ -50,6 +50,10 @@ class DeafLink(MemoryLink):
             return None
         return super().ask(key, payload, timeout_s=timeout_s, parameters=parameters)
 
+    def ask_all(self, key: str, payload: bytes = b"", *, timeout_s: float) -> list[bytes]:
+        reply = self.ask(key, payload, timeout_s=timeout_s)
+        return [] if reply is None else [reply]
+
 
 @pytest.fixture
 def time(monkeypatch: pytest.MonkeyPatch) -> StoppedTime:
@@ -85,14 +89,13 @@ def test_an_order_to_a_robot_that_does_not_tell_its_state_was_not_sent(time: Sto
 
 def test_what_the_state_took_is_gone_for_the_order(time: StoppedTime) -> None:
     station, link = deaf(Field(), time, "/cmd/")
-    answered = link.ask
+    answered = link.ask_all
 
-    def slowly(key: str, payload: bytes = b"", **options: object) -> bytes | None:
-        if key.endswith("/info"):
-            time.sleep(4.8)
-        return answered(key, payload, **options)  # type: ignore[arg-type]
+    def slowly(key: str, payload: bytes = b"", *, timeout_s: float) -> list[bytes]:
+        time.sleep(4.8)
+        return answered(key, payload, timeout_s=timeout_s)
 
-    link.ask = slowly  # type: ignore[method-assign, assignment]
+    link.ask_all = slowly  # type: ignore[method-assign]
     began = time.now
     with pytest.raises(OutcomeUnknown):
         station.command("start")

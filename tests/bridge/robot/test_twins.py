@@ -1,0 +1,93 @@
+"""Two robots of one name: whoever notices lets both stand still, and says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bridge.link.clock import SimulatedClock
+from bridge.link.protocol import Booted, KeyExpressions, encode
+from bridge.robot import program
+from bridge.robot.agent import Agent
+from bridge.robot.program import check_name_is_free
+from bridge.station.station import Station
+from mission.errors import AnswerIsNo
+from tests.bridge.guarded import GuardedField, keys_of_site
+from tests.bridge.world import Field, corridor
+
+
+def twins() -> tuple[Field, Field]:
+    """Two robots r1 on one switchboard, both running the same mission."""
+    one, other = Field(), Field()
+    for field in (one, other):
+        field.station().push(corridor())
+        assert field.order("start").outcome == "ok"
+        field.board = one.board
+    one.serve()
+    other.link = other.board.link()
+    other.serve()
+    return one, other
+
+
+def test_an_order_is_for_the_one_that_told_its_state() -> None:
+    """Written for the first before the second came, it is not carried out by that."""
+    one, other = Field(), Field()
+    for field in (one, other):
+        field.station().push(corridor())
+    start = one.station().order("start")
+    assert other.controller.obey(start).reason == "expired"
+    assert one.controller.obey(start).outcome == "ok"
+
+
+def test_a_station_that_hears_two_stops_both_and_says_so() -> None:
+    one, other = twins()
+    station = Station(one.board.link(), one.keys, commander="test", timeout_s=0.3)
+    with pytest.raises(AnswerIsNo, match=r"two robots answer to the name r1 .* both were told to pause"):
+        station.status()
+    assert (one.controller.run.state, other.controller.run.state) == ("PAUSED", "PAUSED")
+
+
+def test_a_watch_that_hears_two_stops_both() -> None:
+    one, other = twins()
+    station = Station(one.board.link(), one.keys, commander="test", timeout_s=0.3)
+    with pytest.raises(AnswerIsNo, match="two robots"):
+        list(station.reports())
+    assert other.controller.run.state == "PAUSED"
+
+
+def test_an_impostor_is_no_twin(tmp_path: Path) -> None:
+    """With another's keys it answers in vain, and nobody stops."""
+    field = GuardedField(keys_of_site(tmp_path / "site"))
+    field.guarded_station().push(corridor())
+    impostor = field.board.link(field.seals("r2", boot_id="b"))
+    impostor.serve(field.keys.info, lambda request: b"{}")
+    impostor.serve(field.keys.boot, lambda request: encode(Booted(boot_id="b")))
+    assert field.guarded_station().command("start").state == "RUNNING"
+
+
+def test_a_robot_that_notices_its_twin_holds() -> None:
+    one, other = twins()
+    clock = SimulatedClock()
+    agent = Agent(
+        keys=one.keys, link=one.board.link(), journal=one.journal, runner=one.controller, clock=one.clock,
+        command_clock=clock, stand_still=one.controller.hold,
+    )  # fmt: skip
+    agent._look_for_twin()
+    assert one.controller.run.state == "RUNNING"
+    clock.wait(10.0)
+    agent._look_for_twin()
+    assert one.controller.run.state == "HELD"
+    assert "another robot answers to the name r1" in one.controller.run.reason
+    assert other.controller.run.state == "RUNNING"
+
+
+def test_a_name_that_is_alive_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(program, "LOOK_S", 0.01)
+    field = Field()
+    field.serve()
+    link = field.board.link()
+    check_name_is_free(link, KeyExpressions("r1"), "the router")
+    field.link.announce(field.keys.alive)
+    with pytest.raises(AnswerIsNo, match=r"r1: is alive behind the router already .* another --name"):
+        check_name_is_free(link, KeyExpressions("r1"), "the router")
