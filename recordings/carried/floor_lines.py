@@ -11,18 +11,18 @@ from mission.kinds import KINDS
 from recordings import entities
 from recordings.carried.values import Values
 
-Lines = tuple[FloatArray, ...]
+Polylines = tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class FloorLines:
     """Polylines (n, 2) each; what was filled ends where it began."""
 
-    outline: Lines
-    rooms: Lines
-    kinds: dict[str, Lines]
+    outline: Polylines
+    rooms: Polylines
+    kinds: dict[str, Polylines]
     """By kind of element."""
-    openings: Lines
+    openings: Polylines
     names: tuple[tuple[str, float, float], ...]
     """Room names and where they stand."""
 
@@ -30,7 +30,7 @@ class FloorLines:
 def floor_lines(values: Values, origin: tuple[float, float]) -> FloorLines | None:
     """What a recording tells of the floor; None if it has none."""
 
-    def lines(entity: str) -> Lines:
+    def lines(entity: str) -> Polylines:
         strips = [row["strips"] for row in values.rows(entity) if "strips" in row]
         return tuple(_polyline(strip) + origin for strip in strips[-1]) if strips else ()
 

@@ -21,7 +21,7 @@ MOST_POINTS = 1500
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class PlotCurve:
     """A line through (x, y), or marks at them."""
 
     x: FloatArray
@@ -43,14 +43,15 @@ def _plots(comparison: Comparison) -> Iterator[str]:
         seconds = log.seconds(beside.ns)[known]
         tolerance = 1000 * max((stop.tolerance_m for stop in comparison.mission.stops), default=0.0)
         limits = [
-            Curve(seconds[[0, -1]], np.full(2, side), VERMILION, "4 3") for side in (tolerance, -tolerance)
+            PlotCurve(seconds[[0, -1]], np.full(2, side), VERMILION, "4 3")
+            for side in (tolerance, -tolerance)
         ]
-        curve = Curve(*_few(seconds, 1000 * beside.metres[known]), PURPLE)
+        curve = PlotCurve(*_few(seconds, 1000 * beside.metres[known]), PURPLE)
         yield _plot("beside the route, mm, left positive; dashed: tolerance", [*limits, curve])
     late = [(item.arrived_s, item.late_s) for item in comparison.stops if item.late_s is not None]
     if late:
         times, values = np.array(late, dtype=np.float64).T
-        yield _plot("late at each stop, s", [Curve(times, values, BLUE)])
+        yield _plot("late at each stop, s", [PlotCurve(times, values, BLUE)])
     yield from _growth(comparison)
 
 
@@ -69,8 +70,8 @@ def _growth(comparison: Comparison) -> Iterator[str]:
             shares.append(100 * ledger.amount(seen & ledger.visible) / visible)
     if len(times) > 1:
         ends = np.array([0.0, times[-1]])
-        asked = Curve(ends, np.full(2, 100 * ledger.required), VERMILION, "4 3")
-        grown = Curve(np.array(times), np.array(shares), BLUE, steps=True)
+        asked = PlotCurve(ends, np.full(2, 100 * ledger.required), VERMILION, "4 3")
+        grown = PlotCurve(np.array(times), np.array(shares), BLUE, steps=True)
         yield _plot("coverage acquired, %; dashed: asked", [asked, grown])
 
 
@@ -86,7 +87,7 @@ def _few(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     return x[kept], y[kept]
 
 
-def _plot(title: str, curves: Sequence[Curve]) -> str:
+def _plot(title: str, curves: Sequence[PlotCurve]) -> str:
     x = np.concatenate([curve.x for curve in curves])
     y = np.concatenate([curve.y for curve in curves])
     low, high = min(0.0, float(y.min())), max(0.0, float(y.max()))
@@ -128,7 +129,7 @@ def _axes(scale: _Scale) -> Iterator[str]:
     yield tag("path", d=f"M{LEFT} {TOP}V{HEIGHT - BOTTOM}", stroke=GREY, stroke_width=1)
 
 
-def _curve(curve: Curve, scale: _Scale) -> str:
+def _curve(curve: PlotCurve, scale: _Scale) -> str:
     points = list(zip(scale.x(curve.x).tolist(), scale.y(curve.y).tolist(), strict=True))
     d = f"M{points[0][0]:.1f} {points[0][1]:.1f}"
     for x, y in points[1:]:
