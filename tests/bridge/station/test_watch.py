@@ -126,7 +126,7 @@ def test_every_event_is_an_object() -> None:
     field.station().push(corridor())
     field.order("start")
     field.work()
-    for report in (field.controller.report(), *field.journal.events(), Silence(seconds=3.0)):
+    for report in (field.report(), *field.journal.events(), Silence(seconds=3.0)):
         EventObjects(streamed.append).show(report)
     assert [event["number"] for event in streamed] == [event.number for event in field.journal.events()]
     assert streamed[-1]["event"] == "Finished"
