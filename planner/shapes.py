@@ -7,7 +7,6 @@ floor that is moved is planned the same. On the grid, orientation tests are exac
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from shapely.geometry.base import BaseGeometry
 from mission.errors import InputError, StopgoError
 from mission.floor import FloorPlan
 from mission.geometry import FloatArray, Polygon, bounds, frozen
+from planner.kept import kept
 
 GRID = 1e-5
 """Metres per grid step."""
@@ -33,7 +33,7 @@ FARTHEST_STEPS = 2**29
 """Grid steps from 0, 0 up to which all integer arithmetic is exact, a little more than 5.3 km."""
 
 
-@lru_cache(maxsize=8)
+@kept
 def local_origin(floor: FloorPlan) -> FloatArray:
     """The lower left corner of everything on the floor (2,); refuses floors too large to be exact."""
     drawn = {"its outline": [ring for polygon in floor.outline for ring in polygon.rings]}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Set
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -13,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from mission.geometry import BoolArray, FloatArray, IntArray
 from mission.planning import NavigableSpace
+from planner.kept import kept
 from planner.shapes import SLACK, local_origin, polygon_parts, segments_of, to_shape
 from planner.space.reach import INSIDE, reach_of
 
@@ -55,7 +55,7 @@ def gap_before(space: NavigableSpace, shape: BaseGeometry, parts: Set[int]) -> s
     return f"a gap of {width.min():.3f} m in the floor at ({x:.2f}, {y:.2f})"
 
 
-@lru_cache(maxsize=4)
+@kept
 def _gaps_of(space: NavigableSpace) -> FloorGaps:
     """Every gap of a space, each as often as it is long."""
     ground = to_shape(space.ground, local_origin(space.floor))

@@ -6,13 +6,12 @@ outside it. Such a point has an anchor, a point of the drive area to which the w
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 import shapely
 
 from mission.geometry import BoolArray, FloatArray, IntArray
 from mission.planning import NavigableSpace
+from planner.kept import kept
 from planner.shapes import GRID, boundary_lines, local_origin, segments_of, to_shape
 from planner.space.connected import Parts, parts_of
 from planner.space.gaps import Site, Walls
@@ -78,7 +77,7 @@ class Reach:
         return nowhere
 
 
-@lru_cache(maxsize=4)
+@kept
 def reach_of(space: NavigableSpace) -> Reach:
     """The space, prepared once."""
     return Reach(space)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from mission.floor import Element, FloorPlan
 from mission.geometry import FloatArray, frozen, polyline_length
 from mission.planning import Targets
+from planner.kept import kept
 from planner.shapes import (
     GRID,
     local_origin,
@@ -51,7 +51,7 @@ def occluders_of(floor: FloorPlan, closed: FloatArray) -> BaseGeometry:
     return without_idle_vertices(without_cracks(snapped_union([*_occluding(floor)[1], *doors])), floor)
 
 
-@lru_cache(maxsize=4)
+@kept
 def _occluding(floor: FloorPlan) -> tuple[list[int], NDArray[np.object_]]:
     """The occluding elements and their solids, on the grid."""
     origin = local_origin(floor)
