@@ -26,7 +26,7 @@ from recordings.replay.standing import standings
 from recordings.replay.uploaded import differences_of
 
 NEAR_ROUTE_M = 2.0
-LEAST_ON_ROUTE = 0.2
+LEAST_ON_ROUTE, LEAST_WITHOUT_HALTS = 0.5, 0.9
 """A log of which less than this share runs within NEAR_ROUTE_M of the route is of another mission."""
 
 
@@ -42,7 +42,7 @@ def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight
     """
     laid = placed(log, mission, how)
     matches = _matches(laid, mission)
-    _must_belong(log, laid.track, mission, matches)
+    _must_belong(log, laid.track, mission, matches, how)
     offset = laid.alignment.time_offset_ns
     events = _own_events(log, mission, offset)
     remarks = [replace(remark, ns=remark.ns + offset) for remark in log.remarks]
@@ -111,22 +111,28 @@ def _source(log: FieldLog, laid: PlacedLog) -> LogSource:
     return LogSource(Path(log.path).name, log.format, log.digest, log.messages, lost=0, notes=notes)
 
 
-def _must_belong(log: FieldLog, track: Track, mission: Mission, matches: Sequence[Match]) -> None:
+def _must_belong(
+    log: FieldLog, track: Track, mission: Mission, matches: Sequence[Match], how: Placing
+) -> None:
     """Refuse a log whose robot was never near a stop, or hardly ever near the route."""
     stops = np.array([(stop.x, stop.y) for stop in mission.stops])
-    away = nearest_to(stops, track.xy)
+    away, reach = nearest_to(stops, track.xy), reaches(mission)
+    if how.align == "first":  # that puts the robot at the start, wherever it was
+        begins = np.hypot(*(stops - (mission.start.x, mission.start.y)).T) <= reach
+        away = np.where(begins, np.inf, away) if not begins.all() else away
     nearest = int(away.argmin())
     name = f"mission {mission.name} ({mission.id[:12]})"
-    if away[nearest] > reaches(mission)[nearest] and not any(match.stop is not None for match in matches):
+    if away[nearest] > reach[nearest]:
         raise InputError(
             f"{log.path}: was never near a stop of {name}; nearest was {mission.stops[nearest].id}, "
             f"{away[nearest]:.1f} m off; the wrong mission, or a frame placed wrong (--map, --align)?"
         )
-    share = on_route(track, mission)
-    if share < LEAST_ON_ROUTE:
+    share, stood = on_route(track, mission), any(match.how == "visit" for match in matches)
+    if share < (LEAST_ON_ROUTE if stood else LEAST_WITHOUT_HALTS):
+        halts = "" if stood else ", and it halted at no stop"
         raise InputError(
             f"{log.path}: only {share:.0%} of the way driven lies within {NEAR_ROUTE_M:g} m of the route of "
-            f"{name}; the wrong mission, or a frame placed wrong (--map, --align)?"
+            f"{name}{halts}; the wrong mission, or a frame placed wrong (--map, --align)?"
         )
 
 
