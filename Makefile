@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 # Every test that starts a process would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test lint types faults benchmarks wheels clean
+.PHONY: demo docs test lint types faults benchmarks wheels clean
 
 $(STAMP): pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -38,6 +38,11 @@ benchmarks: $(STAMP)
 # Builds what is published, and installs it with each extra in an environment of its own.
 wheels: $(STAMP)
 	$(BIN)/python -m tests.wheels $(PYTHONS)
+
+# The guides as a site, in build/site; a link that leads nowhere is an error.
+docs: $(STAMP)
+	PIP_CONSTRAINT="$(CURDIR)/constraints.txt" $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info recordings/demo .pytest_cache .mypy_cache .ruff_cache

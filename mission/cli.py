@@ -212,7 +212,7 @@ def export(
     """Write a mission in a format that others open.
 
     .plan (QGroundControl), .waypoints (QGC WPL 110), .dxf, .csv, .geojson, .nav2.yaml, .mcap (nav_msgs/Path),
-    .vda5050.json (3.0), .vda5050-2.1.json; docs/exports.md tells what opens where.
+    .vda5050.json (3.0), .vda5050-2.1.json; docs/how-to/exports.md tells what opens where.
 
     Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
     """

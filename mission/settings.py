@@ -3,7 +3,7 @@
 From this declaration plan.toml is read and printed, `stopgo plan` has its options, and values are checked:
 a new parameter is one more field of `Settings`, and nothing else.
 Names are those of the options with underscores. What a person types is metres, seconds and degrees, as here;
-docs/planning.md tells what each one does.
+docs/background/planning.md tells what each one does.
 """
 
 from __future__ import annotations

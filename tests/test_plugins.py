@@ -30,7 +30,7 @@ from tests.bridge.world import WALKING, corridor
 from tests.planner.worlds import two_rooms
 
 ROOT = Path(__file__).parents[1]
-GUIDE = (ROOT / "docs" / "plugins.md").read_text(encoding="utf-8")
+GUIDE = (ROOT / "docs" / "how-to" / "plugins.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```python\n(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL)
 COMMANDS = re.findall(r"^```sh\n(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL)
 

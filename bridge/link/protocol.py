@@ -1,6 +1,6 @@
 """What station and robot say to one another: every key and every message, known to this module alone.
 
-Messages are JSON; docs/protocol.md tells them to people. Times that end in `_ns` are
+Messages are JSON; docs/reference/protocol.md tells them to people. Times that end in `_ns` are
 nanoseconds on the robot's clock.
 """
 

@@ -1,4 +1,4 @@
-"""docs/protocol.md tells people what the code says to machines."""
+"""docs/reference/protocol.md tells people what the code says to machines."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mission.errors import InputError
 from mission.events import AnyEvent, State, StopState, UnknownKind
 from mission.run.orders import Answer, Order, Reason
 
-TEXT = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "protocol.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("reason", get_args(Reason))

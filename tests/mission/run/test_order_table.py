@@ -1,4 +1,4 @@
-"""What every order does in every state: one table, walked whole, and the one that docs/protocol.md prints."""
+"""What every order does in every state: one table, walked whole, which docs/reference/protocol.md prints."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from mission.run.order_table import PLACES, VERBS, effect, table_text
 
-PROTOCOL = Path(__file__).parents[3] / "docs" / "protocol.md"
+PROTOCOL = Path(__file__).parents[3] / "docs" / "reference" / "protocol.md"
 
 EFFECTS = {
     "start": {"READY": "RUNNING", "FINISHED": "RUNNING with `again`", "ABORTED": "RUNNING with `again`"},

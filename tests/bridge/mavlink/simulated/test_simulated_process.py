@@ -296,7 +296,9 @@ def test_a_fault_that_could_not_happen_is_refused_with_one_that_could(text: str,
 
 def test_every_fault_can_be_written_and_is_in_the_guide() -> None:
     assert {read_vehicle_fault(f"{kind}@1=2").kind for kind in FAULTS} == set(FAULTS)
-    guide = (Path(__file__).parents[4] / "docs" / "mavlink.md").read_text(encoding="utf-8")
+    guide = (Path(__file__).parents[4] / "docs" / "how-to" / "simulated-vehicle.md").read_text(
+        encoding="utf-8"
+    )
     assert [kind for kind in FAULTS if f"`{kind}@" not in guide] == []
 
 
