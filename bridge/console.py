@@ -6,10 +6,13 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mission.errors import AnswerIsNo
 from mission.table import printable, printable_lines
+
+if TYPE_CHECKING:
+    import rich.progress
 
 Progress = Callable[[int, int], None]
 """Called with what is done and what there is to do, as a bar's `show`."""
@@ -23,21 +26,30 @@ class Bar:
     def __init__(self, label: str, unit: tuple[str, int] = KILOBYTES) -> None:
         self._label = label
         self._unit, self._per = unit
-        self._shows = sys.stderr.isatty()
+        self._drawn: rich.progress.Progress | None = None
 
     def __enter__(self) -> Bar:
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+            from rich.progress import Progress as Drawn
+
+            columns = TextColumn(self._label), BarColumn(30), TextColumn("{task.description}")
+            self._drawn = Drawn(*columns, TimeRemainingColumn(), console=Console(stderr=True))
+            self._drawn.add_task("", total=None)
+            self._drawn.start()
         return self
 
     def __exit__(self, *exception: object) -> None:
-        if self._shows:
-            print(file=sys.stderr)  # noqa: T201
+        if self._drawn is not None:
+            self._drawn.stop()
 
     def show(self, done: int, total: int) -> None:
-        if self._shows:
-            filled = 30 * done // max(1, total)
-            bar = "█" * filled + "·" * (30 - filled)
+        """Show how much is done, in the unit's parts."""
+        if self._drawn is not None:
             amount = f"{done / self._per:.0f}/{total / self._per:.0f} {self._unit}"
-            print(f"\r{self._label} {bar} {amount}", end="", file=sys.stderr)  # noqa: T201
+            (task,) = self._drawn.task_ids
+            self._drawn.update(task, completed=done, total=total, description=amount)
 
 
 def say(line: str) -> None:

@@ -2,20 +2,40 @@
 
 from __future__ import annotations
 
-import unicodedata
+import shutil
+import sys
 from collections.abc import Sequence
+from io import StringIO
 
-_GAP = "  "
+ENDLESS = 100_000
+"""Columns of what is not a terminal: nothing is folded there."""
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Lines of a table; a column whose every cell reads as a number is set to the right."""
-    rows = [[printable(cell) for cell in row] for row in rows]
-    columns = list(zip(header, *rows, strict=True))
-    widths = [max(map(_width, column)) for column in columns]
-    right = [all(map(_is_number, column[1:])) and len(rows) > 0 for column in columns]
-    rule = ["-" * width for width in widths]
-    return "\n".join(_line(cells, widths, right) for cells in (header, rule, *rows))
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, width: int | None = None) -> str:
+    """Lines of a table; a column whose every cell reads as a number is set to the right.
+
+    Cells are folded where the table is wider than `width`: that of the terminal, if stdout is one.
+    """
+    from rich.console import Console
+    from rich.rule import Rule
+    from rich.table import Table
+    from rich.text import Text
+
+    grid = Table.grid(padding=(0, 2, 0, 0), pad_edge=False)
+    for cells in zip(*rows, strict=True) if rows else [()] * len(header):
+        grid.add_column(justify="right" if cells and all(map(_is_number, cells)) else "left", overflow="fold")
+    grid.add_row(*map(Text, header))
+    grid.add_row(*(Rule(characters="-", style="none") for _ in header))
+    for row in rows:
+        grid.add_row(*(Text(printable(cell)) for cell in row))
+    page = Console(file=StringIO(), width=width or _columns(), color_system=None, legacy_windows=False)
+    with page.capture() as drawn:
+        page.print(grid)
+    return "\n".join(line.rstrip() for line in drawn.get().rstrip("\n").split("\n"))
+
+
+def _columns() -> int:
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else ENDLESS
 
 
 def printable(content: str) -> str:
@@ -35,22 +55,8 @@ def duration(seconds: float) -> str:
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
-def _line(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool]) -> str:
-    padded = []
-    for cell, width, to_right in zip(cells, widths, right, strict=True):
-        space = " " * (width - _width(cell))
-        padded.append(space + cell if to_right else cell + space)
-    return _GAP.join(padded).rstrip()
-
-
 def _is_number(cell: str) -> bool:
     return cell.strip("-") == "" or cell.translate(_NUMBER).isdigit()
 
 
 _NUMBER = str.maketrans("", "", ".:+-% ")
-
-
-def _width(text: str) -> int:
-    """Columns on a terminal: East Asian wide characters take two, combining marks none."""
-    wide = sum(unicodedata.east_asian_width(character) in "WF" for character in text)
-    return len(text) + wide - sum(unicodedata.combining(character) > 0 for character in text)

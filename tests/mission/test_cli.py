@@ -141,3 +141,21 @@ def test_a_file_cannot_colour_the_terminal(
 )
 def test_durations_read_like_a_clock(seconds: float, text: str) -> None:
     assert duration(seconds) == text
+
+
+def test_a_table_is_folded_at_the_terminals_width_and_nowhere_else() -> None:
+    header, rows = ("room", "number"), [("A room with a long [bold] name", "1")]
+    assert table(header, rows).splitlines()[2] == "A room with a long [bold] name       1"
+    folded = table(header, rows, width=20).splitlines()
+    assert folded[:2] == ["room          number", "------------  ------"]
+    assert " ".join(line[:12].strip() for line in folded[2:]) == rows[0][0]
+    assert max(map(len, folded)) <= 20
+
+
+def test_wide_letters_count_twice_and_control_characters_are_shown() -> None:
+    assert table(("a", "b"), [("漢字", "x"), ("\x1b[31m", "y")]).splitlines() == [
+        "a      b",
+        "-----  -",
+        "漢字   x",
+        "\ufffd[31m  y",
+    ]
