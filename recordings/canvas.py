@@ -125,8 +125,8 @@ class Sheet:
     origin: LocalOrigin
     extent: Bounds
     """What 2D views show, in the drawing's metres."""
-    of_run: bool = False
-    """Whether it is a run's and not a plan's."""
+    runs: tuple[str, ...] = ()
+    """Runs that are looked at together, each with a colour and a report of its own."""
 
     @property
     def local_extent(self) -> Bounds:
@@ -148,7 +148,7 @@ def open_canvas(sheet: Sheet, *, port: int | None = None) -> Iterator[Canvas]:
     ) as stream:
         drawn = rr.binary_stream(stream)
         viewers = [] if port is None else [rr.GrpcServerSink("127.0.0.1", port)]
-        layout = blueprint(sheet.local_extent, of_run=sheet.of_run)
+        layout = blueprint(sheet.local_extent, sheet.runs)
         stream.set_sinks(drawn, *viewers, default_blueprint=layout)
         stream.set_log_time_enabled(False)
         stream.send_recording_name(sheet.name)

@@ -16,7 +16,7 @@ from mission.heard_run import track_of
 from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
 from recordings.carried.checking import carry_end
 from recordings.carried.missions import carry_mission
-from recordings.carried.plan import carry_plan
+from recordings.carried.plan import carry_plan, planned_extent
 from recordings.carried.reading import Recording
 from recordings.compact import compact
 from recordings.pieces import Pieces
@@ -151,8 +151,7 @@ class FieldRecording:
             recording_id=mission.id,
             name=mission.name,
             origin=mission_origin(mission),
-            extent=mission_extent(mission),
-            of_run=True,
+            extent=planned_extent(self._plan) or mission_extent(mission),
         )
         self._canvas = self._open.enter_context(open_canvas(sheet, port=self._port))
         draw_mission(self._canvas, mission)
@@ -195,7 +194,8 @@ class FieldRecording:
 
     def _start(self, run_id: str) -> RunDrawing:
         assert self._first is not None
-        self._runs[run_id] = RunDrawing(self.canvas, run_id, self._first)
+        sights = () if self._plan is None or self._plan.mission_id != self._first.id else self._plan.sights
+        self._runs[run_id] = RunDrawing(self.canvas, run_id, self._first, sights)
         return self._runs[run_id]
 
 

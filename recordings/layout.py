@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import rerun as rr
 import rerun.blueprint as rrb
 
 from recordings import entities as at
+from recordings import palette
 from recordings.entities import under
+from recordings.palette import Colour
 
 BACKGROUND = (18, 20, 26, 255)
 
@@ -21,16 +24,18 @@ MARGIN = 0.04
 """Empty space around the drawing, as a share of its size."""
 
 
-def blueprint(bounds: Bounds | None = None, *, of_run: bool = False) -> rrb.Blueprint:
+def blueprint(bounds: Bounds | None = None, runs: Sequence[str] = ()) -> rrb.Blueprint:
     """Tabs for the mission, its planning stages, the run, and the log; 2D views show `bounds`.
 
-    A run is shown at its newest moment: a live one as it goes on, a recorded one at its end.
+    It is the same for plans and runs, so that it does not matter which is opened last: all is shown at its
+    newest moment, a live run as it goes on, a recorded one at its end. With `runs`, for exactly these: each
+    has a colour and a report of its own.
     """
     return rrb.Blueprint(
-        rrb.Tabs(_mission(bounds, of_run), _stages(bounds), _run(), _log(), active_tab=0),
+        rrb.Tabs(_mission(bounds, runs), _stages(bounds), _run(runs), _log(), active_tab=0),
         rrb.TimePanel(
             timeline=at.MISSION_TIME,
-            play_state="following" if of_run else "paused",
+            play_state="following",
             state="collapsed",
             fps=STEPS_PER_SECOND,
         ),
@@ -40,17 +45,19 @@ def blueprint(bounds: Bounds | None = None, *, of_run: bool = False) -> rrb.Blue
     )
 
 
-def _mission(bounds: Bounds | None, of_run: bool) -> rrb.Horizontal:
+def _mission(bounds: Bounds | None, runs: Sequence[str]) -> rrb.Horizontal:
     plan = _flat(
         "Plan and run",
         _visible(bounds),
         *(at.FLOOR, at.COVERAGE, at.ROUTE, at.STOPS, at.PLANNED_ROBOT, at.FIELD),
         time_ranges=_so_far(),
+        overrides=_run_colours(runs),
     )
     reports = rrb.Tabs(
+        rrb.TextDocumentView(origin=at.LATEST_REPORT, name="Report"),
+        *(_run_report(run) for run in runs),
         rrb.TextDocumentView(origin=at.REPORT, name="Plan report"),
-        rrb.TextDocumentView(origin=at.FIELD, contents=under(at.FIELD), name="Run report"),
-        active_tab=1 if of_run else 0,
+        active_tab=0,
     )
     return rrb.Horizontal(
         plan,
@@ -58,6 +65,33 @@ def _mission(bounds: Bounds | None, of_run: bool) -> rrb.Horizontal:
         column_shares=[3, 2],
         name="Mission",
     )
+
+
+def _run_report(run: str) -> rrb.TextDocumentView:
+    return rrb.TextDocumentView(origin=at.RunEntities(run).flat(at.RUN_REPORT), name=f"Run {run}")
+
+
+def _run_colours(runs: Sequence[str]) -> Any:
+    """A colour of its own for what each of several runs drove."""
+    if len(runs) < 2:
+        return {}
+    return {
+        at.RunEntities(run).flat(at.DRIVEN): rr.LineStrips2D.from_fields(colors=_colour(k))
+        for k, run in enumerate(runs)
+    }
+
+
+def _metric_colours(metric: str, runs: Sequence[str]) -> Any:
+    if len(runs) < 2:
+        return {}
+    return {
+        at.RunEntities(run).metric(metric): rr.SeriesLines.from_fields(colors=_colour(k), names=f"run {run}")
+        for k, run in enumerate(runs)
+    }
+
+
+def _colour(number: int) -> Colour:
+    return palette.RUNS[number % len(palette.RUNS)]
 
 
 def _stages(bounds: Bounds | None) -> rrb.Grid:
@@ -72,12 +106,13 @@ def _stages(bounds: Bounds | None) -> rrb.Grid:
     )
 
 
-def _run() -> rrb.Vertical:
+def _run(runs: Sequence[str]) -> rrb.Vertical:
+    states = [under(at.FIELD), under(at.PLANNED_STATE)]
     return rrb.Vertical(
-        rrb.StateTimelineView(origin=at.FIELD, contents=under(at.FIELD), name="States", time_view=_whole()),
-        _plot("Distance from the route, mm (left positive)", at.METRIC_CROSS_TRACK),
+        rrb.StateTimelineView(origin=at.ROOT, contents=states, name="States", time_view=_whole()),
+        _plot("Distance from the route, mm (left positive)", at.METRIC_CROSS_TRACK, runs=runs),
         _plot("Deviation at each stop, mm", at.METRIC_DEVIATION),
-        _plot("Battery, %", at.METRIC_BATTERY, (0.0, 100.0)),
+        _plot("Battery, %", at.METRIC_BATTERY, (0.0, 100.0), runs=runs),
         name="Run",
     )
 
@@ -98,7 +133,7 @@ def _visible(bounds: Bounds | None) -> rrb.VisualBounds2D | None:
 
 
 def _flat(
-    name: str, area: rrb.VisualBounds2D | None, *contents: str, time_ranges: Any = None
+    name: str, area: rrb.VisualBounds2D | None, *contents: str, time_ranges: Any = None, overrides: Any = None
 ) -> rrb.Spatial2DView:
     """A y-up 2D view: its origin lies above the flip."""
     return rrb.Spatial2DView(
@@ -108,6 +143,7 @@ def _flat(
         background=BACKGROUND,
         visual_bounds=area,
         time_ranges=time_ranges,
+        overrides=overrides,
     )
 
 
@@ -132,9 +168,18 @@ def _from_the_south(bounds: Bounds) -> rrb.EyeControls3D:
     )
 
 
-def _plot(name: str, entity: str, span: tuple[float, float] | None = None) -> rrb.TimeSeriesView:
+def _plot(
+    name: str, entity: str, span: tuple[float, float] | None = None, *, runs: Sequence[str] = ()
+) -> rrb.TimeSeriesView:
     axis = None if span is None else rrb.ScalarAxis(range=span, zoom_lock=True)
-    return rrb.TimeSeriesView(origin=entity, contents=under(entity), name=name, axis_x=_whole(), axis_y=axis)
+    return rrb.TimeSeriesView(
+        origin=entity,
+        contents=under(entity),
+        name=name,
+        axis_x=_whole(),
+        axis_y=axis,
+        overrides=_metric_colours(entity, runs),
+    )
 
 
 def _whole() -> rrb.TimeAxis:

@@ -11,6 +11,17 @@ from mission.planning import DROP_REASONS
 Colour = tuple[int, int, int, int]
 
 
+SKY: Colour = (86, 180, 233, 255)
+ORANGE: Colour = (230, 159, 0, 255)
+GREEN: Colour = (0, 158, 115, 255)
+YELLOW: Colour = (240, 228, 66, 255)
+VERMILION: Colour = (213, 94, 0, 255)
+PURPLE: Colour = (204, 121, 167, 255)
+"""Okabe and Ito's colours: told apart whatever colours an eye sees."""
+RUNS = (PURPLE, SKY, ORANGE, GREEN, YELLOW, VERMILION)
+"""Colours of runs that are looked at together."""
+
+
 @dataclass(frozen=True)
 class Meaning:
     """A class id of Rerun: hovering shows its label."""
@@ -20,15 +31,15 @@ class Meaning:
     colour: Colour
 
 
-SEEN = Meaning(10, "target: seen by a stop", (60, 210, 110, 255))
-UNSEEN = Meaning(11, "target: seen by no stop yet", (235, 70, 70, 255))
-HIDDEN = Meaning(12, "target: seen by no candidate", (120, 90, 130, 255))
-NEW = Meaning(13, "target: new in this step", (245, 245, 120, 255))
-TARGET = Meaning(14, "target", (205, 160, 90, 255))
+SEEN = Meaning(10, "target: seen by a stop", SKY)
+UNSEEN = Meaning(11, "target: seen by no stop yet", (178, 180, 186, 255))
+HIDDEN = Meaning(12, "target: seen by no candidate", (88, 92, 100, 255))
+NEW = Meaning(13, "target: new in this step", YELLOW)
+TARGET = Meaning(14, "target", ORANGE)
 ARRIVED = Meaning(40, "arrived", (255, 255, 255, 255))
-SCANNED = Meaning(41, "scanned", (255, 130, 225, 255))
-SKIPPED = Meaning(42, "skipped", (255, 190, 60, 255))
-FAILED = Meaning(43, "failed", (255, 70, 70, 255))
+SCANNED = Meaning(41, "scanned", PURPLE)
+SKIPPED = Meaning(42, "skipped", ORANGE)
+FAILED = Meaning(43, "failed", VERMILION)
 
 _FIRST_REASON = 20
 _DROPPED: Colour = (150, 60, 60, 255)
@@ -69,32 +80,34 @@ KIND_COLOURS: dict[str, Colour] = {
 OUTLINE: Colour = (110, 118, 135, 255)
 HOLE: Colour = (175, 95, 120, 255)
 ROOM: Colour = (58, 64, 78, 255)
-ROOM_NAME: Colour = (150, 158, 175, 255)
+ROOM_NAME: Colour = (118, 122, 130, 255)
 PASSABLE: Colour = (232, 236, 245, 255)
-BLOCKED: Colour = (255, 70, 200, 255)
+BLOCKED: Colour = VERMILION
 DRIVE: Colour = (38, 66, 104, 255)
 STOP_AREA: Colour = (50, 120, 85, 255)
 GAP: Colour = (255, 255, 255, 255)
 RAY: Colour = (235, 215, 110, 70)
 EYE: Colour = (255, 235, 120, 255)
-STOP: Colour = (70, 255, 110, 255)
-DOORWAY: Colour = (200, 255, 90, 255)
+STOP: Colour = GREEN
+DOORWAY: Colour = (0, 114, 190, 255)
 WITHDRAWN: Colour = (112, 112, 122, 255)
-ROUTE: Colour = (40, 210, 240, 255)
-RETURN: Colour = (35, 115, 140, 255)
-PLANNED: Colour = (140, 225, 255, 255)
-DRIVEN: Colour = (255, 130, 225, 255)
+ROUTE: Colour = YELLOW
+RETURN: Colour = (158, 150, 60, 255)
+PLANNED: Colour = (250, 243, 170, 255)
+DRIVEN: Colour = PURPLE
+ACQUIRED: Colour = SKY
+LOST: Colour = VERMILION
 SLAB: Colour = (62, 68, 80, 255)
 
 STATE_COLOURS: dict[str, Colour] = {
     "IDLE": (110, 110, 120, 255),
     "READY": (90, 140, 220, 255),
-    "RUNNING": (60, 190, 110, 255),
-    "PAUSED": (230, 190, 70, 255),
-    "HELD": (240, 130, 50, 255),
-    "HOMING": (150, 120, 230, 255),
-    "FINISHED": (70, 220, 230, 255),
-    "ABORTED": (230, 70, 70, 255),
+    "RUNNING": SKY,
+    "PAUSED": YELLOW,
+    "HELD": VERMILION,
+    "HOMING": PURPLE,
+    "FINISHED": GREEN,
+    "ABORTED": (160, 50, 0, 255),
     "WAITING": (110, 110, 120, 255),
     "NAVIGATING": (60, 160, 220, 255),
     "SETTLING": (200, 190, 90, 255),
@@ -102,8 +115,8 @@ STATE_COLOURS: dict[str, Colour] = {
     "VERIFYING": (120, 220, 190, 255),
     "DONE": (70, 140, 90, 255),
     "RETRIABLE": (240, 160, 60, 255),
-    "SKIPPED": (230, 190, 70, 255),
-    "FAILED": (230, 70, 70, 255),
+    "SKIPPED": ORANGE,
+    "FAILED": VERMILION,
 }
 """Every state of a robot and of a stop."""
 

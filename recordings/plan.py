@@ -31,6 +31,7 @@ from recordings.stages.mission import (
     draw_drive,
     draw_mission,
     mission_extent,
+    plan_states,
     plot_planned_coverage,
     tell_route,
 )
@@ -120,12 +121,14 @@ def _draw_planned_drive(canvas: Canvas, nouns: Nouns) -> None:
     if Selection in nouns:
         visible = int(nouns[Selection].visibility.visible.sum())
         plot_planned_coverage(canvas, mission, drive, visible=visible)
+    plan_states(canvas, mission, drive)
 
 
 def _tell(canvas: Canvas, nouns: Nouns) -> None:
     """The report, and the properties by which the file says what it is of."""
     report = rr.TextDocument(plan_report(nouns, canvas.origin), media_type="text/markdown")
     canvas.show(entities.REPORT, report)
+    canvas.at(entities.LATEST_REPORT, report, step=0, candidate=0, mission_s=0.0)
     results = {"local_origin": list(canvas.origin), "stopgo": __version__, **plan_results(nouns)}
     canvas.describe(entities.PROPERTY_PLAN, results)
     settings = parameters(nouns)

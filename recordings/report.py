@@ -186,10 +186,11 @@ def _findings(nouns: Nouns) -> list[str]:
 
 
 _COLOURS = (
-    "- targets: green seen by a stop, red not seen, violet seen from no candidate, yellow new in a step",
-    "- stops green with their number, doorway stops yellow-green; route cyan, way back dark cyan; run pink",
+    "- targets: blue seen by a stop, light grey not seen, dark grey seen from no candidate, yellow new",
+    "- of a run: bold blue was scanned, thick orange-red was planned and lost; a cross is a stop left out",
+    "- stops green with their number, doorway stops blue; route yellow, way back dark yellow; run purple",
     "- grey: stops and ways that a revision has withdrawn during a run",
-    "- openings: white passable, magenta not",
+    "- openings: white passable, orange-red not",
     "- candidates: yellow kept, reddish dropped; point at one to see why",
     "- walls grey, columns orange, beams purple, stairs teal, windows and railings blue, holes rose",
 )

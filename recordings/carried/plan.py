@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from mission.document import Mission
+from mission.geometry import bounds
 from recordings import entities
 from recordings.canvas import Canvas
+from recordings.carried.floor_lines import floor_lines
 from recordings.carried.reading import Recording
+from recordings.layout import Bounds
 from recordings.read import chunks
 
-TAKEN = (entities.FLOOR, entities.COVERAGE, entities.WORLD_FLOOR, entities.SIGHT, entities.FINDINGS)
+TAKEN = (
+    *(entities.FLOOR, entities.COVERAGE, entities.WORLD_FLOOR, entities.REPORT),
+    *(entities.SIGHT, entities.FINDINGS),
+)
 """What is taken, with all below it."""
 
 
@@ -21,3 +27,20 @@ def carry_plan(canvas: Canvas, plan: Recording, mission: Mission) -> None:
         entity = str(chunk.entity_path)
         if any(entity == name or entity.startswith(f"{name}/") for name in TAKEN):
             canvas.take(chunk)
+
+
+def planned_extent(plan: Recording | None) -> Bounds | None:
+    """Bounds of the floor that a plan's recording shows, in the drawing's metres; None if it shows none."""
+    if plan is None:
+        return None
+    floor = floor_lines(plan.values, origin_in(plan))
+    return None if floor is None else bounds(floor.outline)
+
+
+def origin_in(recording: Recording) -> tuple[float, float]:
+    """Where the recording's own origin lies in the drawing."""
+    for name in (entities.PROPERTY_PLAN, entities.PROPERTY_RUN):
+        origin = recording.contents.properties.get(name, {}).get("local_origin")
+        if origin is not None:
+            return (float(origin[0]), float(origin[1]))
+    return (0.0, 0.0)

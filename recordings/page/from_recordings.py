@@ -8,9 +8,9 @@ from typing import Any
 
 from mission.errors import InputError
 from mission.run_log import LogSource
-from recordings import entities
 from recordings.carried.findings import CarriedFindings, findings_in
 from recordings.carried.floor_lines import FloorLines, floor_lines
+from recordings.carried.plan import origin_in
 from recordings.carried.reading import Recording
 from recordings.page.subject import ReportSubject
 from recordings.review import RecordingReview, Review, missions_of, sights_of
@@ -52,21 +52,12 @@ def _first(read: Sequence[Recording], of: Any) -> Any:
 
 
 def _floor(recording: Recording) -> FloorLines | None:
-    return floor_lines(recording.values, _origin(recording))
+    return floor_lines(recording.values, origin_in(recording))
 
 
 def _found(recording: Recording) -> CarriedFindings | None:
     found = findings_in(recording.values)
     return found if found.findings or found.unreached else None
-
-
-def _origin(recording: Recording) -> tuple[float, float]:
-    """Where the recording's own origin lies in the drawing."""
-    for name in (entities.PROPERTY_PLAN, entities.PROPERTY_RUN):
-        origin = recording.contents.properties.get(name, {}).get("local_origin")
-        if origin is not None:
-            return (float(origin[0]), float(origin[1]))
-    return (0.0, 0.0)
 
 
 def _results(items: Sequence[RecordingReview]) -> dict[str, Any]:

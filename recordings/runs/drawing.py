@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -29,14 +30,16 @@ from mission.events import (
 )
 from mission.geometry import FloatArray, IntArray
 from mission.run_log import Track
+from mission.sight import Sight
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
 from recordings.pens import ORDER, Pen, style
-from recordings.robot import draw_robot, quaternions
+from recordings.robot import Draw, draw_robot, quaternions
+from recordings.runs.acquired_drawing import AcquiredDrawing
 from recordings.runs.report import StopRecord, run_report
 from recordings.runs.revision import change_between, draw_change
 from recordings.runs.trail import Thinner, Trail
-from recordings.stages.mission import ABOVE_FLOOR
+from recordings.stages.mission import ABOVE_FLOOR, state_colours
 
 SOLID_S = 0.5
 """How often the robot moves in 3D."""
@@ -54,7 +57,7 @@ MARKS = {
 class RunDrawing:
     """The entities of one run id on a canvas; grows as the robot tells more."""
 
-    def __init__(self, canvas: Canvas, run_id: str, mission: Mission) -> None:
+    def __init__(self, canvas: Canvas, run_id: str, mission: Mission, sights: Sequence[Sight] = ()) -> None:
         self.canvas = canvas
         self.run_id = run_id
         self.names = entities.RunEntities(run_id)
@@ -64,6 +67,7 @@ class RunDrawing:
         self.records: dict[str, StopRecord] = {}
         self._began_ns: int | None = None
         self._place: FloatArray | None = None
+        self._growth = AcquiredDrawing(sights[-1]) if sights else None
         self._thinner, self._trail, self._way = Thinner(), Trail(), WayFollower(mission)
         self._style()
         self._describe()
@@ -114,14 +118,14 @@ class RunDrawing:
         if isinstance(event, Arrived):
             self._plot_deviation(event)
         self._mark(event)
+        if self._growth is not None:
+            self._growth.tell(event, canvas=self.canvas, names=self.names, draw=self._at_time(event.robot_ns))
         self._report(event)
 
     def _style(self) -> None:
         """What things look like, which stays the same for the whole run."""
         canvas, names = self.canvas, self.names
-        states = rr.StateConfiguration(
-            values=list(palette.STATE_COLOURS), colors=list(palette.STATE_COLOURS.values())
-        )
+        states = state_colours()
         for lane in (entities.STATE, entities.STOP_STATE):
             canvas.show(names.flat(lane), states)
         style(canvas, names.flat(entities.DRIVEN), Pen(palette.DRIVEN, "robot", on_screen(1.5)))
@@ -217,9 +221,11 @@ class RunDrawing:
         stop = getattr(event, "stop", None)
         if stop is not None:
             self.records[stop] = self.records.get(stop, StopRecord()).after(event)
-        text = run_report(self.revisions, self.run_id, self.records, event)
+        coverage = "" if self._growth is None else self._growth.in_words()
+        text = run_report(self.revisions, self.run_id, self.records, event, coverage)
         document = rr.TextDocument(text, media_type="text/markdown")
-        self._at(self.names.flat(entities.RUN_REPORT), document, event.robot_ns)
+        for entity in (self.names.flat(entities.RUN_REPORT), entities.LATEST_REPORT):
+            self._at(entity, document, event.robot_ns)
 
     def tell_time(self, report: StateReport | PoseReport | AnyEvent) -> None:
         """Learn when the mission began, from a report that tells."""
@@ -231,6 +237,9 @@ class RunDrawing:
         """At the robot's time, and at mission time once it is known when the mission began."""
         mission_s = None if self._began_ns is None else (robot_ns - self._began_ns) / 1e9
         self.canvas.at(entity, archetype, mission_s=mission_s, robot_ns=robot_ns)
+
+    def _at_time(self, robot_ns: int) -> Draw:
+        return partial(self._at, robot_ns=robot_ns)
 
     def _columns(self, entity: str, ns: IntArray, *groups: Any) -> None:
         """The same for many rows, one at each time."""

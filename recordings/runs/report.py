@@ -33,9 +33,16 @@ class StopRecord:
 
 
 def run_report(
-    revisions: Sequence[Mission], run_id: str, records: dict[str, StopRecord], latest: AnyEvent
+    revisions: Sequence[Mission],
+    run_id: str,
+    records: dict[str, StopRecord],
+    latest: AnyEvent,
+    coverage: str = "",
 ) -> str:
-    """The run so far in markdown; of the mission's revisions the run follows the last."""
+    """The run so far in markdown; of the mission's revisions the run follows the last.
+
+    `coverage` tells what was acquired, where that is known.
+    """
     mission = revisions[-1]
     scanned = sum(record.outcome == "scanned" for record in records.values())
     lines = [
@@ -45,6 +52,7 @@ def run_report(
         "",
         f"{scanned} of {len(mission.stops)} stops scanned after {latest.mission_time_s:.1f} s"
         f" (last event: {type(latest).__name__})",
+        *(["", coverage] if coverage else []),
         "",
         "| stop | arrived s | deviation mm | outcome |",
         "|---|---|---|---|",

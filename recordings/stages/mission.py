@@ -60,6 +60,36 @@ def tell_route(canvas: Canvas, route: Route) -> None:
     )
 
 
+def plan_states(canvas: Canvas, mission: Mission, drive: Drive) -> None:
+    """What the robot is planned to be doing, and what is tolerated of it, beside what runs tell."""
+    lane = entities.PLANNED_STATE
+    canvas.show(lane, state_colours())
+    limits = {entities.METRIC_DEVIATION: [1.0], entities.METRIC_CROSS_TRACK: [1.0, -1.0]}
+    for metric, sides in limits.items():
+        look = rr.SeriesLines(colors=[palette.FAILED.colour] * len(sides), names=["tolerance"] * len(sides))
+        canvas.show(entities.part(metric, "planned"), look)
+    canvas.at(lane, rr.StateChange(state="NAVIGATING"), mission_s=0.0)
+    for stop, leaving in zip(mission.stops, drive.leaving_s.tolist(), strict=True):
+        scanning = leaving - stop.scan.duration_s
+        times = {"SETTLING": scanning - stop.settle_s, "SCANNING": scanning, "NAVIGATING": leaving}
+        for state, seconds in times.items():
+            canvas.at(lane, rr.StateChange(state=state), mission_s=seconds)
+        for metric, sides in limits.items():
+            values = [side * stop.tolerance_m * 1000 for side in sides]
+            canvas.at(entities.part(metric, "planned"), rr.Scalars(values), mission_s=scanning)
+    least = entities.part(entities.METRIC_BATTERY, "planned")
+    canvas.show(least, rr.SeriesLines(colors=palette.FAILED.colour, names="least, then home"))
+    for seconds in (0.0, float(drive.seconds[-1])):
+        canvas.at(least, rr.Scalars(100 * mission.policy.battery_min), mission_s=seconds)
+
+
+def state_colours() -> rr.StateConfiguration:
+    """The colour of every state, for a lane."""
+    return rr.StateConfiguration(
+        values=list(palette.STATE_COLOURS), colors=list(palette.STATE_COLOURS.values())
+    )
+
+
 def plot_planned_coverage(canvas: Canvas, mission: Mission, drive: Drive, *, visible: int) -> None:
     """Coverage over mission time, if every scan is done as planned."""
     gained = np.cumsum([stop.sees.new_units for stop in mission.stops]) * (100.0 / max(visible, 1))

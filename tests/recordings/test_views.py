@@ -15,6 +15,7 @@ from rerun.experimental import ViewerClient
 from bridge.station.watch import hand_over
 from mission.document import Mission
 from recordings import palette
+from recordings.carried.reading import read_recording
 from recordings.field import FieldRecording
 from recordings.viewer import Viewed
 from tests.recordings import run
@@ -26,17 +27,23 @@ pytestmark = pytest.mark.skipif(
 
 VIEWS = {
     "plan": {
-        "Mission": {"Plan and run": palette.ROUTE, "3D": palette.ROUTE, "Plan report": None},
+        "Mission": {"Plan and run": palette.ROUTE, "3D": palette.ROUTE, "Report": None},
         "Planning": {
             "Navigable space and candidates": palette.STOP_AREA,
             "What a candidate sees (timeline: candidate)": palette.KIND_COLOURS["columns"],
             "Selection (timeline: stage_step)": palette.SEEN.colour,
             "Coverage, %": palette.ROUTE,
         },
+        "Run": {
+            "States": None,
+            "Distance from the route, mm (left positive)": palette.FAILED.colour,
+            "Deviation at each stop, mm": palette.FAILED.colour,
+            "Battery, %": palette.FAILED.colour,
+        },
         "Log": {"Log": None},
     },
     "field": {
-        "Mission": {"Plan and run": palette.DRIVEN, "3D": palette.DRIVEN, "Run report": None},
+        "Mission": {"Plan and run": palette.DRIVEN, "3D": palette.DRIVEN, "Report": None},
         "Run": {
             "States": None,
             "Distance from the route, mm (left positive)": palette.DRIVEN,
@@ -68,6 +75,22 @@ def assert_every_view_shown(client: ViewerClient, which: str, into: Path) -> Non
     client.set_time("mission_time", duration=100.0, play_state="paused")
     for tab, colours in VIEWS[which].items():
         assert_shown(client, tab, colours, into)
+
+
+def test_what_was_lost_is_shown_whatever_is_opened_first(
+    sighted: Path, mission: Mission, tmp_path: Path
+) -> None:
+    """Opened together in any order, a plan and a run with a skip show the run's end, and the same."""
+    field = tmp_path / "field.rrd"
+    with FieldRecording(field, mission, plan=read_recording(sighted)) as recording:
+        for report in run.reports_with_a_skip(mission, "S2"):
+            hand_over(recording, report)
+    pictures = []
+    for files in ([sighted, field], [field, sighted]):
+        with viewer(files) as client:
+            assert_shown(client, "Mission", {"Plan and run": palette.LOST}, tmp_path)
+            pictures.append(pixels(look(client, "Mission", tmp_path)["Plan and run"][1]).astype(int))
+    assert np.abs(pictures[0] - pictures[1]).mean() < 1.0
 
 
 def test_plan_and_run_overlay(plan: Path, field: Path, tmp_path: Path) -> None:

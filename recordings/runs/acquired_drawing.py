@@ -1,0 +1,94 @@
+"""What a run acquires, drawn as it grows: bold where a scan saw it, thick where what was planned is lost."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from mission.events import Aborted, AnyEvent, Finished, Scanned, Skipped
+from mission.figures import percent
+from mission.geometry import BoolArray, FloatArray
+from mission.seen import runs_of
+from mission.sight import SeenFrom, Sight
+from recordings import entities, palette
+from recordings.canvas import Canvas, on_screen
+from recordings.pens import ORDER, Pen, style
+from recordings.robot import Draw
+
+BOLD_PX, THICK_PX = 2.5, 5.0
+"""Radii in points of the screen of what was seen and of what was lost."""
+CROSS_M = 0.3
+"""Half the size of the cross over a stop that was left out, metres."""
+
+
+class AcquiredDrawing:
+    """Knows what the scans of one run have seen so far.
+
+    What a skipped stop would have seen is lost once no stop that is still to come sees it.
+    """
+
+    def __init__(self, sight: Sight) -> None:
+        self._sight = sight
+        self._stops = {stop.id: stop for stop in sight.stops}
+        self._coming = set(sight.ids)
+        self._seen = np.zeros(len(sight.ledger.weight), dtype=bool)
+        self._lost = np.zeros(len(sight.ledger.weight), dtype=bool)
+        self._styled = False
+
+    def tell(self, event: AnyEvent, *, canvas: Canvas, names: entities.RunEntities, draw: Draw) -> None:
+        """Take an event and draw what it adds; `draw` draws at an entity, at the event's time."""
+        self._style(canvas, names)
+        if isinstance(event, Scanned) and event.stop in self._stops:
+            self._coming.discard(event.stop)
+            new = self._sight.seen_units([event.stop]) & ~self._seen
+            self._seen |= new
+            self._draw(canvas, names.flat(entities.ACQUIRED), new, draw)
+        elif isinstance(event, Skipped) and event.stop in self._stops:
+            self._give_up([self._stops[event.stop]], canvas, names, draw)
+        elif isinstance(event, Finished | Aborted):
+            left = [stop for stop in self._sight.stops if stop.id in self._coming]
+            self._give_up(left, canvas, names, draw)
+
+    def in_words(self) -> str:
+        """What was acquired so far, in a sentence."""
+        now, planned = self._sight.ledger.shares(self._seen).whole, self._sight.planned.whole
+        asked = "" if now.required is None else f"{percent(now.required)} asked, "
+        share, wanted = percent(now.coverage), percent(planned.coverage)
+        return f"**{share}** of what is visible is scanned ({asked}{wanted} planned)"
+
+    def _give_up(
+        self, stops: list[SeenFrom], canvas: Canvas, names: entities.RunEntities, draw: Draw
+    ) -> None:
+        """These stops will not be scanned: what none of those to come sees either is lost."""
+        self._coming -= {stop.id for stop in stops}
+        wanted = self._sight.seen_units([stop.id for stop in stops]) & ~self._seen & ~self._lost
+        lost = wanted & ~self._sight.seen_units(self._coming)
+        self._lost |= lost
+        self._draw(canvas, names.flat(entities.LOST), lost, draw)
+        if stops:
+            crosses = canvas.strips(line for stop in stops for line in _cross(stop))
+            above = ORDER["scan"] + 1
+            mark = rr.LineStrips2D(crosses, colors=palette.LOST, radii=on_screen(3), draw_order=above)
+            draw(entities.part(names.flat(entities.MISSING), stops[0].id), mark)
+
+    def _draw(self, canvas: Canvas, entity: str, units: BoolArray, draw: Draw) -> None:
+        lines = self._lines(units)
+        if len(lines):
+            draw(entity, rr.LineStrips2D.from_fields(strips=canvas.strips(lines)))
+
+    def _lines(self, units: BoolArray) -> FloatArray:
+        """The stretches of a mask of units (n,) as segments (k, 2, 2)."""
+        targets, runs = self._sight.targets, runs_of(self._sight.targets, units)
+        a, b = targets.a[runs.segment], targets.b[runs.segment]
+        return np.stack([a + (b - a) * runs.t0[:, None], a + (b - a) * runs.t1[:, None]], axis=1)
+
+    def _style(self, canvas: Canvas, names: entities.RunEntities) -> None:
+        if not self._styled:
+            self._styled = True
+            style(canvas, names.flat(entities.ACQUIRED), Pen(palette.ACQUIRED, "target", on_screen(BOLD_PX)))
+            style(canvas, names.flat(entities.LOST), Pen(palette.LOST, "target", on_screen(THICK_PX)))
+
+
+def _cross(stop: SeenFrom) -> list[FloatArray]:
+    x, y, k = stop.x, stop.y, CROSS_M
+    return [np.array([(x - k, y - k), (x + k, y + k)]), np.array([(x - k, y + k), (x + k, y - k)])]
