@@ -15,6 +15,8 @@ from mission.files.atomic import must_be_writable
 
 if TYPE_CHECKING:
     from mission.document import Mission, Transform
+    from mission.measured import Measured
+    from planner.further import PlannedFloor
     from recordings.logs import FieldLog, Reading
     from recordings.replay.log_placing import Align, Placing
     from recordings.replay.replayed import Replay
@@ -148,11 +150,24 @@ def _seen(replays: list[Replay], floor: Path, top_up: Path | None) -> list[Repla
 
     planned = planned_floor(floor, replays[0].mission)
     told = [item.with_sight(as_driven(planned, item.scanned_from)) for item in replays]
+    told = [item.with_measured(_measured(planned, item)) for item in told]
     if top_up is not None:
-        places = np.concatenate([item.scanned_from for item in replays])
-        evidence = " ".join(item.log.digest for item in replays)
-        _write_further(further(planned, places, evidence=evidence), top_up)
+        places = np.concatenate([item.scanned_from for item in told])
+        evidence = " ".join(item.log.digest for item in told)
+        heaps = [
+            heap.outline for item in told if item.measured is not None for heap in item.measured.unplanned
+        ]
+        _write_further(further(planned, places, obstacles=heaps, evidence=evidence), top_up)
     return told
+
+
+def _measured(planned: PlannedFloor, replay: Replay) -> Measured | None:
+    """What the scans in a log show; None where it has none."""
+    from planner.measuring import measured
+    from recordings.replay.placed_sweeps import placed_sweeps
+
+    found = measured(planned, placed_sweeps(replay))
+    return found if found.points else None
 
 
 def _write_further(mission: Mission | None, path: Path) -> None:

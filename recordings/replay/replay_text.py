@@ -10,6 +10,7 @@ from typing import Any
 from mission.as_driven import AsDriven
 from mission.comparing.telling import comparison_json, comparison_table
 from mission.figures import percent
+from mission.measured import Measured
 from mission.run_log import Alignment
 from mission.table import printable, table
 from recordings.logs.field_log import FieldLog
@@ -36,6 +37,7 @@ def as_text(replay: Replay) -> str:
         *_way(replay),
         *(f"  time lost  {item.seconds:+7.1f} s  {item.where}" for item in lost_times(replay)[:MOST_LOST]),
         *_sight(replay),
+        *_measured(replay),
         f"{HEADLINES[judgement.answer]}. {' '.join(judgement.sentences)}",
     ]
     return "\n".join(printable(line) for line in lines)
@@ -108,6 +110,29 @@ def _sight(replay: Replay) -> list[str]:
     return ["", *(f"  {line}" for line in lines), ""]
 
 
+def _measured(replay: Replay) -> list[str]:
+    """What the scans show."""
+    found = replay.measured
+    if found is None:
+        return []
+    share = found.shares.whole
+    lines = [
+        f"  measured   {percent(share.coverage)} of what is visible has points within "
+        f"{1000 * found.tolerance_m:.0f} mm ({found.points} points)"
+    ]
+    worst = sorted(found.deviations, key=lambda item: -abs(item[2]))[:MOST_LOST]
+    lines += [
+        f"  deviation  {name}: mean {1000 * mean:+.0f} mm, rms {1000 * rms:.0f} mm, {count} points"
+        for name, count, mean, rms in worst
+    ]
+    lines += [
+        f"  unplanned  at ({item.middle[0]:.2f}, {item.middle[1]:.2f}), {item.size_m:.1f} m, "
+        f"hit in {item.hits} scans"
+        for item in found.unplanned
+    ]
+    return [*lines, ""]
+
+
 def as_json(replay: Replay) -> dict[str, Any]:
     """Everything, for programs: metres, radians and seconds."""
     judgement, alignment = judged(replay), replay.run.alignment
@@ -127,6 +152,7 @@ def as_json(replay: Replay) -> dict[str, Any]:
         "halts": [_halt_json(replay, k) for k in range(len(replay.matches))],
         "true_offset_m": {stop.id: replay.true_offset_m(k) for k, stop in enumerate(replay.mission.stops)},
         "coverage": None if replay.sight is None else _sight_json(replay.sight),
+        "measured": None if replay.measured is None else _measured_json(replay.measured),
         "run": comparison_json(replay.comparison),
     }
 
@@ -141,6 +167,29 @@ def _sight_json(sight: AsDriven) -> dict[str, Any]:
     }  # fmt: skip
     elements = [{"id": item.name, "visible": item.visible, "seen": item.seen} for item in sight.elements]
     return {"shares": shares, "elements": elements}
+
+
+def _measured_json(found: Measured) -> dict[str, Any]:
+    return {
+        "tolerance_m": found.tolerance_m,
+        "points": found.points,
+        "share": found.shares.whole.coverage,
+        "elements": [
+            {"id": name, "points": count, "mean_m": mean, "rms_m": rms}
+            for name, count, mean, rms in found.deviations
+        ],
+        "histogram_edges_m": found.edges_m.tolist(),
+        "histograms": {
+            item.id: counts.tolist()
+            for item, counts in zip(found.ledger.elements, found.histogram, strict=True)
+            if counts.any()
+        },
+        "unplanned": [
+            {"x": item.middle[0], "y": item.middle[1], "size_m": item.size_m, "hits": item.hits,
+             "outline": item.outline.exterior.tolist()}
+            for item in found.unplanned
+        ],
+    }  # fmt: skip
 
 
 def _halt_json(replay: Replay, number: int) -> dict[str, Any]:

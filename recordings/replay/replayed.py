@@ -13,6 +13,7 @@ from mission.comparison import Comparison
 from mission.document import Mission
 from mission.events import Scanned, Unconfirmed
 from mission.geometry import FloatArray
+from mission.measured import Measured
 from mission.run_log import RunLog
 from recordings.logs.field_log import FieldLog
 from recordings.replay.log_placing import PlacedLog
@@ -39,9 +40,16 @@ class Replay:
     sight: AsDriven | None = None
     """What was in sight from where the robot stood; None without the floor."""
 
+    measured: Measured | None = None
+    """What the scans in the log show of the floor; None without the floor, or without scans."""
+
     def with_sight(self, sight: AsDriven) -> Replay:
         """The same, with what was in sight."""
         return replace(self, sight=sight)
+
+    def with_measured(self, measured: Measured | None) -> Replay:
+        """The same, with what scans show."""
+        return replace(self, measured=measured)
 
     @cached_property
     def scanned_from(self) -> FloatArray:

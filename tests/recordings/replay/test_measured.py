@@ -1,0 +1,116 @@
+"""What scans in a log show: targets hit, deviations, and what stands there unplanned."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from mission.__main__ import main
+from mission.document import Mission
+from mission.files.mission_json import read
+from planner.further import PlannedFloor, planned_floor, top_up
+from planner.measuring import measured
+from recordings.logs.field_log import FieldLog, Sweep
+from recordings.replay.log_placing import Placing
+from recordings.replay.placed_sweeps import placed_sweeps
+from recordings.replay.replayed import Replay
+from recordings.replay.replaying import replay
+from recordings.replay.standing import standings
+from tests.planner.test_command import drawn
+from tests.recordings.replay.driving import driven, logged
+from tests.recordings.replay.test_as_driven import PLAN
+from tests.recordings.replay.test_replaying import log_of
+
+HEAP = (2.6, 0.9, 3.0, 1.3)
+MOUNT = ("laser", 0.2, 0.1, 0.5)
+RAYS = 720
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> PlannedFloor:
+    path = tmp_path_factory.mktemp("floor")
+    assert main(["plan", str(drawn(path / "floor.dxf")), "-o", str(path), *PLAN]) == 0
+    return planned_floor(path / "floor.dxf", read(path / "mission.json"))
+
+
+def scanned(planned: PlannedFloor, *heaps: tuple[float, float, float, float], off: float = 0.0) -> Replay:
+    """A drive of the whole mission with a laser, turned on its mount, that meets walls moved by `off`."""
+    mission: Mission = planned.mission
+    track = logged(driven(mission))
+    walls = [shapely.Polygon(shape.exterior, shape.holes) for shape in planned.space.occluders]
+    solid = shapely.union_all([*walls, *(shapely.box(*heap) for heap in heaps)])
+    solid = shapely.affinity.translate(solid, xoff=off)
+    halts = standings(track, speed=mission.robot.speed)
+
+    def sweeps() -> Iterator[Sweep]:
+        for halt in halts:
+            for k in range(3):
+                xyz = seen_by_laser(solid, (halt.x, halt.y, halt.heading))
+                yield Sweep(halt.begin_ns + (k + 1) * 10**9, "/scan", "laser", xyz)
+
+    log: FieldLog = replace(log_of(track), sweeps=sweeps, mounts=(MOUNT,))
+    return replay(log, mission, Placing(align="first"))
+
+
+def seen_by_laser(solid: shapely.Geometry, pose: tuple[float, float, float]) -> np.ndarray:
+    """Points (n, 3) in the laser's frame."""
+    _, dx, dy, turn = MOUNT
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    x, y, heading = pose[0] + cos * dx - sin * dy, pose[1] + sin * dx + cos * dy, pose[2] + turn
+    angles = np.arange(RAYS) * math.tau / RAYS
+    ends = np.stack([x + 20 * np.cos(heading + angles), y + 20 * np.sin(heading + angles)], axis=-1)
+    rays = shapely.linestrings(np.stack([np.broadcast_to((x, y), ends.shape), ends], axis=1))
+    hits = shapely.intersection(rays, solid.boundary)
+    ranges = shapely.distance(shapely.Point(x, y), hits)
+    flat = np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=-1)[np.isfinite(ranges)]
+    return np.column_stack([flat, np.zeros(len(flat))])
+
+
+def test_walls_as_planned_are_measured_without_deviation(planned: PlannedFloor) -> None:
+    found = measured(planned, placed_sweeps(scanned(planned)))
+    assert found.unplanned == ()
+    assert (found.shares.whole.coverage or 0) > 0.8
+    for _, count, mean, rms in found.deviations:
+        assert count > 10
+        assert abs(mean) <= 0.006
+        assert rms <= 0.02
+
+
+def test_a_wall_that_stands_elsewhere_is_told_by_its_side(planned: PlannedFloor) -> None:
+    """All walls 4 cm to the right: the left faces of the room come nearer, the right ones go away."""
+    found = measured(planned, placed_sweeps(scanned(planned, off=0.04)), tolerance=0.02)
+    means = [mean for _, _, mean, _ in found.deviations]
+    assert max(means) > 0.02
+    assert min(means) < -0.02
+    as_planned = measured(planned, placed_sweeps(scanned(planned)), tolerance=0.02)
+    assert (found.shares.whole.coverage or 0) < 0.75 * (as_planned.shares.whole.coverage or 0)
+
+
+def test_what_nobody_planned_is_found_and_driven_round(planned: PlannedFloor) -> None:
+    found = measured(planned, placed_sweeps(scanned(planned, HEAP)))
+    (heap,) = found.unplanned
+    assert math.dist(heap.middle, (2.8, 1.1)) < 0.15
+    assert 0.3 < heap.size_m < 0.7
+    further = top_up(planned, np.empty((0, 3)), obstacles=[heap.outline])
+    assert further is not None
+    kept = shapely.Polygon(heap.outline.exterior)
+    legs = [shapely.LineString(stop.approach) for stop in further.stops if len(stop.approach) > 1]
+    assert all(leg.distance(kept) > planned.settings.radius - 0.01 for leg in legs)
+
+
+def test_what_walked_by_once_is_nothing(planned: PlannedFloor) -> None:
+    person = np.stack([np.linspace(2.0, 2.4, 50), np.full(50, 1.0)], axis=-1)
+    assert measured(planned, [person]).unplanned == ()
+    assert measured(planned, [person] * 3).unplanned != ()
+
+
+@pytest.mark.parametrize("points", [np.empty((0, 2)), np.full((3, 2), np.nan), np.full((3, 2), 1e12)])
+def test_points_of_nowhere_show_nothing(planned: PlannedFloor, points: np.ndarray) -> None:
+    found = measured(planned, [points])
+    assert not found.hit.any()
+    assert found.unplanned == ()
