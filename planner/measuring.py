@@ -29,12 +29,16 @@ MARGIN_M = 0.05
 
 
 def measured(
-    planned: PlannedFloor, sweeps: Iterable[FloatArray], *, tolerance: float = TOLERANCE_M
+    planned: PlannedFloor,
+    sweeps: Iterable[FloatArray],
+    *,
+    tolerance: float = TOLERANCE_M,
+    least_sweeps: int = LEAST_SWEEPS,
 ) -> Measured:
     """Lay sweeps of points (n, 2) in the mission's frame on the floor, one after another.
 
     A point belongs to the nearest unit; how far off it is, is its distance from the face. Where points lie
-    that are far from everything that is drawn, in several sweeps, there is something unplanned.
+    far from everything that is drawn, in `least_sweeps` of them or more, there is something unplanned.
     """
     tally = _Tally(planned.space, tolerance)
     for points in sweeps:
@@ -46,7 +50,7 @@ def measured(
         points=tally.points,
         edges_m=frozen(tally.edges),
         histogram=frozen(tally.histogram, np.int64),
-        unplanned=tuple(_unplanned(tally, planned.space)),
+        unplanned=tuple(_unplanned(tally, planned.space, least_sweeps)),
     )
 
 
@@ -98,9 +102,9 @@ class _Tally:
         self.cells[cells[:, 0], cells[:, 1]] += 1
 
 
-def _unplanned(tally: _Tally, space: NavigableSpace) -> list[Unplanned]:
+def _unplanned(tally: _Tally, space: NavigableSpace, least: int) -> list[Unplanned]:
     """Groups of cells that hang together, on floor where nothing is drawn near."""
-    cells = np.argwhere(tally.cells >= LEAST_SWEEPS)
+    cells = np.argwhere(tally.cells >= least)
     if not len(cells):
         return []
     origin = local_origin(space.floor)

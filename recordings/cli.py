@@ -104,6 +104,9 @@ def replay(
     floor: Annotated[
         Path | None, typer.Option(help="The floor it was planned on: tells what the robot saw of it.")
     ] = None,
+    clouds: Annotated[
+        Path | None, typer.Option(help="With --floor: folder of clouds (.e57 .las .laz .ply) in its metres.")
+    ] = None,
     top_up: Annotated[
         Path | None, typer.Option(help="With --floor: further mission to write that sees the rest (.json).")
     ] = None,
@@ -126,6 +129,8 @@ def replay(
 
     if top_up is not None and floor is None:
         raise InputError(f"--top-up {top_up}: is planned on the floor; give its file with --floor")
+    if clouds is not None and floor is None:
+        raise InputError(f"--clouds {clouds}: are laid on the floor; give its file with --floor")
     for path in (out, csv, top_up):
         if path is not None:
             must_be_writable(path)
@@ -135,13 +140,13 @@ def replay(
     how = _placing(map_, align, time_offset, poses, robot_name)
     replays = [laid(log, driven, how) for log in read]
     if floor is not None:
-        replays = _seen(replays, floor, top_up)
+        replays = _seen(replays, floor, clouds, top_up)
     _write_replays(replays, out, csv)
     _tell_replays(replays, as_json=json_)
     return max(judged(item).exit_code for item in replays)
 
 
-def _seen(replays: list[Replay], floor: Path, top_up: Path | None) -> list[Replay]:
+def _seen(replays: list[Replay], floor: Path, clouds: Path | None, top_up: Path | None) -> list[Replay]:
     """With what was in sight from where the robot stood, in all runs together; and the further mission."""
     import numpy as np
 
@@ -150,7 +155,7 @@ def _seen(replays: list[Replay], floor: Path, top_up: Path | None) -> list[Repla
 
     planned = planned_floor(floor, replays[0].mission)
     told = [item.with_sight(as_driven(planned, item.scanned_from)) for item in replays]
-    told = [item.with_measured(_measured(planned, item)) for item in told]
+    told = [item.with_measured(_measured(planned, item, clouds)) for item in told]
     if top_up is not None:
         places = np.concatenate([item.scanned_from for item in told])
         evidence = " ".join(item.log.digest for item in told)
@@ -161,11 +166,14 @@ def _seen(replays: list[Replay], floor: Path, top_up: Path | None) -> list[Repla
     return told
 
 
-def _measured(planned: PlannedFloor, replay: Replay) -> Measured | None:
-    """What the scans in a log show; None where it has none."""
+def _measured(planned: PlannedFloor, replay: Replay, clouds: Path | None) -> Measured | None:
+    """What the scanner's own clouds show, else the scans in the log; None where there is neither."""
     from planner.measuring import measured
+    from recordings.clouds import clouds_in, levels
     from recordings.replay.placed_sweeps import placed_sweeps
 
+    if clouds is not None:
+        return measured(planned, levels(clouds_in(clouds)), least_sweeps=1)
     found = measured(planned, placed_sweeps(replay))
     return found if found.points else None
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ import shapely
 
 from mission.__main__ import main
 from mission.document import Mission
-from mission.files.mission_json import read
+from mission.files.mission_json import read, write
 from planner.further import PlannedFloor, planned_floor, top_up
 from planner.measuring import measured
 from recordings.logs.field_log import FieldLog, Sweep
@@ -25,6 +27,7 @@ from tests.planner.test_command import drawn
 from tests.recordings.replay.driving import driven, logged
 from tests.recordings.replay.test_as_driven import PLAN
 from tests.recordings.replay.test_replaying import log_of
+from tests.recordings.test_clouds import ply
 
 HEAP = (2.6, 0.9, 3.0, 1.3)
 MOUNT = ("laser", 0.2, 0.1, 0.5)
@@ -101,6 +104,33 @@ def test_what_nobody_planned_is_found_and_driven_round(planned: PlannedFloor) ->
     kept = shapely.Polygon(heap.outline.exterior)
     legs = [shapely.LineString(stop.approach) for stop in further.stops if len(stop.approach) > 1]
     assert all(leg.distance(kept) > planned.settings.radius - 0.01 for leg in legs)
+
+
+def test_the_scanners_own_clouds_count_the_same_way(
+    planned: PlannedFloor, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Points all over the walls, from floor to ceiling, and a heap of which nobody knew."""
+    mission = planned.mission
+    track = logged(driven(mission))
+    table = zip(track.ns.tolist(), track.xy.tolist(), track.heading.tolist(), strict=True)
+    rows = "".join(f"{ns},{x},{y},{heading}\n" for ns, (x, y), heading in table)
+    (tmp_path / "run.csv").write_text("time_ns,x,y,heading\n" + rows)
+    write(mission, tmp_path / "mission.json")
+    drawn(tmp_path / "floor.dxf")
+    ring = shapely.box(*HEAP).exterior
+    heap = shapely.get_coordinates(ring.interpolate(np.linspace(0, ring.length, 200)))
+    flat = np.concatenate([planned.space.targets.unit_xy, heap])
+    (tmp_path / "clouds").mkdir()
+    points = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for z in (0.0, 0.8, 1.6, 2.6)])
+    ply(tmp_path / "clouds" / "all.ply", points)
+    given = ["--mission", str(tmp_path / "mission.json"), "--align", "first", "--json"]
+    floor = ["--floor", str(tmp_path / "floor.dxf"), "--clouds", str(tmp_path / "clouds")]
+    main(["replay", str(tmp_path / "run.csv"), *given, *floor])
+    found = json.loads(capsys.readouterr().out)["measured"]
+    assert found["share"] == 1.0
+    assert found["points"] == 2 * len(flat)
+    (unplanned,) = found["unplanned"]
+    assert math.dist((unplanned["x"], unplanned["y"]), (2.8, 1.1)) < 0.15
 
 
 def test_what_walked_by_once_is_nothing(planned: PlannedFloor) -> None:

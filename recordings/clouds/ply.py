@@ -1,0 +1,100 @@
+"""PLY files: a header of text, then vertices as text or as numbers of either byte order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from mission.errors import InputError
+from mission.geometry import FloatArray
+
+TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
+    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
+    "double": "f8", "float64": "f8",
+}  # fmt: skip
+ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
+PIECE = 1_000_000
+LONGEST_HEADER = 1000
+"""Lines."""
+
+
+@dataclass(frozen=True)
+class Vertices:
+    """What the header says of the vertices, which come first."""
+
+    order: str
+    """`<` or `>`; empty for text."""
+    count: int
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]
+
+
+def read_ply(path: Path) -> Iterator[FloatArray]:
+    """Vertices (n, 3), a million at a time.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, or its vertices have no x, y, z.
+    """
+    with path.open("rb") as file:
+        about = _header(file, path)
+        if set("xyz") - set(about.names):
+            raise InputError(f"{path}: its vertices have no x, y, z")
+        yield from _text(file, about, path) if not about.order else _numbers(file, about, path)
+
+
+def _header(file: BinaryIO, path: Path) -> Vertices:
+    if file.readline(8).strip() != b"ply":
+        raise InputError(f"{path}: does not begin as a PLY does")
+    order, count, element = "", 0, ""
+    names: list[str] = []
+    kinds: list[str] = []
+    for _ in range(LONGEST_HEADER):
+        words = file.readline(1000).decode("ascii", "replace").split()
+        if words[:1] == ["end_header"]:
+            return Vertices(order, count, tuple(names), tuple(kinds))
+        if words[:1] == ["format"] and words[1:2] and words[1] in ORDERS:
+            order = ORDERS[words[1]]
+        elif words[:1] == ["element"] and len(words) == 3:
+            if element == "" and words[1] != "vertex":
+                break
+            element = words[1]
+            count = int(words[2]) if element == "vertex" and words[2].isdigit() else count
+        elif words[:1] == ["property"] and element == "vertex":
+            if len(words) != 3 or words[1] not in TYPES:
+                break
+            names.append(words[2])
+            kinds.append(TYPES[words[1]])
+    raise InputError(f"{path}: its header is none of a PLY with vertices first")
+
+
+def _numbers(file: BinaryIO, about: Vertices, path: Path) -> Iterator[FloatArray]:
+    kind = np.dtype([(name, about.order + code) for name, code in zip(about.names, about.kinds, strict=True)])
+    left = about.count
+    while left > 0:
+        data = file.read(min(left, PIECE) * kind.itemsize)
+        rows = np.frombuffer(data[: len(data) // kind.itemsize * kind.itemsize], kind)
+        if not len(rows):
+            raise InputError(f"{path}: ends {left} vertices too early")
+        left -= len(rows)
+        yield np.stack([rows[axis].astype(float) for axis in "xyz"], axis=-1)
+
+
+def _text(file: BinaryIO, about: Vertices, path: Path) -> Iterator[FloatArray]:
+    at = [about.names.index(axis) for axis in "xyz"]
+    left = about.count
+    while left > 0:
+        lines = [line for line in (file.readline() for _ in range(min(left, PIECE))) if line]
+        if not lines:
+            raise InputError(f"{path}: ends {left} vertices too early")
+        left -= len(lines)
+        try:
+            yield np.array([[float(line.split()[k]) for k in at] for line in lines])
+        except (ValueError, IndexError):
+            raise InputError(f"{path}: a vertex in it is no numbers") from None
