@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -52,6 +53,9 @@ def plan_command(
     ] = None,
     *,
     all_parts: Annotated[bool, typer.Option(help="Also plan parts not connected with the first.")] = False,
+    all_storeys: Annotated[
+        bool, typer.Option(help="Plan every storey of a model that people walk on, each into its folder.")
+    ] = False,
     strict: Annotated[
         bool, typer.Option(help="Exit 1 if floor is left out or the plan is doubtful.")
     ] = False,
@@ -73,9 +77,26 @@ def plan_command(
         return 0
     if floor is None:
         raise InputError("no floor given; name a file, such as: stopgo plan floor.dxf -o plan")
+    if all_storeys:
+        from planner.storeys import plan_storeys
+
+        one = partial(_plan_storey, all_parts=all_parts, strict=strict)
+        return plan_storeys(floor, _folder(out), settings, one, as_json=as_json)
     reports = plan_files(floor, out, settings, all_parts=all_parts)
     _print(reports, as_json=as_json)
     return max(report.strict_answer if strict else report.answer for report in reports)
+
+
+def _plan_storey(
+    floor: Path, folder: Path, settings: Settings, *, all_parts: bool, strict: bool
+) -> tuple[int, str, list[dict[str, Any]]]:
+    """Plan one storey, in whatever process: its exit code, what a person reads, and what `--json` tells."""
+    try:
+        reports = plan_files(floor, folder, settings, all_parts=all_parts)
+    except StopgoError as error:
+        return error.exit_code, str(error), []
+    code = max(report.strict_answer if strict else report.answer for report in reports)
+    return code, "\n".join(r.as_text() for r in reports), [r.as_json() for r in reports]
 
 
 def _print(reports: list[PlanReport], *, as_json: bool) -> None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mission.errors import InputError
+
 if TYPE_CHECKING:
+    from mission.floor import FloorPlan
     from planner.floors.reader import FloorOptions
     from planner.floors.survey import FloorChoice, LayerUse, Survey
 
@@ -19,6 +23,8 @@ def add_floor_commands(app: typer.Typer) -> None:
     from planner.options import with_options
 
     floors = with_options(floors_command, (*FLOOR_PARAMETERS, "layers"))
+    convert = with_options(convert_command, (*FLOOR_PARAMETERS, "layers"))
+    app.command(name="convert", epilog="Example: stopgo convert building.ifc --storey EG -o eg.dxf")(convert)
     app.command(name="floors", epilog="Example: stopgo floors building.ifc --svg floors.svg")(floors)
 
 
@@ -54,6 +60,46 @@ def floors_command(
     else:
         typer.echo(printable_lines("\n".join(survey_lines(found))))
     return 0 if found.refusal is None else 1
+
+
+def convert_command(
+    file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf, an .ifc or an .ifczip.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The .dxf that is written.")],
+    *,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+    **given: Any,
+) -> int:
+    """Write a floor as a layered DXF in metres, which plans to the same stops and may be drawn on before."""
+    from mission.files.atomic import write_atomic
+    from mission.files.layered_dxf import layered_dxf
+    from mission.settings import read_settings
+    from planner.floors import options_of, read_floor
+    from planner.options import values_of
+
+    if out.suffix.lower() != ".dxf":
+        raise InputError(f"{out}: must end in .dxf")
+    floor = read_floor(file, options_of(read_settings(None, values_of(given))))
+    write_atomic(out, layered_dxf(floor))
+    lost = list(_not_in_a_drawing(floor))
+    for text in lost:
+        typer.echo(f"stopgo: {text}", err=True)
+    if as_json:
+        told = {"file": str(out), "floor": floor.name, "rooms": len(floor.rooms), "lost": lost}
+        typer.echo(json.dumps(told, ensure_ascii=False))
+    else:
+        typer.echo(f"{out}: {floor.name}, {floor.area:.0f} m², {len(floor.rooms)} rooms")
+    return 0
+
+
+def _not_in_a_drawing(floor: FloorPlan) -> Iterator[str]:
+    """What a layered drawing has no place for."""
+    place = floor.georeference
+    if place is not None:
+        origin = f"{place.lat:.7f},{place.lon:.7f},{place.alt:.2f},{place.heading_deg:.3f}"
+        yield f"a drawing has no place on earth; plan it with --origin {origin}"
+    settled = sum(not item.to_scan for item in floor.elements)
+    if settled:
+        yield f"{settled} elements are not to be scanned on that day; in the drawing all are"
 
 
 def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:

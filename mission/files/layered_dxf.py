@@ -1,0 +1,112 @@
+"""Writes a floor as a layered DXF in metres, so that reading it again gives the same floor.
+
+Layers are those that the reader of layered drawings knows: FLOOR, ROOMS, WALLS and so on. GlobalIds are XDATA
+of application IFC, group 1000.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mission.floor import FloorPlan, Room
+from mission.geometry import FloatArray, Polygon
+from mission.kinds import KINDS
+from mission.table import printable
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing
+    from ezdxf.entities import DXFEntity
+    from ezdxf.layouts import Modelspace
+
+COLOURS = {
+    "FLOOR": 8, "ROOMS": 3, "DOORS": 5, "PASSAGES": 150, "WALLS": 7, "COLUMNS": 1, "BEAMS": 40,
+    "STAIRS": 30, "WINDOWS": 4, "RAILINGS": 6, "OTHER": 9,
+}  # fmt: skip
+"""AutoCAD colour of each layer."""
+TEXT = 0.2
+"""Height of a room's name in metres."""
+
+
+def layered_dxf(floor: FloorPlan) -> bytes:
+    """The drawing's bytes; equal floors give equal bytes."""
+    import ezdxf
+    import ezdxf.units
+
+    with _fixed_dates():
+        drawing = ezdxf.new("R2010", units=ezdxf.units.M)
+        drawing.appids.add("IFC")
+        for name, colour in COLOURS.items():
+            drawing.layers.add(name, color=colour)
+        _draw(drawing.modelspace(), floor)
+        return _encoded(drawing)
+
+
+@contextmanager
+def _fixed_dates() -> Iterator[None]:
+    """ezdxf writes dates and random identifiers into a file unless told not to."""
+    import ezdxf
+
+    before = ezdxf.options.write_fixed_meta_data_for_testing
+    ezdxf.options.write_fixed_meta_data_for_testing = True
+    try:
+        yield
+    finally:
+        ezdxf.options.write_fixed_meta_data_for_testing = before
+
+
+def _encoded(drawing: Drawing) -> bytes:
+    drawing.classes.add_required_classes(drawing.dxfversion)
+    drawing.classes.classes = dict(sorted(drawing.classes.classes.items()))  # a set's order is no order
+    text = io.StringIO()
+    drawing.write(text)
+    return text.getvalue().encode("utf-8")
+
+
+def _draw(space: Modelspace, floor: FloorPlan) -> None:
+    for part in floor.outline:
+        _rings(space, part, "FLOOR", None)
+    for room in floor.rooms:
+        for part in room.polygons:
+            _rings(space, part, "ROOMS", room.global_id)
+        _name(space, room)
+    for element in floor.elements:
+        layer = element.kind.upper() if element.kind in KINDS else "OTHER"
+        for part in element.solids:
+            _rings(space, part, layer, element.global_id)
+        for line in element.lines:
+            _marked(space.add_lwpolyline(line.tolist(), dxfattribs={"layer": layer}), element.global_id)
+    for opening in floor.openings:
+        layer = "DOORS" if opening.kind == "door" else "PASSAGES"
+        a, b = opening.line.tolist()
+        _marked(space.add_line(a, b, dxfattribs={"layer": layer}), opening.global_id)
+
+
+def _rings(space: Modelspace, part: Polygon, layer: str, global_id: str | None) -> None:
+    """The outer ring as it is, counter-clockwise, and its holes against it."""
+    for ring in part.rings:
+        _marked(space.add_lwpolyline(ring.tolist(), close=True, dxfattribs={"layer": layer}), global_id)
+
+
+def _marked(entity: DXFEntity, global_id: str | None) -> None:
+    if global_id:
+        entity.set_xdata("IFC", [(1000, global_id)])
+
+
+def _name(space: Modelspace, room: Room) -> None:
+    if room.name:
+        look = {"layer": "ROOMS", "height": TEXT, "insert": _inside(room).tolist()}
+        space.add_text(printable(room.name), dxfattribs=look)
+
+
+def _inside(room: Room) -> FloatArray:
+    """A point in the room's largest part, far from its edges."""
+    import shapely
+
+    parts = [shapely.Polygon(part.exterior, part.holes) for part in room.polygons]
+    largest = max(parts, key=lambda part: part.area)
+    return np.round(shapely.get_coordinates(largest.point_on_surface())[0], 4)
