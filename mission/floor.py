@@ -138,6 +138,8 @@ class FloorPlan:
     findings: tuple[Finding, ...] = ()
     status: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     """Elements on this floor by construction status, on the day in `source`; empty without one."""
+    on_robots_map: bool = False
+    """Whether the coordinates are those of the robot's own map."""
     ignored: tuple[IgnoredLine, ...] = ()
     """Lines that no plan may cross unsaid: nobody knows what they stand for."""
 

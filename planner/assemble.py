@@ -33,6 +33,7 @@ from mission.specs import (
     scanner_of,
     site_origin_of,
 )
+from mission.turning import SAME
 from planner.routing import GRAPHS
 from planner.shapes import local_origin
 from planner.space.gaps import Walls, keeps_clear
@@ -53,7 +54,7 @@ def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
             revision=revision,
             name=floor.name if part == 0 else f"{floor.name}-{part + 1}",
             digest="",
-            frame=Frame(name="site"),
+            frame=Frame(name="map", to_map=SAME) if floor.on_robots_map else Frame(name="site"),
             georeference=_georeference(space),
             robot=robot_of(settings),
             scanner=scanner_of(settings),

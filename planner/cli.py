@@ -44,7 +44,7 @@ def plan_command(
     floor: Annotated[
         Path | None,
         typer.Argument(
-            help="The floor: a .dxf, layered or as drawn; an .ifc or .ifczip.", show_default=False
+            help="The floor: a .dxf, layered or as drawn; an .ifc or .ifczip; a map.yaml.", show_default=False
         ),
     ] = None,
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")] = Path(),

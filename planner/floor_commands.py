@@ -29,7 +29,7 @@ def add_floor_commands(app: typer.Typer) -> None:
 
 
 def floors_command(
-    file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf, an .ifc or an .ifczip.")],
+    file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf, .ifc, .ifczip or map.yaml.")],
     *,
     svg: Annotated[Path | None, typer.Option(help="Draw what was read, and what was left out.")] = None,
     write_map: Annotated[

@@ -29,6 +29,13 @@ READERS: tuple[Reader, ...] = (
         takes=frozenset({"layers", "layer_map", "drawing", "region", "units"}),
     ),
     Reader(
+        kind="robot map",
+        suffixes=(".yaml", ".yml"),
+        holds=lambda data: all(key in data[:4096] for key in (b"image:", b"resolution:", b"origin:")),
+        module="planner.floors.robot_map",
+        takes=frozenset(),
+    ),
+    Reader(
         kind="building model",
         suffixes=(".ifc", ".ifczip"),
         holds=lambda data: b"ISO-10303-21" in data[:1024] or _is_zipped_model(data),

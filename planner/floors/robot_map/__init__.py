@@ -1,0 +1,174 @@
+"""Reads a robot's map, a ROS map.yaml with its picture, as a floor in the map's own frame.
+
+Occupied cells become walls, or obstacles where they are too small for one; what nobody knows is not floor.
+The coordinates are those of the map, so that stops are where the robot takes them to be.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from mission.errors import InputError
+from mission.floor import Finding, FloorPlan
+from mission.geometry import bounds, frozen
+from planner.floors.linework import completed
+from planner.floors.parts import in_order, parts_of
+from planner.floors.reader import FloorFile, FloorOptions
+from planner.floors.robot_map.cell_regions import placed, polygons_of_cells, smoothed
+from planner.floors.robot_map.description import FREE, OCCUPIED, UNKNOWN, MapDescription, read_description
+from planner.floors.robot_map.picture import read_picture
+from planner.floors.strokes import Stroke
+from planner.floors.survey import FloorChoice, Survey
+
+LEAST_WALL = 0.5
+"""Occupied cells that hang together over less than this, in metres, are an obstacle and no wall."""
+LEAST_FLOOR = 1.0
+"""Free cells that hang together in less than this, in m², are no floor."""
+_EIGHT = np.ones((3, 3), dtype=bool)
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """A map's cells, sorted."""
+
+    walls: NDArray[np.bool_]
+    specks: NDArray[np.bool_]
+    """Small obstacles."""
+    floor: NDArray[np.bool_]
+    """Free cells and what stands on them."""
+    findings: tuple[Finding, ...]
+
+
+def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
+    """The floor that a robot's map shows.
+
+    Raises
+    ------
+    InputError
+        When the description or its picture cannot be read, or no floor is free on it.
+    """
+    description, picture = _opened(file)
+    grid = _grid(description, picture, file.path)
+    strokes = [
+        *_strokes(grid.floor, "floor", description),
+        *_strokes(grid.walls, "walls", description),
+        *_strokes(grid.specks, "other", description),
+    ]
+    made = completed(strokes, [])
+    parts = parts_of(made.strokes, [], source=file.path, layers=(), known=frozenset({"map"}))
+    return FloorPlan(
+        name=file.path.stem,
+        source=file.source(options={"image": hashlib.sha256(picture).hexdigest()}),
+        outline=parts.outline,
+        rooms=parts.rooms,
+        openings=parts.openings,
+        elements=parts.elements,
+        findings=in_order((*grid.findings, *made.findings, *parts.findings)),
+        on_robots_map=True,
+    )
+
+
+def survey(file: FloorFile, options: FloorOptions) -> Survey:
+    """What a robot's map holds."""
+    description, picture = _opened(file)
+    floor = read(file, options)
+    cells = description.cells(read_picture(picture, name=description.image))
+    kinds = (*(item.kind for item in floor.elements), *(f"{item.kind}s" for item in floor.openings))
+    choice = FloorChoice(
+        name=floor.name,
+        option="",
+        area_m2=floor.area,
+        bounds=bounds([part.exterior for part in floor.outline]),
+        elements={"rooms": len(floor.rooms), **Counter(kinds)},
+        chosen=True,
+    )
+    unknown = int(np.count_nonzero(cells == UNKNOWN))
+    return Survey(
+        file=file.path.name,
+        kind=f"robot map, {cells.shape[1]} x {cells.shape[0]} cells of {description.resolution:g} m",
+        digest=file.digest,
+        units="metre, in the map's own frame",
+        floors=(choice,),
+        inferred=tuple(item.message for item in floor.findings if item.code.startswith("inferred_")),
+        ignored=(f"{unknown} unknown cells ({unknown / cells.size:.0%}) are not floor",),
+        findings=tuple(item for item in floor.findings if not item.code.startswith("inferred_")),
+    )
+
+
+def _opened(file: FloorFile) -> tuple[MapDescription, bytes]:
+    """The description, and the bytes of its picture, which lies beside it."""
+    description = read_description(file.data, name=str(file.path))
+    path = file.path.parent / description.image
+    try:
+        return description, path.read_bytes()
+    except (OSError, ValueError):
+        raise InputError(
+            f"{file.path}: its image {description.image} cannot be read; put it beside the file, "
+            "or write where it is"
+        ) from None
+
+
+def _grid(description: MapDescription, picture: bytes, path: Path) -> _Grid:
+    cells = description.cells(read_picture(picture, name=description.image))
+    floor = _largest_floors(cells, description, path)
+    occupied = (cells == OCCUPIED) & floor
+    specks = _small(occupied, LEAST_WALL / description.resolution)
+    findings = []
+    if specks.any():
+        _, count = ndimage.label(specks, _EIGHT)
+        text = f"{count} groups of occupied cells smaller than {LEAST_WALL:g} m are obstacles, no walls"
+        findings.append(Finding("small_obstacles", text))
+    return _Grid(occupied & ~specks, specks, floor, tuple(findings))
+
+
+def _largest_floors(cells: NDArray[np.uint8], description: MapDescription, path: Path) -> NDArray[np.bool_]:
+    """Free cells that hang together, lone unknown ones among them, and the occupied cells beside them."""
+    free = cells == FREE
+    others = ndimage.convolve((~free).astype(np.uint8), _EIGHT.astype(np.uint8), mode="constant", cval=1)
+    lone = (cells == UNKNOWN) & (others == 1)
+    label, count = ndimage.label(free | lone)
+    area = np.bincount(label[free], minlength=count + 1) * description.resolution**2
+    kept = np.isin(label, np.flatnonzero(area >= LEAST_FLOOR)) & (label > 0)
+    if not kept.any():
+        unknown = np.count_nonzero(cells == UNKNOWN) / cells.size
+        raise InputError(
+            f"{path}: no floor is free on the map ({unknown:.0%} of its cells are unknown); "
+            "check image, negate, mode and the thresholds"
+        )
+    standing, _ = ndimage.label((cells == OCCUPIED) | kept, _EIGHT)
+    beside = np.unique(standing[kept])
+    return kept | (np.isin(standing, beside) & (cells == OCCUPIED))
+
+
+def _small(occupied: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
+    """Cells of groups that are smaller than `least` cells both ways."""
+    label, _ = ndimage.label(occupied, _EIGHT)
+    small = [
+        number
+        for number, (rows, columns) in enumerate(ndimage.find_objects(label), start=1)
+        if max(rows.stop - rows.start, columns.stop - columns.start) < least
+    ]
+    return np.isin(label, small)
+
+
+def _strokes(mask: NDArray[np.bool_], role: str, description: MapDescription) -> list[Stroke]:
+    """The outlines of cells as closed strokes; holes go round the other way."""
+    shapes = shapely.orient_polygons(smoothed(polygons_of_cells(mask)))
+    return [
+        Stroke(_ring(ring, description), "map", role, closed=True, fill=role != "floor")
+        for shape in shapes
+        for ring in (shape.exterior, *shape.interiors)
+    ]
+
+
+def _ring(ring: shapely.LinearRing, description: MapDescription) -> np.ndarray:
+    corners = shapely.get_coordinates(ring)[:-1]
+    return frozen(placed(corners, resolution=description.resolution, origin=description.origin))
