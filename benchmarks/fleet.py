@@ -36,7 +36,7 @@ def main() -> None:
             booted = pool.map(lambda n: robot(folder, endpoint, n), range(given.robots))
             for process in booted:
                 stack.callback(end_robot, process)
-        print(f"{len(fleet(endpoint))} robots tell their state")
+        print(f"{sum(member.state is not None for member in fleet(endpoint))} robots tell their state")
         listen(endpoint, given.seconds)
 
 

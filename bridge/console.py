@@ -57,9 +57,14 @@ def say(line: str) -> None:
     print(printable(line), file=sys.stderr, flush=True)  # noqa: T201
 
 
-def tell(text: str, *, at_once: bool = False) -> None:
-    """What a command was asked for, on stdout; it may hold what a robot, a vehicle or a file says."""
-    print(printable_lines(text), flush=at_once)  # noqa: T201
+def tell(line: str, *, at_once: bool = False) -> None:
+    """A line of what a command was asked for, on stdout; it may hold what a robot or a file says."""
+    print(printable(line), flush=at_once)  # noqa: T201
+
+
+def tell_lines(text: str) -> None:
+    """Several such lines: a table or a document, whose cells can hold no line breaks of their own."""
+    print(printable_lines(text))  # noqa: T201
 
 
 @contextmanager

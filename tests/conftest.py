@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import tempfile
 from collections.abc import Iterator
 
 import pytest
@@ -15,9 +16,12 @@ def pytest_configure() -> None:
     """Let no test depend on where the tests run, or on which of them ran before in the same process.
 
     A shell without job control starts background programs with SIGINT ignored, and children inherit that.
+    What commands remember of robots and vehicles goes to a folder of the tests' own.
     pymavlink asks this variable for its version, at its import and again later; the bridge sets it.
     """
     os.environ["MAVLINK20"] = "1"
+    if "PYTEST_XDIST_WORKER" not in os.environ:  # workers have their parent's
+        os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="stopgo-tests-")
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 

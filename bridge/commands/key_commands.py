@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from bridge.commands.connection import SiteName
-from bridge.console import print_json, tell
+from bridge.console import print_json, tell, tell_lines
 from mission.errors import InputError
 from mission.table import table
 
@@ -145,7 +145,7 @@ def keys_list(
          one.state if one.current else f"{one.state}, replaced")
         for one in found
     ]  # fmt: skip
-    tell(table(("role", "name", "serial", "until", "state"), rows))
+    tell_lines(table(("role", "name", "serial", "until", "state"), rows))
 
 
 def router_rules(
@@ -164,4 +164,4 @@ def router_rules(
     from bridge.link.keys import now_utc
 
     valid = [one.holder for one in listed(folder, now=now_utc()) if one.state == "valid"]
-    tell(json.dumps({"access_control": router_access_control(valid, site)}, indent=2))
+    tell_lines(json.dumps({"access_control": router_access_control(valid, site)}, indent=2))

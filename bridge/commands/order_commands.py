@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -30,6 +31,8 @@ from bridge.commands.connection import (
 from bridge.console import print_json, refusals_in, tell
 
 if TYPE_CHECKING:
+    from bridge.station.roster import LastSeen
+    from bridge.station.station import FleetMember
     from mission.events import StateReport
     from mission.run.orders import Answer, Verb
 
@@ -127,16 +130,23 @@ def status(
     insecure: Insecure = False,
     keys: KeyFolder = None,
     all_: Annotated[bool, typer.Option("--all", help="All robots, though one is preset.")] = False,
+    roster: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.toml", help="Who is missed: robots = [...]; else all ever seen."),
+    ] = None,
+    forget: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Miss a robot no more that was seen; repeatable.")
+    ] = None,
     json_: Json = False,
 ) -> None:
-    """Tell what the robot is doing, or what all robots of the site are.
+    """Tell what the robot is doing, or what all robots of the site are; 1 if one of those is silent.
 
     Example: stopgo status --robot r1 --json
 
+    Example: stopgo status --connect tls/router.site:7447 --keys ~/keys/alice --roster robots.toml
+
     Example: stopgo status --mavlink udpout:127.0.0.1:14550
     """
-    from bridge.station.station import fleet
-
     given = given_in(context)
     told = with_presets(given, {
         "robot": robot, "mavlink": mavlink, "connect": connect, "site": site, "keys": keys,
@@ -146,22 +156,80 @@ def status(
         told |= {"robot": None, "mavlink": None}
     if told["robot"] is None and told["mavlink"] is None:
         alone(given, "all robots of a site", *VEHICLES)
-        reports = fleet(
-            told["connect"], site=told["site"], timeout_s=timeout, insecure=insecure, keys=told["keys"]
-        )
-        as_json: dict[str, Any] = {"robots": [status_json(report) for report in reports]}
-    else:
-        connection = connection_of(
-            given, vehicle=vehicle, signing_key=signing_key, state=state, timeout=timeout, insecure=insecure,
-            **told,
+        return fleet_status(
+            told["connect"], told["site"], timeout_s=timeout, insecure=insecure, keys=told["keys"],
+            roster=roster, leave_out=tuple(forget or ()), as_json=json_,
         )  # fmt: skip
-        with in_time(connection.to_look()) as station:
-            reports = (station.status(),)
-        as_json = status_json(reports[0])
+    alone(given, "one robot", "--roster", "--forget")
+    connection = connection_of(
+        given, vehicle=vehicle, signing_key=signing_key, state=state, timeout=timeout, insecure=insecure,
+        **told,
+    )  # fmt: skip
+    with in_time(connection.to_look()) as station:
+        report = station.status()
     if json_:
-        print_json(as_json)
+        print_json(status_json(report))
     else:
-        tell("\n".join(state_line(report) for report in reports))
+        tell(state_line(report))
+
+
+def fleet_status(
+    endpoint: str,
+    site: str | None,
+    *,
+    roster: Path | None,
+    leave_out: tuple[str, ...],
+    as_json: bool,
+    **reaching: Any,
+) -> None:
+    """Tell of all robots of a site, those too that ought to be there; a silent one is an answer of no."""
+    from bridge.link.keys import now_utc
+    from bridge.station.roster import LastSeen, forget, read_roster, remember, remembered, usual_roster
+    from bridge.station.station import fleet
+
+    path = usual_roster(endpoint, site)
+    if leave_out:
+        forget(path, leave_out)
+    before = remembered(path)
+    members = fleet(
+        endpoint, site=site, known=tuple(before) if roster is None else read_roster(roster), **reaching
+    )
+    seen = {
+        member.robot: LastSeen(at=now_utc(), state=member.state.state) for member in members if member.state
+    }
+    if seen:
+        remember(path, seen)
+    if as_json:
+        print_json({"robots": [member_json(member, before.get(member.robot)) for member in members]})
+    else:
+        for member in members:
+            tell(member_line(member, before.get(member.robot)))
+    if len(seen) < len(members):
+        raise typer.Exit(1)
+
+
+def member_json(member: FleetMember, before: LastSeen | None) -> dict[str, Any]:
+    """The same keys for every robot; a silent one has no values but its name and when it was last seen."""
+    told = dict.fromkeys(STATUS_KEYS) if member.state is None else status_json(member.state)
+    last = None if before is None or member.state else before.at.isoformat(timespec="seconds")
+    return told | {
+        "robot": member.robot,
+        "silent": member.state is None,
+        "trouble": member.trouble,
+        "last_seen": last,
+    }
+
+
+def member_line(member: FleetMember, before: LastSeen | None) -> str:
+    """One line of a fleet."""
+    if member.state is not None:
+        return state_line(member.state)
+    last = (
+        "never seen from here"
+        if before is None
+        else f"{before.state} when last seen, {before.at:%Y-%m-%d %H:%M} UTC"
+    )
+    return f"{member.robot}: SILENT; {last}; {member.trouble}"
 
 
 def status_json(report: StateReport) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
-from bridge.console import Bar, print_json, say, tell
+from bridge.console import Bar, print_json, say, tell, tell_lines
 from bridge.mavlink.auto.logbook import forget, logbook, remember
 from bridge.mavlink.auto.unfinished_run import check_run_over
 from bridge.mavlink.line.origin import check_origin
@@ -109,7 +109,7 @@ def fetch_mission(line: Line, *, out: Path | None, as_json: bool) -> None:
     elif out is not None:
         tell(f"{out}: the {len(own)} items that {peer} holds")
     else:
-        tell(_page(peer, own))
+        tell_lines(_page(peer, own))
 
 
 def clear_mission(line: Line, *, state: Path | None, while_running: bool, as_json: bool) -> None:

@@ -12,7 +12,7 @@ import typer
 
 from bridge.commands.connection import Connection, reached, with_connection
 from bridge.commands.order_commands import Json, status_json
-from bridge.console import print_json, say, tell
+from bridge.console import print_json, say, tell, tell_lines
 
 if TYPE_CHECKING:
     from bridge.station.watch import Showing
@@ -89,7 +89,7 @@ def tell_compared(heard: HeardRun, state: StateReport, *, json_: bool) -> int:
         beside = {} if compared is None else {"comparison": comparison_json(compared)}
         print_json(status_json(state) | beside)
     elif compared is not None:
-        tell(comparison_text(compared))
+        tell_lines(comparison_text(compared))
     if compared is None or state.state != "FINISHED":
         return 0 if state.state == "FINISHED" else 1
     if heard.sights and compared.acquired is None:

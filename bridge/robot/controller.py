@@ -24,6 +24,7 @@ from bridge.robot.owed import Owed
 from bridge.robot.runner import Position
 from mission.document import Mission
 from mission.events import AnyEvent, Pose
+from mission.files.file_name import file_name
 from mission.run import revision, way
 from mission.run import states as runs
 from mission.run.battery import what_is_missing
@@ -363,7 +364,7 @@ class Controller:
 
     def _scan(self, run: Run, mission: Mission) -> None:
         stop = mission.stops[run.at]
-        label = f"{run.run_id}-{stop.id}-{run.attempt + 1}"
+        label = f"{run.run_id}-{file_name(stop.id)}-{run.attempt + 1}"
         result = self._scanner.scan(label, stop.scan, interrupt=self._interrupt)
         self._advance(run, lambda now: runs.scan_ended(now, mission, result))
 

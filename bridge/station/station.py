@@ -12,9 +12,10 @@ import socket
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -108,6 +109,17 @@ def connect(
         yield station
 
 
+@dataclass(frozen=True)
+class FleetMember:
+    """One robot of a site, as it answered or did not."""
+
+    robot: str
+    state: StateReport | None
+    """`None` if it is silent."""
+    trouble: str = ""
+    """Why it is not well, though it may have answered."""
+
+
 def fleet(
     endpoint: str,
     *,
@@ -115,36 +127,44 @@ def fleet(
     timeout_s: float = 5.0,
     insecure: bool = False,
     keys: Path | None = None,
-) -> tuple[StateReport, ...]:
-    """The state of every robot of the site that can be reached through `endpoint`, by name.
+    known: Iterable[str] = (),
+) -> tuple[FleetMember, ...]:
+    """Every robot of the site that shows itself through `endpoint`, and the `known` that do not, by name.
 
     Raises
     ------
     RobotUnreachable
-        If not a single robot showed itself within `timeout_s`.
+        If not a single robot showed itself within `timeout_s`, and none is known.
     """
     from bridge.link.zenoh_link import Guard, connecting
 
     held = None if keys is None else read_keys(keys, now=now_utc())
+    every, names = KeyExpressions.of_every_robot(site), set(known)
     with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
-        station = Station(link, KeyExpressions.of_every_robot(site), commander=whoami(), timeout_s=timeout_s)
-        seen: set[str] = set()
-        link.watch_presence(
-            station.keys.alive, lambda key, alive: seen.add(station.keys.robot_of(key)) if alive else None
-        )
-        station.reach(endpoint, why=lambda: why_no_link(endpoint, held))
+        station = Station(link, every, commander=whoami(), timeout_s=timeout_s)
+        shown: set[str] = set()
+        link.watch_presence(every.alive, lambda key, alive: shown.add(every.robot_of(key)) if alive else None)
+        try:
+            station.reach(endpoint, why=lambda: why_no_link(endpoint, held))
+        except RobotUnreachable as error:
+            if not names:
+                raise
+            return tuple(FleetMember(name, None, str(error)) for name in sorted(names))
         time.sleep(GATHER_S)
-        names = sorted(seen)
         with ThreadPoolExecutor(max_workers=MOST_ASKED) as pool:
-            states = pool.map(lambda name: _state_of(link, KeyExpressions(name, site), timeout_s), names)
-            return tuple(state for state in states if state is not None)
+            asked = pool.map(lambda name: _member(link, KeyExpressions(name, site), timeout_s, held), shown)
+            found = (*asked, *(FleetMember(name, None, "does not show itself") for name in names - shown))
+    return tuple(sorted(found, key=lambda member: member.robot))
 
 
-def _state_of(link: Link, keys: KeyExpressions, timeout_s: float) -> StateReport | None:
+def _member(link: Link, keys: KeyExpressions, timeout_s: float, held: HeldKeys | None) -> FleetMember:
+    station = Station(link, keys, commander=whoami(), timeout_s=timeout_s, held=held)
     try:
-        return Station(link, keys, commander=whoami(), timeout_s=timeout_s).status()
-    except OutcomeUnknown:
-        return None
+        return FleetMember(keys.robot, station.status())
+    except OutcomeUnknown as silent:
+        return FleetMember(keys.robot, None, f"shows itself, but {silent}")
+    except (AnswerIsNo, InputError) as no:
+        return FleetMember(keys.robot, None, str(no))
 
 
 def whoami() -> str:

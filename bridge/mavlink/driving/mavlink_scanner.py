@@ -15,6 +15,7 @@ from bridge.mavlink.line.messages import request
 from bridge.mavlink.line.wire import MessageQueue
 from mission.document import Mission, Scan
 from mission.errors import OutcomeUnknown, RobotUnreachable
+from mission.files.file_name import file_name
 from mission.mavlink.captures import Picture, picture_of, result_of
 from mission.mavlink.enums import CommandResult, MessageId
 from mission.mavlink.items import Command
@@ -57,7 +58,7 @@ class MavlinkScanner:
 
     def take(self, mission: Mission) -> None:
         """Trigger with the numbers that this mission's stops have."""
-        ids = (stop.id for stop in mission.stops)
+        ids = (file_name(stop.id) for stop in mission.stops)
         self._numbers = dict(zip(ids, numbers_of(mission), strict=True))
 
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
@@ -161,5 +162,5 @@ class MavlinkScanner:
 
 
 def stop_of(label: str) -> str:
-    """The stop in a scan's label, `<run id>-<stop id>-<attempt>`."""
+    """The stop in a scan's label, `<run id>-<stop id as a file's name>-<attempt>`."""
     return label.partition("-")[2].rpartition("-")[0]
