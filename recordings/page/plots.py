@@ -21,11 +21,7 @@ MOST_POINTS = 1500
 
 
 @dataclass(frozen=True, eq=False)
-<<<<<<< HEAD
 class PlotLine:
-=======
-class PlotLine:
->>>>>>> 406c57c (Show in recordings what a run acquired and lost, in colours that every eye tells apart)
     """A line through (x, y), or marks at them."""
 
     x: FloatArray
@@ -47,25 +43,14 @@ def _plots(comparison: Comparison) -> Iterator[str]:
         seconds = log.seconds(beside.ns)[known]
         tolerance = 1000 * max((stop.tolerance_m for stop in comparison.mission.stops), default=0.0)
         limits = [
-<<<<<<< HEAD
-            PlotLine(seconds[[0, -1]], np.full(2, side), VERMILION, "4 3")
-            for side in (tolerance, -tolerance)
-        ]
-        curve = PlotLine(*_few(seconds, 1000 * beside.metres[known]), PURPLE)
-=======
             PlotLine(seconds[[0, -1]], np.full(2, side), VERMILION, "4 3") for side in (tolerance, -tolerance)
         ]
         curve = PlotLine(*_few(seconds, 1000 * beside.metres[known]), PURPLE)
->>>>>>> 406c57c (Show in recordings what a run acquired and lost, in colours that every eye tells apart)
         yield _plot("beside the route, mm, left positive; dashed: tolerance", [*limits, curve])
     late = [(item.arrived_s, item.late_s) for item in comparison.stops if item.late_s is not None]
     if late:
         times, values = np.array(late, dtype=np.float64).T
-<<<<<<< HEAD
         yield _plot("late at each stop, s", [PlotLine(times, values, BLUE)])
-=======
-        yield _plot("late at each stop, s", [PlotLine(times, values, BLUE)])
->>>>>>> 406c57c (Show in recordings what a run acquired and lost, in colours that every eye tells apart)
     yield from _growth(comparison)
 
 
@@ -84,13 +69,8 @@ def _growth(comparison: Comparison) -> Iterator[str]:
             shares.append(100 * ledger.amount(seen & ledger.visible) / visible)
     if len(times) > 1:
         ends = np.array([0.0, times[-1]])
-<<<<<<< HEAD
         asked = PlotLine(ends, np.full(2, 100 * ledger.required), VERMILION, "4 3")
         grown = PlotLine(np.array(times), np.array(shares), BLUE, steps=True)
-=======
-        asked = PlotLine(ends, np.full(2, 100 * ledger.required), VERMILION, "4 3")
-        grown = PlotLine(np.array(times), np.array(shares), BLUE, steps=True)
->>>>>>> 406c57c (Show in recordings what a run acquired and lost, in colours that every eye tells apart)
         yield _plot("coverage acquired, %; dashed: asked", [asked, grown])
 
 
@@ -106,11 +86,7 @@ def _few(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     return x[kept], y[kept]
 
 
-<<<<<<< HEAD
 def _plot(title: str, curves: Sequence[PlotLine]) -> str:
-=======
-def _plot(title: str, curves: Sequence[PlotLine]) -> str:
->>>>>>> 406c57c (Show in recordings what a run acquired and lost, in colours that every eye tells apart)
     x = np.concatenate([curve.x for curve in curves])
     y = np.concatenate([curve.y for curve in curves])
     low, high = min(0.0, float(y.min())), max(0.0, float(y.max()))
@@ -152,11 +128,7 @@ def _axes(scale: _Scale) -> Iterator[str]:
     yield tag("path", d=f"M{LEFT} {TOP}V{HEIGHT - BOTTOM}", stroke=GREY, stroke_width=1)
 
 
-<<<<<<< HEAD
 def _curve(curve: PlotLine, scale: _Scale) -> str:
-=======
-def _curve(curve: PlotLine, scale: _Scale) -> str:
->>>>>>> 406c57c (Show in recordings what a run acquired and lost, in colours that every eye tells apart)
     points = list(zip(scale.x(curve.x).tolist(), scale.y(curve.y).tolist(), strict=True))
     d = f"M{points[0][0]:.1f} {points[0][1]:.1f}"
     for x, y in points[1:]:
