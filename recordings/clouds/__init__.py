@@ -14,28 +14,28 @@ import numpy as np
 from mission.errors import InputError
 from mission.geometry import FloatArray
 
-Pieces = Iterator[FloatArray]
+CloudPieces = Iterator[FloatArray]
 """Points (n, 3), one station or one part of a file at a time."""
-CloudReader = Callable[[Path], Pieces]
+CloudReader = Callable[[Path], CloudPieces]
 LOW_M, HIGH_M = 0.3, 2.0
 """Heights above the floor between which points count."""
 FLOOR_SHARE = 0.5
 """Percent of points that lie below the floor's height: it is told from the first piece."""
 
 
-def _e57(path: Path) -> Pieces:
+def _e57(path: Path) -> CloudPieces:
     from recordings.clouds.e57 import read_e57
 
     return read_e57(path)
 
 
-def _las(path: Path) -> Pieces:
+def _las(path: Path) -> CloudPieces:
     from recordings.clouds.las import read_las
 
     return read_las(path)
 
 
-def _ply(path: Path) -> Pieces:
+def _ply(path: Path) -> CloudPieces:
     from recordings.clouds.ply import read_ply
 
     return read_ply(path)

@@ -14,7 +14,7 @@ import shapely
 
 from mission.__main__ import main
 from mission.document import Mission
-from mission.files.mission_json import read, write
+from mission.files.mission_json import read
 from planner.further import PlannedFloor, planned_floor, top_up
 from planner.measuring import measured
 from recordings.logs.field_log import FieldLog, Sweep
@@ -35,10 +35,16 @@ RAYS = 720
 
 
 @pytest.fixture(scope="module")
-def planned(tmp_path_factory: pytest.TempPathFactory) -> PlannedFloor:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A planned floor of two rooms."""
     path = tmp_path_factory.mktemp("floor")
     assert main(["plan", str(drawn(path / "floor.dxf")), "-o", str(path), *PLAN]) == 0
-    return planned_floor(path / "floor.dxf", read(path / "mission.json"))
+    return path
+
+
+@pytest.fixture(scope="module")
+def planned(folder: Path) -> PlannedFloor:
+    return planned_floor(folder / "floor.dxf", read(folder / "mission.json"))
 
 
 def scanned(planned: PlannedFloor, *heaps: tuple[float, float, float, float], off: float = 0.0) -> Replay:
@@ -107,7 +113,7 @@ def test_what_nobody_planned_is_found_and_driven_round(planned: PlannedFloor) ->
 
 
 def test_the_scanners_own_clouds_count_the_same_way(
-    planned: PlannedFloor, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, planned: PlannedFloor, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Points all over the walls, from floor to ceiling, and a heap of which nobody knew."""
     mission = planned.mission
@@ -115,16 +121,14 @@ def test_the_scanners_own_clouds_count_the_same_way(
     table = zip(track.ns.tolist(), track.xy.tolist(), track.heading.tolist(), strict=True)
     rows = "".join(f"{ns},{x},{y},{heading}\n" for ns, (x, y), heading in table)
     (tmp_path / "run.csv").write_text("time_ns,x,y,heading\n" + rows)
-    write(mission, tmp_path / "mission.json")
-    drawn(tmp_path / "floor.dxf")
     ring = shapely.box(*HEAP).exterior
     heap = shapely.get_coordinates(ring.interpolate(np.linspace(0, ring.length, 200)))
     flat = np.concatenate([planned.space.targets.unit_xy, heap])
     (tmp_path / "clouds").mkdir()
     points = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for z in (0.0, 0.8, 1.6, 2.6)])
     ply(tmp_path / "clouds" / "all.ply", points)
-    given = ["--mission", str(tmp_path / "mission.json"), "--align", "first", "--json"]
-    floor = ["--floor", str(tmp_path / "floor.dxf"), "--clouds", str(tmp_path / "clouds")]
+    given = ["--mission", str(folder / "mission.json"), "--align", "first", "--json"]
+    floor = ["--floor", str(folder / "floor.dxf"), "--clouds", str(tmp_path / "clouds")]
     main(["replay", str(tmp_path / "run.csv"), *given, *floor])
     found = json.loads(capsys.readouterr().out)["measured"]
     assert found["share"] == 1.0
