@@ -25,8 +25,6 @@ from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.station.test_fleet import router
 from tests.bridge.world import corridor
 
-NOW = now_utc()
-
 
 @pytest.fixture
 def site(tmp_path: Path) -> Path:
@@ -34,7 +32,7 @@ def site(tmp_path: Path) -> Path:
 
 
 def test_a_certificate_names_its_holder_and_its_role_apart(site: Path) -> None:
-    keys = read_keys(site / "r1", now=NOW)
+    keys = read_keys(site / "r1", now=now_utc())
     assert common_name(keys.certificate) == "robot:r1"
     assert (keys.holder.role, keys.holder.name) == ("robot", "r1")
 
@@ -48,33 +46,33 @@ def test_keys_of_an_older_kind_are_refused_with_the_way_out_and_can_be_renewed(
         return made(unit or common, common.partition(":")[2] if unit else organisation)
 
     monkeypatch.setattr(authority, "_subject", older)
-    issue(site, "robot", "r9", now=NOW)
+    issue(site, "robot", "r9", now=now_utc())
     monkeypatch.undo()
     (site / "r9" / "revoked.json").unlink()
     with pytest.raises(InputError, match=r"names its role and not its holder.*stopgo keys rotate r9"):
-        read_keys(site / "r9", now=NOW)
-    rotate(site, "r9", now=NOW)
-    assert read_keys(site / "r9", now=NOW).holder.name == "r9"
+        read_keys(site / "r9", now=now_utc())
+    rotate(site, "r9", now=now_utc())
+    assert read_keys(site / "r9", now=now_utc()).holder.name == "r9"
 
 
 def test_new_keys_beside_old_ones_until_those_are_revoked(site: Path) -> None:
-    robot = Certificates(read_keys(site / "r1", now=NOW), lambda: NOW)
-    before = read_keys(site / "alice", now=NOW)
-    rotate(site, "alice", now=NOW)
-    after = read_keys(site / "alice", now=NOW)
+    robot = Certificates(read_keys(site / "r1", now=now_utc()), now_utc)
+    before = read_keys(site / "alice", now=now_utc())
+    rotate(site, "alice", now=now_utc())
+    after = read_keys(site / "alice", now=now_utc())
     assert robot.holder(before.der)[0].name == robot.holder(after.der)[0].name == "alice"
     assert revoke(site, "alice", old=True) == (before.holder.serial,)
     assert robot.holder(after.der)[0].name == "alice"
     with pytest.raises(Untrusted, match="alice is revoked"):
         robot.holder(before.der)
-    states = [(one.holder.name, one.state, one.current) for one in listed(site, now=NOW)]
+    states = [(one.holder.name, one.state, one.current) for one in listed(site, now=now_utc())]
     assert states[:2] == [("alice", "valid", True), ("alice", "revoked", False)]
     assert all(state == ("valid", True) for _, *state in map(list, states[2:]) for state in [tuple(state)])
 
 
 def test_what_is_revoked_stays_so_with_an_older_a_forged_or_a_missing_list(site: Path) -> None:
-    keys, alice, bob = (read_keys(site / who, now=NOW) for who in ("r1", "alice", "bob"))
-    robot = Certificates(keys, lambda: NOW)
+    keys, alice, bob = (read_keys(site / who, now=now_utc()) for who in ("r1", "alice", "bob"))
+    robot = Certificates(keys, now_utc)
     older = keys.files.revoked.read_bytes()
     revoke(site, "alice")
     with pytest.raises(Untrusted, match="revoked"):
@@ -88,10 +86,10 @@ def test_what_is_revoked_stays_so_with_an_older_a_forged_or_a_missing_list(site:
             robot.holder(alice.der)
         assert robot.holder(bob.der)[0].name == "bob"
     with pytest.raises(InputError, match=r"revoked\.json: cannot be read.*copy it"):
-        read_keys(site / "r1", now=NOW)
+        read_keys(site / "r1", now=now_utc())
     keys.files.revoked.write_bytes(newer.replace(b'"number":1', b'"number":9'))
     with pytest.raises(InputError, match="not signed by the authority"):
-        read_keys(site / "r1", now=NOW)
+        read_keys(site / "r1", now=now_utc())
 
 
 def test_a_revoked_station_reads_no_keys_and_is_not_obeyed(site: Path) -> None:
@@ -103,7 +101,7 @@ def test_a_revoked_station_reads_no_keys_and_is_not_obeyed(site: Path) -> None:
         with pytest.raises((AnswerIsNo, OutcomeUnknown), match="alice is revoked"):
             order()
     with pytest.raises(InputError, match="is revoked; issue new keys for alice"):
-        read_keys(site / "alice", now=NOW)
+        read_keys(site / "alice", now=now_utc())
 
 
 def test_a_revoked_robot_is_not_believed(site: Path) -> None:
@@ -119,10 +117,10 @@ def test_a_key_that_others_may_read_is_refused(site: Path) -> None:
         assert files.key.stat().st_mode & 0o777 == 0o600
         files.key.chmod(0o640)
     with pytest.raises(InputError, match=r"alice/key\.pem: others may read or write it; chmod 600"):
-        read_keys(site / "alice", now=NOW)
+        read_keys(site / "alice", now=now_utc())
     for act in (
-        lambda: issue(site, "station", "carl", now=NOW),
-        lambda: rotate(site, "alice", now=NOW),
+        lambda: issue(site, "station", "carl", now=now_utc()),
+        lambda: rotate(site, "alice", now=now_utc()),
         lambda: revoke(site, "alice"),
     ):
         with pytest.raises(InputError, match=r"authority/key\.pem: others may read or write it; chmod 600"):
@@ -132,17 +130,17 @@ def test_a_key_that_others_may_read_is_refused(site: Path) -> None:
 @pytest.mark.parametrize("address", ["", "a b", "10.0.0.1/24", "-x", "x" * 300])
 def test_an_address_that_is_none_is_named(site: Path, address: str) -> None:
     with pytest.raises(InputError, match="--address"):
-        rotate(site, "r1", now=NOW, addresses=(address,))
+        rotate(site, "r1", now=now_utc(), addresses=(address,))
 
 
 def test_names_that_cannot_be_are_refused(site: Path) -> None:
     for name in ("", "a/b", "../x", "x" * 57, "authority"):
         with pytest.raises(InputError, match="name "):
-            issue(site, "station", name, now=NOW)
+            issue(site, "station", name, now=now_utc())
         with pytest.raises(InputError, match="holds no keys"):
             revoke(site, name)
     with pytest.raises(InputError, match="nobody connects to it"):
-        issue(site, "viewer", "zoe", now=NOW, addresses=("10.0.0.1",))
+        issue(site, "viewer", "zoe", now=now_utc(), addresses=("10.0.0.1",))
 
 
 def test_the_commands_make_list_renew_and_revoke_keys(
@@ -176,8 +174,8 @@ def test_the_commands_make_list_renew_and_revoke_keys(
 def test_a_wrong_authority_and_a_wrong_address_are_told_from_a_robot_that_is_off(
     site: Path, tmp_path: Path
 ) -> None:
-    init_site(tmp_path / "other", now=NOW)
-    issue(tmp_path / "other", "station", "stranger", now=NOW)
+    init_site(tmp_path / "other", now=now_utc())
+    issue(tmp_path / "other", "station", "stranger", now=now_utc())
     port = free_port()
     listen, here, there = (f"tls/{host}:{port}" for host in ("0.0.0.0", "127.0.0.1", "127.0.0.2"))
     with robot_with(site, tmp_path, listen):
@@ -189,7 +187,7 @@ def test_a_wrong_authority_and_a_wrong_address_are_told_from_a_robot_that_is_off
             unreached = connect(where, robot="r1", keys=keys, timeout_s=0.5)
             with pytest.raises(RobotUnreachable, match=why), unreached:
                 pass
-    rotate(site, "r1", now=NOW, addresses=("127.0.0.2",))
+    rotate(site, "r1", now=now_utc(), addresses=("127.0.0.2",))
     reached = connect(there, robot="r1", keys=site / "alice")
     with robot_with(site, tmp_path, listen), reached as station:
         assert station.status().state == "IDLE"
@@ -208,14 +206,14 @@ def test_a_routers_rules_hold_each_robot_to_its_own_keys(
     site: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A robot with r2's keys cannot even answer on r1's, a viewer cannot order; r1 runs its mission."""
-    issue(site, "router", "hub", now=NOW)
+    issue(site, "router", "hub", now=now_utc())
     rules = tmp_path / "rules.json"
     assert main(["keys", "router-rules", "--in", str(site), "--site", "north"]) == 0
     rules.write_text(capsys.readouterr().out)
     endpoint, keys = f"tls/127.0.0.1:{free_port()}", KeyExpressions("r1", "north")
     extra = ("--connect", endpoint, "--keys", str(site / "r1"), "--site", "north")
     with router(endpoint, str(site / "hub"), str(rules)):
-        impostor = Guard(read_keys(site / "r2", now=NOW), boot_id="b")
+        impostor = Guard(read_keys(site / "r2", now=now_utc()), boot_id="b")
         with joining(endpoint, impostor) as other:
             asked: list[str] = []
             other.serve(f"{keys.root}/**", lambda request: asked.append(request.key) or b"{}")  # type: ignore[func-returns-value]
@@ -226,7 +224,7 @@ def test_a_routers_rules_hold_each_robot_to_its_own_keys(
             try:
                 with connect(endpoint, robot="r1", site="north", keys=site / "alice") as station:
                     station.push(corridor())
-                    with connecting(endpoint, Guard(read_keys(site / "vera", now=NOW))) as link:
+                    with connecting(endpoint, Guard(read_keys(site / "vera", now=now_utc()))) as link:
                         assert link.ask(keys.command("abort"), timeout_s=1) is None
                     assert station.command("start").outcome == "ok"
                     reports = list(station.reports())
@@ -240,8 +238,8 @@ def test_a_routers_rules_hold_each_robot_to_its_own_keys(
 
 def test_rules_name_everybody_whose_keys_count_and_no_role_without_holders() -> None:
     def holder(role: str, name: str) -> Holder:
-        later = NOW + timedelta(days=1)
-        return Holder(role=role, name=name, serial="1", not_before=NOW, not_after=later)  # type: ignore[arg-type]
+        later = now_utc() + timedelta(days=1)
+        return Holder(role=role, name=name, serial="1", not_before=now_utc(), not_after=later)  # type: ignore[arg-type]
 
     rules = router_access_control([holder("robot", "r1"), holder("station", "alice")], None)
     names = [name for subject in rules["subjects"] for name in subject["cert_common_names"]]
