@@ -283,3 +283,44 @@ def test_a_base_that_fails_is_stopped_and_drives_no_more() -> None:
     assert guarded.goto([(0, 0)], heading=None, limits=limits, interrupt=Event()) == "blocked"
     guarded.stop()
     assert stops == ["stop", "stop"]
+
+
+LOG = """
+import numpy as np
+from recordings.logs import FieldLog, LogFormat
+from recordings.logs.field_log import Poses
+
+def read(path, how):
+    given = path.read_text()
+    times = np.array([2, 1] if given == "back" else [1, 2])
+    xy = np.array([[0, 0], [1, np.nan if given == "nan" else 1]], dtype=float)
+    poses = Poses("odometer", "map", times, xy, np.array([np.nan, 0.0]))
+    if given == "fails":
+        raise RuntimeError("out of tape")
+    clock = "sun" if given == "sun" else "wall"
+    return FieldLog(str(path), "tape", "f" * 64, 2, clock, 1, 2, poses=(poses,))
+
+FORMAT = LogFormat("tape", (".tape",), (), lambda: read)
+"""
+
+
+def test_a_kind_of_log_is_brought_and_checked(module: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    from recordings.logs import read_log
+
+    module("tapes", LOG)
+    entry(monkeypatch, "stopgo.log", "tape", "tapes:FORMAT")
+    Path("a.tape").write_text("good")
+    assert len(read_log(Path("a.tape")).poses[0].ns) == 2
+    wrong = {
+        "back": "the times of odometer are not in order",
+        "nan": "the places of odometer has 1 numbers that are not finite",
+        "fails": r"RuntimeError: out of tape \(tapes.py, line 12\)",
+        "sun": "its clock is 'sun'; known: wall, since boot, simulated",
+    }
+    for content, said in wrong.items():
+        Path("a.tape").write_text(content)
+        with pytest.raises(InputError, match=f"^log reader tape: {said}"):
+            read_log(Path("a.tape"))
+    Path("a.film").write_text("good")
+    with pytest.raises(InputError, match=r"known are \.bag, .*, \.tape$"):
+        read_log(Path("a.film"))

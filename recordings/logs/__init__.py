@@ -1,17 +1,21 @@
 """A robot's own log, whatever it is -> what it holds (`FieldLog`).
 
-A reader is a function `(path, reading) -> FieldLog`, and one line in `READERS`.
+A reader is a function `(path, reading) -> FieldLog`, and one line in `READERS`. Installed packages bring
+more: entry points in the group `stopgo.log`, each a `LogFormat`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from mission.errors import InputError
+from mission.plugins import Variant
 from recordings.logs.field_log import FieldLog, Reading
 from recordings.logs.files import head, must_be_readable
+from recordings.logs.foreign_logs import foreign_formats, sound_log
 
 LogReader = Callable[[Path, Reading], FieldLog]
 
@@ -115,8 +119,20 @@ def _reader_for(path: Path) -> LogReader:
         return chosen[0].reader()
     if named:
         raise InputError(f"{path}: does not begin as a {named[0].name} does; was it copied whole?")
-    known = ", ".join(suffix for form in READERS for suffix in form.suffixes)
+    others = list(foreign_formats(LogFormat))
+    for other in others:
+        form = other.what
+        if path.name.lower().endswith(form.suffixes) or (form.begins and begin.startswith(form.begins)):
+            return partial(_read_foreign, other)
+    forms = (*READERS, *(other.what for other in others))
+    known = ", ".join(suffix for form in forms for suffix in form.suffixes)
     raise InputError(f"{path}: neither its name nor its content is that of a log; known are {known}")
+
+
+def _read_foreign(other: Variant[LogFormat], path: Path, how: Reading) -> FieldLog:
+    with other.blamed():
+        given = other.what.reader()(path, how)
+    return sound_log(other, given)
 
 
 def _of_folder(path: Path) -> LogReader:

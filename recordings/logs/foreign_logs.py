@@ -1,0 +1,38 @@
+"""Kinds of logs that installed packages bring: entry points in the group `stopgo.log`, each a `LogFormat`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from mission.plugins import Variant, installed, variant
+from recordings.logs.field_log import FieldLog
+
+CLOCKS = ("wall", "since boot", "simulated")
+"""What `FieldLog.clock` may be."""
+
+
+def foreign_formats(kind: type[Any]) -> Iterator[Variant[Any]]:
+    """Each kind of log that an installed package brings; all are of this kind."""
+    for name in installed("log"):
+        found: Variant[Any] = variant("log", name, {}, said=f"log reader {name}")
+        found.noun(found.what, kind)
+        yield found
+
+
+def sound_log(reader: Variant[Any], given: object) -> FieldLog:
+    """What another's reader gives, if it is a log whose poses are finite and in the order of their times."""
+    log: FieldLog = reader.noun(given, FieldLog)
+    if log.clock not in CLOCKS:
+        raise reader.wrong(f"its clock is '{log.clock}'; known: {', '.join(CLOCKS)}")
+    for poses in log.poses:
+        count = len(poses.ns)
+        reader.array(poses.ns, f"the times of {poses.source}", (count,))
+        reader.array(poses.xy, f"the places of {poses.source}", (count, 2))
+        heading = np.where(np.isnan(poses.heading), 0.0, poses.heading)
+        reader.array(heading, f"the headings of {poses.source}", (count,))
+        if (np.diff(poses.ns) < 0).any():
+            raise reader.wrong(f"the times of {poses.source} are not in order")
+    return log
