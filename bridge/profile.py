@@ -70,7 +70,11 @@ def counting(profile: Profile, typed: Set[str]) -> Profile:
 
 def files(environment: Mapping[str, str] = os.environ, folder: Path | None = None) -> tuple[Path, ...]:
     """Where a stopgo.toml is looked for, the one that counts more first."""
-    return (folder or Path()) / FILE, _user_folder(environment) / "stopgo" / FILE
+    here = (folder or Path()) / FILE
+    try:
+        return here, _user_folder(environment) / "stopgo" / FILE
+    except RuntimeError:  # a user without a home, as in some containers
+        return (here,)
 
 
 def _user_folder(environment: Mapping[str, str]) -> Path:

@@ -125,3 +125,14 @@ def test_status_can_ask_all_though_one_is_preset(capsys: pytest.CaptureFixture[s
     Path("stopgo.toml").write_text('robot = "r7"\nconnect = "tcp/127.0.0.1:1"\n')
     assert main(["status", "--all", "--robot", "r1"]) == 2
     assert "--robot has no meaning with --all" in capsys.readouterr().err
+
+
+def test_a_user_without_a_home_has_the_folders_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    def homeless() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CONFIG_HOME")
+    monkeypatch.delenv("APPDATA", raising=False)
+    monkeypatch.setattr(Path, "home", homeless)
+    Path("stopgo.toml").write_text('robot = "r2"\n')
+    assert read_profile()["robot"].value == "r2"

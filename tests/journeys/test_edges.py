@@ -179,3 +179,16 @@ def test_an_answer_in_json_is_the_only_one(workplace: Path, capsys: pytest.Captu
     (workplace / "other.dxf").write_text("another floor")
     assert main(["check", "mission.json", "--floor", "other.dxf", "--json"]) == 1
     assert json.loads(capsys.readouterr().out)["ok"] is False
+
+
+@pytest.mark.parametrize(("typed", "offered"), [("stopgo pau", "pause"), ("stopgo plan --sel", "--selector")])
+def test_a_shell_completes_commands_and_options(
+    typed: str, offered: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("_STOPGO_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", typed)
+    monkeypatch.setenv("COMP_CWORD", str(len(typed.split()) - 1))
+    with pytest.raises(SystemExit) as left:
+        main([])
+    assert left.value.code == 0
+    assert capsys.readouterr().out.split() == [offered]
