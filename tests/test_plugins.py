@@ -18,7 +18,7 @@ import pytest
 
 import stopgo
 from bridge.link.clock import SimulatedClock
-from bridge.robot.plugin_body import GuardedBase, PluginBody
+from bridge.robot.plugin_body import GuardedBase, plugin_body
 from mission.__main__ import main
 from mission.errors import InputError, StopgoError
 from mission.floor import FloorPlan
@@ -244,7 +244,7 @@ def test_a_format_is_read_back(
 
 def test_the_controller_of_the_guide_drives(module: Write, tmp_path: Path) -> None:
     module("my_robot", BLOCKS[1])
-    with PluginBody("my_robot:controller", tmp_path)(SimulatedClock()) as body:
+    with plugin_body("my_robot:controller", tmp_path)(SimulatedClock()) as body:
         limits = WALKING
         assert body.base.goto([(0, 0), (1, 2)], heading=None, limits=limits, interrupt=Event()) == "arrived"
         assert (body.base.pose().x, body.base.pose().y) == (1, 2)
@@ -261,7 +261,7 @@ def test_the_controller_of_the_guide_drives(module: Write, tmp_path: Path) -> No
 )  # fmt: skip
 def test_a_controller_that_is_none_is_refused(code: str, said: str, module: Write, tmp_path: Path) -> None:
     module("odd", code)
-    opened = PluginBody("odd:f", tmp_path)(SimulatedClock())
+    opened = plugin_body("odd:f", tmp_path)(SimulatedClock())
     with pytest.raises(InputError, match=f"^--controller odd:f: {said}"), opened:
         raise AssertionError("was taken")
 

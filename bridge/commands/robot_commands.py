@@ -91,7 +91,7 @@ def robot(
     """
     from bridge.mavlink.driving.autopilot_body import AutopilotBody, autopilot_url
     from bridge.robot.bodies import OpenBody, SimulatedBody
-    from bridge.robot.plugin_body import PluginBody
+    from bridge.robot.plugin_body import plugin_body
     from bridge.robot.program import RobotOptions, run_robot
     from bridge.robot.simulator import Faults, read_fault
 
@@ -102,7 +102,7 @@ def robot(
     if controller != "sim" and url is None:
         others = tuple(option for option in ONLY_SIMULATED if option != "--map")
         alone(given, "a controller of your own", *others, *ONLY_DRIVEN)
-        body: OpenBody = PluginBody(controller, state, to_map)
+        body: OpenBody = plugin_body(controller, state, to_map)
     elif url is None:
         alone(given, "a simulated robot", *ONLY_DRIVEN)
         body = SimulatedBody(

@@ -30,13 +30,13 @@ OURS: dict[str, Any] = {"sim": None, "mavlink:URL": None}
 class PluginBody:
     """What another's function gives: `function(state: Path) -> (base, scanner)`."""
 
-    name: str
+    made: Variant[Any]
     state: Path
     to_map: Transform | None = None
 
     @contextmanager
     def __call__(self, clock: Clock) -> Iterator[Body]:
-        made: Variant[Any] = variant("controller", self.name, OURS, said=f"--controller {self.name}")
+        made = self.made
         base, scanner = made.several(made.called(self.state), "base, scanner")
         for given, protocol in ((base, Base), (scanner, Scanner)):
             missing = [name for name in _asked_of(protocol) if not hasattr(given, name)]
@@ -50,6 +50,11 @@ class PluginBody:
             raise InputError(guarded.fault)
         on_map = OnMap(guarded, self.to_map)
         yield Body(on_map, GuardedScanner(made, scanner), on_map.take)
+
+
+def plugin_body(name: str, state: Path, to_map: Transform | None = None) -> PluginBody:
+    """The body of a controller of this name, loaded; raises InputError if there is none."""
+    return PluginBody(variant("controller", name, OURS, said=f"--controller {name}"), state, to_map)
 
 
 def _asked_of(protocol: type) -> list[str]:

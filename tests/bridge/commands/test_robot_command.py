@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from mission.__main__ import main
@@ -39,10 +41,16 @@ DRIVEN = [*ROBOT, "--controller", "mavlink:udpin:127.0.0.1:14550"]
     ],
 )
 def test_options_that_cannot_be_are_refused_in_one_line(
-    options: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    options: list[str],
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     code = main(["robot", *options])
     out = capsys.readouterr()
     assert (code, out.out) == (2, "")
     assert said in out.err
     assert len(out.err.strip().splitlines()) == 1
+    assert not list(tmp_path.iterdir()), "nothing is begun"
