@@ -24,7 +24,7 @@ class Rank(IntEnum):
 
 GRAVE = (
     *("walls_missing", "little_reached", "stray_element", "leg_over_ignored", "units_doubtful"),
-    *("no_geometry", "kernel_crashed", "schedule_unrelated"),
+    *("no_geometry", "kernel_crashed", "damaged_model", "schedule_unrelated"),
     *("open_outline", "missing_block", "no_outline", "bad_coordinates"),
 )
 NOTES = (

@@ -101,7 +101,7 @@ def floor_area(
         text = f"{said} at {level.z:.2f} m: the floor is taken from {len(rooms)} rooms and the walls between"
         return closed(between, WALL_GAP), [Finding("floor_from_rooms", text)]
     hull, gap = _enclosed([*standing, *(door.threshold for door in doors)])
-    if hull.is_empty:
+    if hull.difference(shapely.union_all(standing)).area < LEAST_ROOM:
         return slabs, []
     text = (
         f"no slab, no rooms at {level.z:.2f} m: the floor is what walls enclose, gaps up to {gap:g} m closed"

@@ -6,6 +6,7 @@ goes to stderr where that is a terminal. What it was working on last is in the f
 
 from __future__ import annotations
 
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -59,6 +60,8 @@ UNSEEN = (
 )
 CLEAR = 0.3
 """A style that lets more than this share of light through is glass."""
+MOST_COMPLAINTS = 5
+"""Lines of the library's log that are handed on."""
 LARGEST = 1e7
 """Metres from the origin beyond which nothing is built."""
 
@@ -66,23 +69,32 @@ LARGEST = 1e7
 def main(arguments: list[str]) -> int:
     """Read MODEL and write OUT; `--one-by-one` makes each shape alone, without the GlobalIds that follow."""
     path, out, *rest = arguments
+    ifcopenshell.get_log()  # forgets what it hands out
     try:
         model = ifcopenshell.open(path)
     except (ifcopenshell.Error, RuntimeError, OSError, ValueError, LookupError) as error:
-        said = " ".join(str(error).split()) or type(error).__name__
+        said = "; ".join(_complaints()) or " ".join(str(error).split()) or type(error).__name__
         Path(f"{out}.why").write_text(f"cannot be read as IFC ({said}); export it again", encoding="utf-8")
         return 2
+    damage = tuple(_complaints())
     alone = frozenset(rest[1:])
     shapes = _one_by_one(model, alone, Path(f"{out}.at")) if rest else _all_at_once(model)
-    Path(out).write_bytes(packed(extracted(model, shapes)))
+    Path(out).write_bytes(packed(extracted(model, shapes, damage=damage)))
     return 0
+
+
+def _complaints() -> Iterator[str]:
+    """What the library's log holds by now, without its dates: at most a few lines."""
+    log = str(ifcopenshell.get_log())
+    lines = [re.sub(r"^(\[[^]]*\]\s*)+", "", line) for line in log.splitlines()]
+    yield from [line for line in lines if line][:MOST_COMPLAINTS]
 
 
 Made = tuple[int, Any]
 """A product's number in the file, and its geometry."""
 
 
-def extracted(model: ifcopenshell.file, shapes: Iterable[Made]) -> Model:
+def extracted(model: ifcopenshell.file, shapes: Iterable[Made], *, damage: tuple[str, ...] = ()) -> Model:
     """All of a model that a plan needs."""
     unit = ifcopenshell.util.unit.calculate_unit_scale(model)
     vertices, faces, where, clear = _arrays(shapes)
@@ -105,6 +117,7 @@ def extracted(model: ifcopenshell.file, shapes: Iterable[Made]) -> Model:
         place=place_of(model, unit),
         left_out=_left_out(model),
         failed=failed,
+        damage=damage,
     )
     return Model(described, vertices, faces)
 

@@ -21,7 +21,7 @@ from mission.files.atomic import write_atomic
 from planner.floors.ifc.model import Model, unpacked
 from planner.floors.reader import FloorFile
 
-FORM = 2
+FORM = 3
 """Raised whenever what is kept of a model, or how it is read, changes."""
 MOST_KEPT = 2 * 1024**3
 """Bytes of models that are kept; the ones longest unused go first."""
@@ -57,6 +57,10 @@ def load(file: FloorFile) -> Model:
         packed = _extracted(data, file.path)
         _keep(kept, packed)
         model = unpacked(packed)
+    if not model.meshes:
+        raise InputError(
+            f"{file.path}: holds no wall, slab, space or other element with a shape; export the building"
+        )
     return model
 
 
@@ -124,9 +128,7 @@ def _unzipped(file: FloorFile) -> bytes:
 def _check(data: bytes, path: Path) -> None:
     """Refuse what no kernel needs to be asked about: other schemas, and files that end early."""
     if MARK not in data[:1024]:
-        raise InputError(
-            f"{path}: is not an IFC file (it starts with {data[:16]!r}); export the model as IFC"
-        )
+        raise InputError(f"{path}: is not an IFC file (it starts with {data[:16]!r}); export it as IFC")
     named = re.search(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'", data[:65536], re.IGNORECASE)
     schema = named[1].decode("ascii", "replace").upper() if named else "none"
     known = schema in SCHEMAS or re.fullmatch(r"IFC4X3_ADD\d+|IFC4_ADD\d+(_TC\d+)?|IFC2X3_TC1", schema)
@@ -187,5 +189,6 @@ def _with_crashed(packed: bytes, bad: Sequence[str]) -> bytes:
 
     model = unpacked(packed)
     named = [f"{model.products[item].ifc_class} {item} '{model.products[item].name}'" for item in bad]
-    described = replace(model.described, crashed=tuple(named))
+    failed = tuple(text for text in model.described.failed if not any(guid in text for guid in bad))
+    described = replace(model.described, crashed=tuple(named), failed=failed)
     return pack(Model(described, model.vertices, model.faces))

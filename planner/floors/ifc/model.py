@@ -103,6 +103,8 @@ class Described(msgspec.Struct, frozen=True, kw_only=True):
     """Products by class that no plan is made of, such as furniture."""
     failed: tuple[str, ...] = ()
     """Products whose geometry could not be made, in words."""
+    damage: tuple[str, ...] = ()
+    """What in the file could not be read, in the library's words."""
     crashed: tuple[str, ...] = ()
     """Products at which the geometry kernel crashed, in words."""
 

@@ -11,6 +11,7 @@ import shapely
 from mission.errors import InputError
 from mission.floor import Element, Finding, FloorPlan
 from mission.geometry import frozen
+from planner.floors.drawing import legible
 from planner.floors.ifc.areas import Space, derived_rooms, floor_area, modelled_rooms
 from planner.floors.ifc.doors import doors_on
 from planner.floors.ifc.georeference import georeference_of
@@ -85,12 +86,11 @@ def _as_of(item: Element, found: Statuses, options: FloorOptions) -> Element:
 
 def odd_products(model: Model) -> list[Finding]:
     """Products that could not be shaped, each by name."""
+    told = model.described
     return [
-        *(Finding("no_geometry", f"{name} has no shape that can be made") for name in model.described.failed),
-        *(
-            Finding("kernel_crashed", f"{name} crashed the geometry kernel")
-            for name in model.described.crashed
-        ),
+        *(Finding("damaged_model", f"the file is damaged: {legible(text)}") for text in told.damage),
+        *(Finding("no_geometry", f"{name} has no shape that can be made") for name in told.failed),
+        *(Finding("kernel_crashed", f"{name} crashed the geometry kernel") for name in told.crashed),
     ]
 
 
