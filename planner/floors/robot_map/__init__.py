@@ -24,7 +24,7 @@ from planner.floors.parts import in_order, parts_of
 from planner.floors.reader import FloorFile, FloorOptions
 from planner.floors.robot_map.cell_regions import placed, polygons_of_cells, smoothed
 from planner.floors.robot_map.description import FREE, OCCUPIED, UNKNOWN, MapDescription, read_description
-from planner.floors.robot_map.picture import read_picture
+from planner.floors.robot_map.grey_picture import read_picture
 from planner.floors.strokes import Stroke
 from planner.floors.survey import FloorChoice, Survey
 

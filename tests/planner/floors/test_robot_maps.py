@@ -17,7 +17,7 @@ from mission.settings import Settings
 from planner import plan
 from planner.floors import read_floor, survey_floor
 from planner.floors.robot_map.cell_regions import polygons_of_cells
-from planner.floors.robot_map.picture import read_picture
+from planner.floors.robot_map.grey_picture import read_picture
 from tests.planner.worlds import box, door, floor_of, room, wall
 
 RESOLUTION = 0.05
