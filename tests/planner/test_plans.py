@@ -68,7 +68,7 @@ def test_two_plans_of_a_floor_are_the_same_bytes(name: str) -> None:
     assert encode(planned(floor(name))[0]) == encode(the_plan(name)[0])
 
 
-@pytest.mark.parametrize("name", AGAIN)
+@pytest.mark.parametrize("name", [name for name in AGAIN if name != LARGEST])
 def test_the_order_of_entities_does_not_change_a_plan(name: str) -> None:
     random = np.random.default_rng(1)
     original = floor(name)
