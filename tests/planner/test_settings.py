@@ -37,7 +37,12 @@ OTHER: dict[str, Any] = {
     "level": 3.2,
     "scan_height": 1.5,
     "robot_height": 1.8,
+    "date": "2024-05-31",
+    "since": "2024-04-30",
+    "schedule_columns": ("guid=GlobalId", "task=Name"),
 }
+NEEDS = dict.fromkeys(("since", "schedule", "in_progress"), "date")
+"""What says nothing without another parameter."""
 
 
 def other(name: str) -> Any:
@@ -65,12 +70,13 @@ def typed(name: str, value: Any) -> list[str]:
 def test_a_parameter_is_the_same_as_option_in_the_file_and_in_python(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    expected = replace(Settings(), **{name: other(name)})
+    told = {one: other(one) for one in (name, NEEDS.get(name, name))}
+    expected = replace(Settings(), **told)
     assert expected != Settings()
-    made = stopgo.settings(**{name: other(name)})
+    made = stopgo.settings(**told)
     assert made == expected
     assert msgspec.to_builtins(made) == msgspec.to_builtins(expected)  # as missions and recordings tell it
-    assert main(["plan", "--print-config", *typed(name, other(name))]) == 0
+    assert main(["plan", "--print-config", *(word for one in told for word in typed(one, told[one]))]) == 0
     (tmp_path / "plan.toml").write_text(capsys.readouterr().out, encoding="utf-8")
     assert read_settings(tmp_path / "plan.toml", {}) == expected
 
