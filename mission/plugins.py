@@ -79,6 +79,12 @@ class Variant(Generic[T]):
             raise self.wrong(f"{name} has {int((~np.isfinite(found)).sum())} numbers that are not finite")
         return found
 
+    def check_held(self, given: object, name: str, shape: tuple[int | None, ...]) -> None:
+        """Refuse what a noun holds, if it is not an array of finite numbers of this shape."""
+        if not isinstance(given, np.ndarray):
+            raise self.wrong(f"{name} is {_kind_of(given)}, not an array")
+        self.array(given, name, shape)
+
     def indices(self, given: object, name: str, *, length: int | None, below: int) -> NDArray[np.int64]:
         """Whole numbers from 0 and below a limit, in one row."""
         found = self.array(given, name, (length,))

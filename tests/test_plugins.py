@@ -97,6 +97,11 @@ WRONG: dict[str, tuple[str, str, str]] = {
         "    return Visibility(found, np.arange(n + 1), one, one, one + 10**9, 'x')",
         "last holds 1e.09, not whole numbers",
     ),
+    "ways of words": (
+        "graph",
+        "from planner.routing.ways import Ways\ndef f(space, points): return Ways(points, [['a']], None)",
+        "ValueError: could not convert string to float",
+    ),
     "covers too little": ("selector", "def f(cover, settings): return [], 0", "its 0 rows leave . of the"),
     "bound above": (
         "selector", "def f(cover, settings): return list(range(cover.rows)), cover.rows + 1", "bound holds",
@@ -147,6 +152,20 @@ def test_a_method_added_to_the_dictionary_is_called_by_its_name(monkeypatch: pyt
     assert made.route.method.startswith("mine")
 
 
+def test_what_a_plug_in_sees_may_be_lists(module: Write) -> None:
+    module(
+        "lists",
+        "from dataclasses import replace\nfrom planner.visibility.exact_sight import exact\n"
+        "def f(found):\n"
+        "    seen = exact(found)\n"
+        "    runs = {k: getattr(seen, k).tolist() for k in ('pointer', 'segment', 'first', 'last')}\n"
+        "    return replace(seen, method='lists', **runs)",
+    )
+    one = plan(FLOOR, Settings(visibility="lists:f", range=2.0)).first
+    other = plan(FLOOR, Settings(range=2.0)).first
+    assert np.array_equal(one.selection.xy, other.selection.xy)
+
+
 def test_a_bound_of_a_plug_in_is_told_as_its_own(module: Write) -> None:
     module("honest", NUMPY + "def f(cover, settings): return np.arange(cover.rows), cover.rows")
     made = plan(FLOOR, Settings(selector="honest:f", refine=False))
@@ -182,7 +201,10 @@ def read(file, options):
     given = file.data.decode()
     if given == "fails":
         raise RuntimeError("out of paper")
-    outline = () if given == "empty" else (Polygon.of([(0, 0), (1, float(given)), (0, 1)]),)
+    if given == "list":
+        outline = (Polygon([(0, 0), (1, 1), (0, 1)]),)
+    else:
+        outline = () if given == "empty" else (Polygon.of([(0, 0), (1, float(given)), (0, 1)]),)
     source = FloorSource("a", "f" * 64) if given == "2" else file.source()
     return 3 if given == "3" else FloorPlan("sketch", source, outline)
 
@@ -195,6 +217,7 @@ READER = Reader("sketch", (".sketch",), lambda data: False, "paper", frozenset()
     [
         ("fails", r"RuntimeError: out of paper \(paper.py, line 10\)"),
         ("empty", "gave a floor without an outline"),
+        ("list", "a ring is a list, not an array"),
         ("nan", "a ring has 1 numbers that are not finite"),
         ("2", "gave the floor of another file"),
         ("3", "gave a int, not a FloorPlan"),

@@ -28,11 +28,11 @@ def sound(reader: Variant[Reader], given: object, digest: str) -> FloorPlan:
     solids = [polygon for element in floor.elements for polygon in element.solids]
     rooms = [polygon for room in floor.rooms for polygon in room.polygons]
     for ring in (ring for polygon in (*floor.outline, *rooms, *solids) for ring in polygon.rings):
-        reader.array(ring, "a ring", (None, 2))
+        reader.check_held(ring, "a ring", (None, 2))
     for line in (line for element in floor.elements for line in element.lines):
-        reader.array(line, "a line", (None, 2))
+        reader.check_held(line, "a line", (None, 2))
     for opening in floor.openings:
-        reader.array(opening.line, f"the line of {opening.id}", (2, 2))
+        reader.check_held(opening.line, f"the line of {opening.id}", (2, 2))
     for element in floor.elements:
         if element.kind not in KINDS:
             raise reader.wrong(f"{element.id} is of kind '{element.kind}'; known: {', '.join(KINDS)}")

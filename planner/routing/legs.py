@@ -26,7 +26,9 @@ class Legs:
     def __post_init__(self) -> None:
         if self.graph.ours:
             return
-        count, lengths = len(self.points), np.asarray(self.ways.lengths, dtype=np.float64)
+        with self.graph.blamed():
+            lengths = self.lengths
+        count = len(self.points)
         finite = self.graph.array(np.where(np.isposinf(lengths), 0.0, lengths), "lengths", (count, count))
         if (finite < 0).any() or np.diag(finite).any():
             raise self.graph.wrong("lengths are not all positive, and 0 from a point to itself")
@@ -36,7 +38,7 @@ class Legs:
     @property
     def lengths(self) -> FloatArray:
         """(n, n) in metres; infinite where there is no way."""
-        return self.ways.lengths
+        return np.asarray(self.ways.lengths, dtype=np.float64)
 
     def way(self, start: int, end: int) -> FloatArray:
         """The polyline (n, 2) from one point to another, both included."""

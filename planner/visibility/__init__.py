@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mission.errors import AnswerIsNo
+from mission.geometry import frozen
 from mission.planning import Candidates, Visibility
 from mission.plugins import Variant, variant
 from planner.visibility.bresenham import bresenham
@@ -52,7 +53,11 @@ def _sound(method: Variant[VisibilityMethod], given: object, candidates: Candida
     of = targets.unit_segment
     if (last < first).any() or (of[first] != segment).any() or (of[last] != segment).any():
         raise method.wrong("a run's units do not lie on its segment")
-    return found
+    if method.ours:
+        return found
+    method.noun(found.method, str)
+    pointer, segment, first, last = (frozen(values, np.int64) for values in (pointer, segment, first, last))
+    return Visibility(candidates, pointer, segment, first, last, found.method)
 
 
 __all__ = ["METHODS", "VisibilityMethod", "visibility"]

@@ -29,10 +29,12 @@ def sound_log(reader: Variant[Any], given: object) -> FieldLog:
         raise reader.wrong(f"its clock is '{log.clock}'; known: {', '.join(CLOCKS)}")
     for poses in log.poses:
         count = len(poses.ns)
-        reader.array(poses.ns, f"the times of {poses.source}", (count,))
-        reader.array(poses.xy, f"the places of {poses.source}", (count, 2))
-        heading = np.where(np.isnan(poses.heading), 0.0, poses.heading)
-        reader.array(heading, f"the headings of {poses.source}", (count,))
+        reader.check_held(poses.ns, f"the times of {poses.source}", (count,))
+        reader.check_held(poses.xy, f"the places of {poses.source}", (count, 2))
+        heading = np.asarray(poses.heading)
+        reader.check_held(
+            np.where(np.isnan(heading), 0.0, heading), f"the headings of {poses.source}", (count,)
+        )
         if (np.diff(poses.ns) < 0).any():
             raise reader.wrong(f"the times of {poses.source} are not in order")
     return log
