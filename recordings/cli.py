@@ -41,6 +41,9 @@ def review(
     html: Annotated[
         Path | None, typer.Option("--html", metavar="REPORT.html", help="Write a report, one file alone.")
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="MERGED.rrd", help="Write them as one recording.")
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Open them together in the Rerun viewer.")] = False,
 ) -> int:
     """Read recordings to their end, and tell what the plan was, and what the runs acquired.
@@ -58,6 +61,10 @@ def review(
         from recordings.page.from_recordings import subject_of
 
         write_atomic(html, report_html(subject_of(found)))
+    if out is not None and found.recordings:
+        from recordings.merging import merge
+
+        merge([item.recording for item in found.recordings], out)
     if json_:
         told = [item.as_json() for item in found.recordings]
         alone = len(told) == 1 and not found.faults

@@ -102,6 +102,8 @@ class FieldRecording:
         """Take a line of the robot's journal; what was told before it is on disk then."""
         self._take(event)
         self._told_end = isinstance(event, Finished | Aborted) and not self._waiting
+        if self._told_end and event.run_id in self._runs:
+            self._runs[event.run_id].measure()
         if self._told_end:  # now and not when it is closed: the disk may be full then
             carry_end(self.canvas)
         self._save()
@@ -118,6 +120,8 @@ class FieldRecording:
             for report in self._waiting:
                 self._draw(report)
             self._draw_poses()
+            for run in self._runs.values():
+                run.measure()
             if not self._told_end:
                 carry_end(self._canvas)
             self._save()

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import rerun as rr
 
-from mission.comparing.beside import WayFollower
+from mission.comparing.late_beside import LateBeside
 from mission.document import Mission
 from mission.events import (
     Aborted,
@@ -68,7 +68,7 @@ class RunDrawing:
         self._began_ns: int | None = None
         self._place: FloatArray | None = None
         self._growth = AcquiredDrawing(sights[-1]) if sights else None
-        self._thinner, self._trail, self._way = Thinner(), Trail(), WayFollower(mission)
+        self._thinner, self._trail, self._way = Thinner(), Trail(), LateBeside(mission)
         self._style()
         self._describe()
 
@@ -83,7 +83,7 @@ class RunDrawing:
         self._describe()
 
     def poses(self, told: Track) -> None:
-        """Move the robot, lengthen its path, and measure its distance from the legs it drives."""
+        """Move the robot, and lengthen its path; what waits for events is plotted by `measure`."""
         poses = self._thinner.thin(told)
         if not len(poses):
             return
@@ -93,11 +93,13 @@ class RunDrawing:
             draw_robot(draw, *robots, radius=self.mission.robot.radius, colour=palette.DRIVEN)
         self._move(poses)
         self._lengthen(poses)
-        self._measure(poses)
+        self._way.poses(poses)
         self._place = poses.xy[-1]
 
     def state(self, report: StateReport) -> None:
         """Put the robot's and the stop's state on their lanes, and the battery on its plot."""
+        if self._way.knows(report.last_event):
+            self.measure(report.robot_ns)
         self._at(self.names.flat(entities.STATE), rr.StateChange(state=report.state), report.robot_ns)
         stop_state = "" if report.stop_state is None else report.stop_state
         self._at(self.names.flat(entities.STOP_STATE), rr.StateChange(state=stop_state), report.robot_ns)
@@ -108,7 +110,7 @@ class RunDrawing:
     def event(self, event: AnyEvent) -> None:
         """Write the event down whole, mark it on the plan, and bring the report up to date."""
         self.tell_time(event)
-        self._way.tell(event, self.mission)
+        self._way.event(event, self.mission)
         told = {name: value for name, value in msgspec.to_builtins(event).items() if name in EVENT_FIELDS}
         told["body"] = msgspec.json.encode(event).decode()
         self._at(self.names.events, rr.DynamicArchetype("Event", components=told), event.robot_ns)
@@ -183,12 +185,13 @@ class RunDrawing:
             raised = [strokes.level(strip, 2 * ABOVE_FLOOR) for strip in flat]
             self._columns(self.names.solid(entities.DRIVEN), ns, rr.LineStrips3D.columns(strips=raised))
 
-    def _measure(self, poses: Track) -> None:
-        beside = self._way.measure(poses.xy)[:, 0]
+    def measure(self, until_ns: int | None = None) -> None:
+        """Plot how far beside the way the robot was; up to a time until which all events are known."""
+        ns, beside = self._way.measured(until_ns)
         known = np.isfinite(beside)
         if known.any():
             values = rr.Scalars.columns(scalars=beside[known] * 1000)
-            self._columns(self.names.metric(entities.METRIC_CROSS_TRACK), poses.ns[known], values)
+            self._columns(self.names.metric(entities.METRIC_CROSS_TRACK), ns[known], values)
 
     def _mark(self, event: AnyEvent) -> None:
         stop = self.stops.get(getattr(event, "stop", ""))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mission.comparing.beside import WayFollower, beside
+from mission.comparing.late_beside import LateBeside
 from mission.document import Mission
 from mission.events import Arrived, Finished, Homing, Scanned, Skipped, Started
 from mission.run_log import RunLog
@@ -83,6 +84,36 @@ def test_what_is_measured_does_not_depend_on_how_poses_come() -> None:
         follower.tell(_scanned("S1"))
     one_by_one = np.concatenate([single.measure(pose) for pose in xy])
     assert np.array_equal(whole.measure(xy), one_by_one)
+
+
+def test_events_that_come_late_change_nothing() -> None:
+    """Poses of two legs come first, then the events between them, as from a journal after a gap."""
+    mission = hook()
+    poses = line(0, (0, 0.1), (10, 0.1)) + line(110, (10, 1), (0, 1.2))
+    log = told(
+        mission,
+        (Started, 0, {"commander": "ann"}),
+        (Arrived, 30, {"stop": "S1", "pose": at(10, 0), "deviation_m": 0.0}),
+        (Scanned, 99, {"stop": "S1", "pose": at(10, 0), **SCAN}),
+        poses=poses,
+    )
+    late = LateBeside(mission)
+    late.poses(log.poses)
+    assert not late.knows(1)
+    for event in log.events:
+        late.event(event, mission)
+    early, metres = late.measured(int(log.poses.ns[4]))
+    rest, others = late.measured()
+    assert (len(early), late.knows(3)) == (5, True)
+    assert np.array_equal(np.concatenate([early, rest]), log.poses.ns)
+    whole = WayFollower(mission)
+    expected = []
+    xy = log.poses.xy
+    for event, before in zip(log.events, (xy[:1], xy[1:21], xy[21:21]), strict=True):
+        expected.append(whole.measure(before))
+        whole.tell(event)
+    expected.append(whole.measure(xy[21:]))
+    assert np.array_equal(np.concatenate([metres, others]), np.concatenate(expected)[:, 0])
 
 
 def test_home_is_by_the_return_or_back_the_way_it_came() -> None:

@@ -1,0 +1,79 @@
+"""A plan and its runs -> one recording, laid out for exactly these runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from mission.errors import InputError
+from mission.files.atomic import replacing
+from recordings import entities
+from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
+from recordings.carried.checking import carry_end
+from recordings.carried.plan import origin_in, planned_extent
+from recordings.carried.reading import Recording
+from recordings.read import chunks
+from recordings.review import missions_of
+from recordings.stages.mission import mission_extent
+
+
+def merge(recordings: Sequence[Recording], out: Path) -> None:
+    """Write one recording of a mission's plan and runs; of a run that several tell of, the first counts.
+
+    Raises
+    ------
+    InputError
+        When they are of several missions or origins, or `out` is one of them or cannot be written.
+    """
+    ordered = sorted(recordings, key=lambda item: entities.PROPERTY_PLAN not in item.contents.properties)
+    _must_fit(ordered, out)
+    missions = missions_of(ordered)
+    if not missions:
+        raise InputError(f"{out}: no recording carries its mission; plan and record again")
+    runs = tuple(dict.fromkeys(str(log.run_id) for item in ordered for log in item.logs))
+    extents = (planned_extent(item) for item in ordered)
+    sheet = Sheet(
+        recording_id=ordered[0].mission_id,
+        name=missions[-1].name,
+        origin=mission_origin(missions[0]),
+        extent=next((item for item in extents if item is not None), mission_extent(missions[-1])),
+        runs=runs,
+    )
+    with replacing(out) as (temporary,), open_canvas(sheet) as canvas:
+        _fill(canvas, ordered)
+        temporary.write_bytes(canvas.taken())
+
+
+def _must_fit(recordings: Sequence[Recording], out: Path) -> None:
+    ids = sorted({item.mission_id for item in recordings})
+    if len(ids) > 1:
+        raise InputError(f"{out}: one recording is of one mission; these are of {len(ids)}: {', '.join(ids)}")
+    if len({origin_in(item) for item in recordings}) > 1:
+        raise InputError(f"{out}: the recordings' origins differ: their missions begin at different places")
+    if any(out.resolve() == item.path.resolve() for item in recordings):
+        raise InputError(f"{out}: is one of the recordings to be merged; give another name")
+
+
+def _fill(canvas: Canvas, recordings: Iterable[Recording]) -> None:
+    """Take everything over once: what a recording has told, a later one does not tell again."""
+    told: set[str] = set(canvas.counts)
+    for recording in recordings:
+        mine: set[str] = set()
+        for chunk in chunks(recording.path):
+            entity = str(chunk.entity_path)
+            if entity.startswith(entities.PROPERTIES):
+                continue
+            if entity not in told or entity == entities.LATEST_REPORT:
+                mine.add(entity)
+                canvas.take(chunk)
+        told |= mine
+        for name in (entities.PROPERTY_PLAN, entities.PROPERTY_PARAMETERS, entities.PROPERTY_RUN):
+            values = recording.contents.properties.get(name)
+            if values and f"{entities.PROPERTIES}/{name}" not in told:
+                told.add(f"{entities.PROPERTIES}/{name}")
+                canvas.describe(name, {key: _listed(value) for key, value in values.items()})
+    carry_end(canvas)
+
+
+def _listed(value: object) -> object:
+    return list(value) if isinstance(value, tuple) else value
