@@ -12,6 +12,7 @@ import msgspec
 
 from bridge.station.follow import Followed, Silence
 from bridge.station.station import Station
+from mission.comparing.spans import stood_s
 from mission.document import Mission
 from mission.errors import OutcomeUnknown
 from mission.events import (
@@ -210,7 +211,7 @@ def table_lines(
 def remaining_s(
     mission: Mission, state: StateReport, events: tuple[AnyEvent, ...], elapsed_s: float
 ) -> float:
-    """Seconds left if all goes as planned from the stop that is worked on."""
+    """Seconds left if all goes as planned from the stop that is worked on, however long the run stands."""
     plan = schedule(mission)
     ids = [stop.id for stop in mission.stops]
     behind = state.done_count + state.skipped_count if state.stop is None else ids.index(state.stop)
@@ -220,7 +221,8 @@ def remaining_s(
         last = mission.stops[behind - 1]
         begun = float(plan.arrival_s[behind - 1]) + last.settle_s + last.scan.duration_s
     since = max((event.mission_time_s for event in events if isinstance(event, Scanned)), default=0.0)
-    return max(0.0, plan.total_s - begun - max(0.0, elapsed_s - since))
+    worked = elapsed_s - since - stood_s(events, since_s=since, until_s=elapsed_s)
+    return max(0.0, plan.total_s - begun - max(0.0, worked))
 
 
 def clock(seconds: float) -> str:

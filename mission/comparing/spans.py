@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from mission.comparison import Span
 from mission.events import (
@@ -19,6 +19,7 @@ from mission.events import (
 )
 from mission.run_log import RunLog
 
+STANDING: tuple[State, ...] = ("PAUSED", "HELD")
 OVER: tuple[State, ...] = ("FINISHED", "ABORTED")
 
 
@@ -34,6 +35,18 @@ def spans_of(log: RunLog) -> tuple[Span, ...]:
         for (begin, state, why), end in zip(changes, [*ends, max(last, changes[-1][0])], strict=True)
         if state not in OVER and end > begin
     )
+
+
+def stood_s(events: Iterable[AnyEvent], *, since_s: float, until_s: float) -> float:
+    """Seconds of mission time that a run was paused or held between two times, as its events tell."""
+    state: State | None = None
+    homing, stood, begun = False, 0.0, since_s
+    for event in events:
+        homing = homing or isinstance(event, Homing)
+        at = min(max(event.mission_time_s, since_s), until_s)
+        stood += at - begun if state in STANDING else 0.0
+        state, begun = _after(event, state, homing) or state, at
+    return stood + (max(0.0, until_s - begun) if state in STANDING else 0.0)
 
 
 def _changes(log: RunLog) -> Iterator[tuple[float, State, str]]:

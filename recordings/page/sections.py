@@ -14,7 +14,7 @@ from mission.figures import Share, percent
 from mission.page import route_length
 from mission.schedule import schedule
 from mission.table import duration
-from recordings.page.picture import legend, line_sample, plan_picture
+from recordings.page.floor_picture import legend, line_sample, plan_picture
 from recordings.page.plots import plots
 from recordings.page.style import ANSWERS, BLUE, GREY, PURPLE, STATES, VERMILION, YELLOW
 from recordings.page.subject import ReportSubject

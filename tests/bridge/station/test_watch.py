@@ -64,6 +64,17 @@ def test_the_time_left_counts_down_and_ends_at_zero() -> None:
     assert left[-1] < 0.1
 
 
+def test_the_time_left_stands_still_while_the_run_does() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    field.order("pause")
+    events = field.journal.events()
+    now = events[-1].mission_time_s
+    left = [remaining_s(corridor(), field.report(), events, now + waited) for waited in (0.0, 100.0, 3600.0)]
+    assert left == [schedule(corridor()).total_s] * 3
+
+
 def test_the_table_names_stop_state_battery_link_and_time() -> None:
     field = Field()
     field.station().push(corridor())

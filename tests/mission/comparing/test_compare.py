@@ -11,6 +11,7 @@ import pytest
 
 from mission.comparing.compare import compare
 from mission.comparing.judging import judge
+from mission.comparing.spans import stood_s
 from mission.comparing.telling import comparison_json, comparison_text
 from mission.comparison import Comparison
 from mission.document import Mission, sealed
@@ -247,3 +248,16 @@ def test_a_log_of_nothing_is_compared_too() -> None:
     assert [item.outcome for item in compared.stops] == ["not reached", "not reached"]
     assert (compared.spans, compared.beside.greatest_m) == ((), None)
     assert comparison_text(compared)
+
+
+def test_standing_still_is_counted_between_two_times() -> None:
+    events = told(
+        square_tour(),
+        START,
+        (Paused, 10.0, {"reason": "pause by ann"}),
+        (Resumed, 25.0, {"commander": "ann"}),
+        (Held, 40.0, {"reason": "blocked"}),
+    ).events
+    assert stood_s(events, since_s=0.0, until_s=30.0) == 15.0
+    assert stood_s(events, since_s=20.0, until_s=50.0) == 5.0 + 10.0
+    assert stood_s(events[:1], since_s=0.0, until_s=50.0) == 0.0
