@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from recordings.logs import FieldLog, Reading
     from recordings.replay.log_placing import Align, Placing
     from recordings.replay.replayed import Replay
+    from recordings.review import Review
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -118,6 +119,12 @@ def replay(
         Path | None, typer.Option(help="With --floor: further mission to write that sees the rest (.json).")
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="Table of stops to write (.csv).")] = None,
+    html: Annotated[
+        Path | None, typer.Option(metavar="REPORT.html", help="Report to write, one file alone.")
+    ] = None,
+    plan: Annotated[
+        Path | None, typer.Option(metavar="PLAN.rrd", help="The plan's recording: its floor, for the report.")
+    ] = None,
     json_: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> int:
     """Lay a robot's own log beside the mission: which stops were done, how far off, and what was missed.
@@ -138,19 +145,42 @@ def replay(
         raise InputError(f"--top-up {top_up}: is planned on the floor; give its file with --floor")
     if clouds is not None and floor is None:
         raise InputError(f"--clouds {clouds}: are laid on the floor; give its file with --floor")
-    for path in (out, csv, top_up):
+    for path in (out, csv, top_up, html):
         if path is not None:
             must_be_writable(path)
     if csv is not None and len(read) > 1:
         raise InputError("--csv: is a table of one log; give one log")
     driven = _mission(mission, read)
     how = _placing(map_, align, time_offset, poses, robot_name)
-    replays = [laid(log, driven, how) for log in read]
+    plans = None if plan is None else _plans(plan, driven)
+    sights = (
+        () if plans is None else tuple(sight for item in plans.recordings for sight in item.recording.sights)
+    )
+    replays = [laid(log, driven, how, sights) for log in read]
     if floor is not None:
         replays = _seen(replays, floor, clouds, top_up)
     _write_replays(replays, out, csv)
+    if html is not None:
+        from mission.files.atomic import write_atomic
+        from recordings.page import report_html
+        from recordings.replay.replay_page import page_of
+
+        write_atomic(html, report_html(page_of(replays, plans)))
     _tell_replays(replays, as_json=json_)
     return max(judged(item).exit_code for item in replays)
+
+
+def _plans(path: Path, mission: Mission) -> Review:
+    """A plan's recording, if it is of the mission."""
+    from recordings.review import review as read
+
+    found = read([path])
+    for fault in found.faults:
+        raise InputError(fault)
+    held = found.recordings[0].recording
+    if held.mission_id != mission.id:
+        raise InputError(f"--plan {path}: is of mission {held.mission_id[:12]}, not {mission.id[:12]}")
+    return found
 
 
 def _seen(replays: list[Replay], floor: Path, clouds: Path | None, top_up: Path | None) -> list[Replay]:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 
 from mission.acquired import Acquired
-from mission.comparing.judging import judge
 from mission.comparison import Comparison, StopComparison
 from mission.document import Stop
 from mission.events import Scanned
@@ -114,7 +113,7 @@ def _plan_shares(shares: Sequence[Share], what: str) -> str:
 def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iterator[str]:
     if not alone:
         yield tag("h2", shown(f"Run {comparison.run_id or 'without a name'}"))
-    judgement = judge(comparison)
+    judgement = subject.judgement(comparison)
     words = shown(" " + " ".join(judgement.sentences))
     yield tag("div", tag("b", shown(f"{judgement.headline}.")), words, class_="band",
               style=f"background:{ANSWERS[judgement.answer]}")  # fmt: skip
@@ -124,6 +123,8 @@ def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iter
     yield section("Stops", tag("div", _stop_grid(comparison), class_="scroll"))
     if comparison.acquired is not None:
         yield tag("div", *_coverage_tables(comparison.acquired), class_="columns")
+    for title, lines in subject.told.get(comparison.run_id, ()):
+        yield section(title, tag("ul", *(tag("li", shown(line)) for line in lines)))
     yield section("On the way", plots(comparison))
 
 
@@ -264,7 +265,9 @@ def _bar(share: Share) -> str:
 def _side_by_side(subject: ReportSubject) -> str:
     runs = subject.comparisons
     header = ["", *(shown(run.run_id or "without a name") for run in runs)]
-    rows = [row([tag("b", name), *(figure(run) for run in runs)]) for name, figure in _ROWS]
+    verdicts = (shown(subject.judgement(run).headline) for run in runs)
+    rows = [row([tag("b", "verdict"), *verdicts])]
+    rows += [row([tag("b", name), *(figure(run) for run in runs)]) for name, figure in _ROWS]
     stops = dict.fromkeys(item.stop for run in runs for item in run.stops)
     by_stop = [{item.stop: item for item in run.stops} for run in runs]
     cells = [row([shown(stop), *(_outcome(items.get(stop)) for items in by_stop)]) for stop in stops]
@@ -298,7 +301,6 @@ def _rooms_of(runs: Sequence[Comparison], header: list[str]) -> str:
 
 
 _ROWS = (
-    ("verdict", lambda run: shown(judge(run).headline)),
     ("robot", lambda run: shown(run.log.robot)),
     ("stops scanned", lambda run: f"{run.scanned} / {len(run.asked)}"),
     ("coverage", lambda run: "" if run.acquired is None else percent(run.acquired.shares.whole.coverage)),

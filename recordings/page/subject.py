@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from mission.comparing.judging import Judgement, judge
 from mission.comparison import Comparison
 from mission.document import Mission
 from mission.run_log import LogSource
@@ -31,6 +33,15 @@ class ReportSubject:
     """The files that it was made from."""
     problems: tuple[str, ...] = ()
     """What of these files is missing or contradicts itself."""
+
+    judgements: Mapping[str | None, Judgement] = field(default_factory=dict)
+    """What is answered of a run otherwise than by its scans, by run id: of logs that tell of none."""
+    told: Mapping[str | None, tuple[tuple[str, tuple[str, ...]], ...]] = field(default_factory=dict)
+    """What else is told of a run, by run id: titles, each with its lines."""
+
+    def judgement(self, run: Comparison) -> Judgement:
+        """What is answered of a run, and why."""
+        return self.judgements.get(run.run_id) or judge(run)
 
     @property
     def mission(self) -> Mission:

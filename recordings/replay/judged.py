@@ -20,7 +20,15 @@ def judged(replay: Replay) -> Judgement:
     """
     unseen = replay.sight is not None and not replay.sight.enough
     answer: Certainty = "no" if missing(replay) or outside(replay) or unseen else "yes"
-    return Judgement(answer, tuple(_sentences(replay)))
+    return DriveJudgement(answer, tuple(_sentences(replay)))
+
+
+class DriveJudgement(Judgement):
+    """An answer to how a mission was driven; whether it was scanned is another question."""
+
+    @property
+    def headline(self) -> str:
+        return HEADLINES[self.answer]
 
 
 def missing(replay: Replay) -> list[StopComparison]:
@@ -65,4 +73,8 @@ WORDS = {
     "arrived": "No scan at",
     "not reached": "Not reached:",
 }
-HEADLINES = {"yes": "Driven as planned", "no": "Not driven as planned", "unknown": "Not known"}
+HEADLINES: dict[Certainty, str] = {
+    "yes": "Driven as planned",
+    "no": "Not driven as planned",
+    "unknown": "Not known",
+}

@@ -14,7 +14,7 @@ from mission.measured import Measured
 from mission.run_log import Alignment
 from mission.table import printable, table
 from recordings.logs.field_log import FieldLog
-from recordings.replay.judged import HEADLINES, judged
+from recordings.replay.judged import judged
 from recordings.replay.replayed import Replay
 from recordings.replay.way_and_time import lost_times, way_of
 
@@ -33,12 +33,12 @@ def as_text(replay: Replay) -> str:
         "",
         *(f"  {line}" for line in comparison_table(replay.comparison).split("\n")),
         "",
-        *_truth(replay),
-        *_way(replay),
+        *truth_lines(replay),
+        *way_lines(replay),
         *(f"  time lost  {item.seconds:+7.1f} s  {item.where}" for item in lost_times(replay)[:MOST_LOST]),
         *_sight(replay),
-        *_measured(replay),
-        f"{HEADLINES[judgement.answer]}. {' '.join(judgement.sentences)}",
+        *measured_lines(replay),
+        judgement.text,
     ]
     return "\n".join(printable(line) for line in lines)
 
@@ -70,14 +70,14 @@ def notes_of(replay: Replay) -> tuple[str, ...]:
     return (*lost, *replay.log.oddities, *replay.placed.source.oddities, *turns, *replay.uploads)
 
 
-def _truth(replay: Replay) -> list[str]:
+def truth_lines(replay: Replay) -> list[str]:
     """By a simulator's word, where it stood."""
     offsets = [(stop.id, replay.true_offset_m(k)) for k, stop in enumerate(replay.mission.stops)]
     told = [f"{name} {1000 * away:.0f} mm" for name, away in offsets if away is not None]
     return [f"  in truth   {', '.join(told)}"] if told else []
 
 
-def _way(replay: Replay) -> list[str]:
+def way_lines(replay: Replay) -> list[str]:
     way = way_of(replay)
     lines = [
         f"  way        {way.driven_m:.1f} m driven, {way.planned_m:.1f} m planned to the last stop visited "
@@ -110,7 +110,7 @@ def _sight(replay: Replay) -> list[str]:
     return ["", *(f"  {line}" for line in lines), ""]
 
 
-def _measured(replay: Replay) -> list[str]:
+def measured_lines(replay: Replay) -> list[str]:
     """What the scans show."""
     found = replay.measured
     if found is None:
@@ -146,7 +146,7 @@ def as_json(replay: Replay) -> dict[str, Any]:
         "alignment": None if alignment is None else vars(alignment),
         "inferred": replay.inferred,
         "answer": judgement.answer,
-        "verdict": f"{HEADLINES[judgement.answer]}. {' '.join(judgement.sentences)}",
+        "verdict": judgement.text,
         "way": {**vars(way_of(replay)), "extra_m": way_of(replay).extra_m},
         "time_lost": [vars(item) for item in lost_times(replay)],
         "halts": [_halt_json(replay, k) for k in range(len(replay.matches))],

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mission.document import Mission
-from mission.geometry import BoolArray, FloatArray
+from mission.geometry import FloatArray, IntArray
 from mission.run.way import legs_of
 from mission.run_log import Track
 from recordings.replay.matching import Match
@@ -56,7 +56,7 @@ def way_of(replay: Replay) -> Way:
     when = None if at is None else float(replay.run.seconds([beside.ns[at]])[0])
     told = bool(len(metres))
     return Way(
-        driven_m=driven_m(replay.run.poses, replay.matches),
+        driven_m=way_track(replay.run.poses, replay.matches).length_m,
         planned_m=_planned_m(replay.mission, replay.matches),
         mean_m=float(metres.mean()) if told else None,
         rms_m=float(np.sqrt((metres**2).mean())) if told else None,
@@ -67,30 +67,30 @@ def way_of(replay: Replay) -> Way:
     )
 
 
-def driven_m(track: Track, matches: tuple[Match, ...]) -> float:
-    """Length of the way between halts, along means of half a second."""
-    if len(track) < 2:
-        return 0.0
-    index = ((track.ns - track.ns[0]) / (SMOOTHED_S * 1e9)).astype(np.int64)
-    many = np.bincount(index)
-    means = np.stack([np.bincount(index, column) for column in track.xy.T], axis=-1)
-    held = many > 0
-    places = means[held] / many[held, None]
-    ns = track.ns[0] + (np.flatnonzero(held) + 0.5) * SMOOTHED_S * 1e9
-    return _length(places, _moving(ns, matches))
+def way_track(track: Track, matches: tuple[Match, ...]) -> Track:
+    """The way without its noise: means of half a second, and of each halt the place where the robot stood."""
+    halts = [match.standing for match in matches]
+    moving = np.ones(len(track), bool)
+    for halt in halts:
+        moving &= (track.ns < halt.begin_ns) | (track.ns > halt.end_ns)
+    rows = [(ns, halt.x, halt.y, halt.heading) for halt in halts for ns in (halt.begin_ns, halt.end_ns)]
+    stood = np.array([row[1:] for row in rows]).reshape(-1, 3)
+    ns, means = _means(track.ns[moving], track.xy[moving], np.unwrap(track.heading)[moving])
+    all_ns = np.concatenate([ns, np.array([row[0] for row in rows], np.int64)])
+    return Track.of(
+        all_ns, np.concatenate([means[:, :2], stood[:, :2]]), np.concatenate([means[:, 2], stood[:, 2]])
+    )
 
 
-def _moving(ns: FloatArray, matches: tuple[Match, ...]) -> BoolArray:
-    """Whether each step between times (n,) is outside every halt (n - 1,)."""
-    moving = np.ones(max(len(ns) - 1, 0), bool)
-    for match in matches:
-        halt = match.standing
-        moving &= ~((ns[:-1] >= halt.begin_ns) & (ns[1:] <= halt.end_ns))
-    return moving
-
-
-def _length(places: FloatArray, moving: BoolArray) -> float:
-    return float(np.hypot(*np.diff(places, axis=0).T)[moving].sum())
+def _means(ns: IntArray, xy: FloatArray, heading: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Times and x, y, heading (n, 3) averaged over pieces of SMOOTHED_S."""
+    if not len(ns):
+        return ns, np.empty((0, 3))
+    index = ((ns - ns[0]) / (SMOOTHED_S * 1e9)).astype(np.int64)
+    _, first, many = np.unique(index, return_index=True, return_counts=True)
+    table = np.column_stack([(ns - ns[0]).astype(float), xy, heading])
+    means = np.add.reduceat(table, first, axis=0) / many[:, None]
+    return ns[0] + np.rint(means[:, 0]).astype(np.int64), means[:, 1:]
 
 
 def _planned_m(mission: Mission, matches: tuple[Match, ...]) -> float:

@@ -69,6 +69,8 @@ def test_a_drive_as_planned_is_one() -> None:
     assert judged(found).exit_code == 0
     way = way_of(found)
     assert way.driven_m == pytest.approx(way.planned_m, rel=0.01)
+    noisy = replay(log_of(logged(driven(MISSION), Senses(noise_m=0.05))), MISSION, FIRST)
+    assert way_of(noisy).driven_m == pytest.approx(way.planned_m, rel=0.05)
     assert way.greatest_m == pytest.approx(0, abs=1e-9)
 
 
@@ -191,11 +193,16 @@ def test_the_command_reads_a_bag_and_writes_table_and_recording(
     plan = tmp_path / "mission.json"
     write(MISSION, plan)
     given = [str(bag), "--mission", str(plan), "--align", "first", "--json"]
-    files = ["--csv", str(tmp_path / "stops.csv"), "-o", str(tmp_path / "replay.rrd")]
+    html = tmp_path / "report.html"
+    files = ["--csv", str(tmp_path / "stops.csv"), "-o", str(tmp_path / "replay.rrd"), "--html", str(html)]
     assert main(["replay", *given, *files]) == 1
     told = json.loads(capsys.readouterr().out)
     assert told["answer"] == "no"
     assert told["run"]["stops"][0]["deviation_m"] == pytest.approx(offset_of(drive, MISSION, 0), abs=1e-6)
+    page = html.read_text()
+    assert told["verdict"].split(". ")[0] in page
+    assert "scan it again" in page
+    assert "coverage acquired" not in page
     assert len((tmp_path / "stops.csv").read_text().splitlines()) == 1 + len(MISSION.stops)
     from recordings.review import review
 
