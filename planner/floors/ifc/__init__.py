@@ -10,7 +10,7 @@ from mission.errors import InputError
 from mission.floor import FloorPlan
 from mission.geometry import bounds
 from mission.kinds import KINDS
-from planner.floors.ifc.levels import Level, chosen_level, levels_of, walked, with_uses
+from planner.floors.ifc.levels import Level, chosen_level, levels_of, standing_at, walked, with_uses
 from planner.floors.ifc.loading import load
 from planner.floors.ifc.model import Model
 from planner.floors.ifc.storey_plan import floor_on, odd_products
@@ -18,7 +18,10 @@ from planner.floors.parts import in_order
 from planner.floors.reader import FloorFile, FloorOptions
 from planner.floors.survey import FloorChoice, LayerUse, Survey
 
-WORKED_OUT = ("floor_from_rooms", "floor_from_walls", "rooms_derived", "spaces_overlap", "off_floor")
+WORKED_OUT = (
+    *("floor_from_rooms", "floor_from_proxies", "floor_from_walls", "rooms_derived"),
+    *("spaces_overlap", "off_floor"),
+)
 """Findings about what the model does not say and was worked out."""
 
 
@@ -63,6 +66,7 @@ def survey(file: FloorFile, options: FloorOptions) -> Survey:
         floors=tuple(choices),
         layers=_classes(model),
         ignored=tuple(f"{count} {name}" for name, count in described.left_out.items()),
+        inferred=() if levels else (f"no storeys; elements stand at {standing_at(model)}: --level Z",),
         findings=in_order(odd_products(model)),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import shapely
@@ -87,11 +87,16 @@ def floor_area(
     level: Level, model: Model, rooms: Sequence[Space], solids: Sequence[Solid], doors: Sequence[Door]
 ) -> tuple[Region, list[Finding]]:
     """The floor: the slabs at its level, else the rooms and what stands between, else the walls' hull."""
-    slabs = _slabs(level, model)
+    slabs, odd = _slabs(level, walked_on(model)), []
+    if slabs.is_empty:
+        slabs = _slabs(level, [body for _, body in model.of_role("other")])
+        odd = [
+            Finding("floor_from_proxies", f"no slab at {level.z:.2f} m: the floor is IfcBuildingElementProxy")
+        ]
     spaces = shapely.union_all([room.region for room in rooms]) if rooms else NOTHING
     standing = [item.region for item in solids if item.kind in BARRIERS]
     if slabs.area and slabs.area >= ENOUGH * spaces.area:
-        return slabs, []
+        return slabs, odd
     if rooms:
         doorways = [door.threshold for door in doors]
         between = shapely.union_all([spaces, slabs, *standing, *doorways])
@@ -100,19 +105,21 @@ def floor_area(
         )
         text = f"{said} at {level.z:.2f} m: the floor is taken from {len(rooms)} rooms and the walls between"
         return closed(between, WALL_GAP), [Finding("floor_from_rooms", text)]
-    hull, gap = _enclosed([*standing, *(door.threshold for door in doors)])
+    walls = [item.region for item in solids if item.kind in ("walls", "columns", "windows")]
+    hull, gap = _enclosed([*walls, *(door.threshold for door in doors)])
     if hull.difference(shapely.union_all(standing)).area < LEAST_ROOM:
         return slabs, []
     text = (
         f"no slab, no rooms at {level.z:.2f} m: the floor is what walls enclose, gaps up to {gap:g} m closed"
     )
-    return shapely.union_all([hull, slabs]), [Finding("floor_from_walls", text)]
+    sills = [item.region for item in solids if item.kind == "railings" and item.region.intersects(hull)]
+    return tidy(shapely.union_all([hull, slabs, *sills])), [Finding("floor_from_walls", text)]
 
 
-def _slabs(level: Level, model: Model) -> Region:
-    """What looks up within reach of a level, small gaps closed."""
+def _slabs(level: Level, bodies: Iterable[Surface]) -> Region:
+    """What of bodies looks up within reach of a level, small gaps closed."""
     faces: list[Region] = []
-    for mesh in walked_on(model):
+    for mesh in bodies:
         if mesh.z[0] > level.z + NEAR_LEVEL or mesh.z[1] < level.z - NEAR_LEVEL:
             continue
         triangles, heights, _ = upward(mesh)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -128,8 +129,8 @@ def chosen_level(
         return walked(levels)[0]
     if not levels:
         raise InputError(
-            f"{path}: the model has no storeys; say where the floor lies with --level Z (its elements lie "
-            f"between {_range(model)} m)"
+            f"{path}: the model has no storeys; say where the floor lies with --level Z (walls and "
+            f"doors stand at {standing_at(model)})"
         )
     raise InputError(f"{path}: has {len(levels)} storeys; choose one with --storey: {listed(levels)}")
 
@@ -163,11 +164,10 @@ def listed(levels: Iterable[Level]) -> str:
     return ", ".join(f"'{level.name}' ({level.z:+.2f} m)" for level in levels)
 
 
-def _range(model: Model) -> str:
-    spans = [mesh.z for mesh in model.meshes.values()]
-    if not spans:
-        return "no heights"
-    return f"{min(low for low, _ in spans):.2f} and {max(high for _, high in spans):.2f}"
+def standing_at(model: Model) -> str:
+    """The heights at which most walls, columns and doors stand, for a model without storeys."""
+    feet = Counter(round(body.z[0], 1) + 0.0 for _, body in model.of_role("walls", "columns", "doors"))
+    return ", ".join(f"{z:g} m ({count})" for z, count in feet.most_common(4)) or "no height"
 
 
 def with_uses(levels: tuple[Level, ...], model: Model) -> tuple[Level, ...]:
