@@ -22,6 +22,8 @@ _BROAD = 0.4
 """What is drawn broader than this (m), such as the place of an open garage door, is no line across."""
 _REACH = 0.3
 """Frames may keep a leaf this far (m) from its jamb."""
+_DRAWN_OPEN = 0.6
+"""Where a leaf is drawn speaks against its being shut there as much as a wall this far (m) away."""
 _FLUSH = 0.08
 _WHOLE = 0.8
 _JAMB = (0.03, 0.08, 0.15, 0.3)
@@ -164,7 +166,7 @@ def _leaf(swing: Swing, leaves: _Strokes, walls: _Near) -> Leaf:
     drawn = [leaves.along(swing.hinge, end) for end in swing.ends]
     away = [_to_walls(swing.hinge, end, near) for end in swing.ends]
     if drawn[0] != drawn[1]:
-        away[drawn.index(True)] += 0.35
+        away[drawn.index(True)] += _DRAWN_OPEN
     shut = 0 if away[0] <= away[1] else 1
     return Leaf(swing.hinge, swing.ends[shut], swing.ends[1 - shut])
 

@@ -127,6 +127,19 @@ def test_a_swing_of_many_small_lines_is_a_swing(tmp_path: Path) -> None:
     is_the_flat(read(drawing, tmp_path))
 
 
+def test_a_leaf_that_stands_open_along_a_wall_opens_no_wall(tmp_path: Path) -> None:
+    """The door leads out of the hall at the end of its wall; open, its leaf lies on the wall beside it."""
+    drawing = new_drawing()
+    model = drawing.modelspace()
+    rectangle(model, "FLOORING", 0, 0, 8, 6)
+    rectangle(model, "A-WALL", 2, 4, 6, 4.2)
+    model.add_line((4, 3.97), (4.9, 3.97), dxfattribs={"layer": "A-DOOR"})
+    model.add_arc((4, 3.97), 0.9, 270, 360, dxfattribs={"layer": "A-DOOR"})
+    floor = read(drawing, tmp_path)
+    assert sum(solid.area for item in floor.elements for solid in item.solids) == pytest.approx(0.8)
+    assert [item.line[:, 0].round(2).tolist() for item in floor.openings] == [[4.0, 4.0]]
+
+
 def test_a_gap_between_walls_ends_is_a_passage(tmp_path: Path) -> None:
     drawing = new_drawing()
     flat(drawing.modelspace(), doors="DIM")
