@@ -61,6 +61,9 @@ class Scanner(Protocol):
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
         """Scan, and give up when `interrupt` is set or `scan.timeout_s` has passed."""
 
+    def what_became(self, label: str) -> ScanResult | ScanFailed | None:
+        """How a scan ended that was begun before the program was started anew; `None` if it cannot say."""
+
     @property
     def profiles(self) -> tuple[str, ...] | None:
         """Scan profiles it knows; `None` if it takes any."""

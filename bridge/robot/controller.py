@@ -22,7 +22,7 @@ from bridge.robot.base import Base, Rest, Scanner
 from bridge.robot.journal import Journal
 from bridge.robot.owed import Owed
 from bridge.robot.runner import Position
-from mission.document import Mission
+from mission.document import Mission, Stop
 from mission.events import AnyEvent, Pose
 from mission.files.file_name import file_name
 from mission.run import revision, way
@@ -32,6 +32,7 @@ from mission.run.decision import Decision, Situation, decide, handed_over
 from mission.run.lease import Lease, claimed, lasting_ns
 from mission.run.orders import FREE_VERBS, Answer, Order, Refused
 from mission.run.revision import RevisionPolicy
+from mission.run.scans import ScanFailed, ScanResult
 from mission.run.states import Change, Run
 
 SETTLE_SAMPLE_S = 0.1
@@ -104,9 +105,16 @@ class Controller:
             return
         self._run = kept
         self._hold(self._stored(kept.mission_id, kept.revision))
-        change = runs.rebooted(kept)
+        change = runs.rebooted(kept, self._what_became(kept))
         if change.events:
             self._keep(change)
+
+    def _what_became(self, run: Run) -> ScanResult | ScanFailed | None:
+        """What the scanner says of the scan that was under way when the program ended."""
+        stop = runs.stop_of(run, self._mission)
+        if stop is None or run.stop_state != "SCANNING":
+            return None
+        return self._scanner.what_became(_label(run, stop))
 
     def _mend_lease(self) -> None:
         """A lease from a time when the date was far ahead would last until then."""
@@ -364,8 +372,7 @@ class Controller:
 
     def _scan(self, run: Run, mission: Mission) -> None:
         stop = mission.stops[run.at]
-        label = f"{run.run_id}-{file_name(stop.id)}-{run.attempt + 1}"
-        result = self._scanner.scan(label, stop.scan, interrupt=self._interrupt)
+        result = self._scanner.scan(_label(run, stop), stop.scan, interrupt=self._interrupt)
         self._advance(run, lambda now: runs.scan_ended(now, mission, result))
 
     def _verify(self, run: Run, mission: Mission) -> None:
@@ -455,9 +462,11 @@ class Controller:
         self, order: Order, decision: Decision | Refused, error: sqlite3.OperationalError
     ) -> Answer:
         """A stop is carried out whatever the disk says, and stored later; any other order is refused."""
-        if isinstance(decision, Refused) or order.verb not in FREE_VERBS:
+        if order.verb not in FREE_VERBS:
             return self._answer(order, self._halt_unstored(error))
         answer = self._answer(order, decision)
+        if isinstance(decision, Refused):
+            return answer
         answer = msgspec.structs.replace(answer, message=f"done; the journal cannot be written yet: {error}")
         self._owed.add(self._told_of(decision.change), order, answer)
         self._become(decision.change.run, ordered=True)
@@ -490,6 +499,11 @@ WORK: dict[str, Callable[[Controller, Run, Mission], None]] = {
     "SCANNING": Controller._scan,
     "VERIFYING": Controller._verify,
 }
+
+
+def _label(run: Run, stop: Stop) -> str:
+    """Names one scan, and no other, however often the stop is scanned."""
+    return f"{run.run_id}-{file_name(stop.id)}-{run.scans}"
 
 
 def has_work(run: Run) -> bool:

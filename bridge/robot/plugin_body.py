@@ -39,7 +39,8 @@ class PluginBody:
         made = self.made
         base, scanner = made.several(made.called(self.state), "base, scanner")
         for given, protocol in ((base, Base), (scanner, Scanner)):
-            missing = [name for name in _asked_of(protocol) if not hasattr(given, name)]
+            asked = [name for name in _asked_of(protocol) if name != "what_became"]  # not every scanner can
+            missing = [name for name in asked if not hasattr(given, name)]
             if missing:
                 raise made.wrong(
                     f"its {type(given).__name__} is no {protocol.__name__}: it lacks {', '.join(missing)}"
@@ -147,6 +148,17 @@ class GuardedScanner:
             raise self._made.wrong(f"its scan gave a {type(result).__name__}, not a ScanResult or ScanFailed")
         except InputError as error:
             return ScanFailed(reason=str(error))
+
+    def what_became(self, label: str) -> ScanResult | ScanFailed | None:
+        """What it says of a scan that was cut off; nothing, where it has no such word."""
+        if not hasattr(self._scanner, "what_became"):
+            return None
+        try:
+            with self._made.blamed():
+                result = self._scanner.what_became(label)
+        except InputError:
+            return None
+        return result if isinstance(result, ScanResult | ScanFailed) else None
 
     @property
     def profiles(self) -> tuple[str, ...] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import math
 import os
@@ -253,6 +254,7 @@ class SimulatedScanner:
         self._record = record
         self._faults = faults
         self._scans = 0
+        self._ended: dict[str, ScanResult] = _remembered(record)
 
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
         self._scans += 1
@@ -267,12 +269,40 @@ class SimulatedScanner:
         empty = self._faults.due("empty", self._scans)
         points = 0 if empty else round(POINTS_PER_S * max(scan.duration_s, 0.1))
         digest = hashlib.sha256(label.encode()).hexdigest()
-        return ScanResult(file=f"{label}.e57", size=points * BYTES_PER_POINT, sha256=digest, points=points)
+        result = ScanResult(file=f"{label}.e57", size=points * BYTES_PER_POINT, sha256=digest, points=points)
+        self._remember_scan(label, result)
+        return result
+
+    def what_became(self, label: str) -> ScanResult | ScanFailed | None:
+        """A scanner has a memory of its own: a scan that it does not know of has not ended."""
+        return self._ended.get(label, ScanFailed(reason="cut off"))
+
+    def _remember_scan(self, label: str, result: ScanResult) -> None:
+        self._ended[label] = result
+        if self._record is not None:
+            with _memory(self._record).open("ab") as memory:
+                memory.write(msgspec.json.encode((label, result)) + b"\n")
 
     def _note(self, line: str) -> None:
         if self._record is not None:
             with self._record.open("a", encoding="utf-8") as record:
                 record.write(line + "\n")
+
+
+def _memory(record: Path) -> Path:
+    return record.with_suffix(".ended")
+
+
+def _remembered(record: Path | None) -> dict[str, ScanResult]:
+    """Scans that ended, as an earlier process wrote them down; a line that it could not end is none."""
+    if record is None or not _memory(record).exists():
+        return {}
+    found: dict[str, ScanResult] = {}
+    for line in _memory(record).read_bytes().splitlines():
+        with contextlib.suppress(msgspec.DecodeError):
+            label, result = msgspec.json.decode(line, type=tuple[str, ScanResult])
+            found[label] = result
+    return found
 
 
 def read_world(keep: Path | None) -> World:

@@ -56,6 +56,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     attempt: int = 0
     approaches: int = 0
     """Corrections driven at this stop."""
+    scans: int = 0
+    """Scans begun in this run; the last one's number is in its file's name."""
     scan: ScanResult | None = None
     """The scan that waits to be verified."""
     done: tuple[str, ...] = ()
@@ -117,10 +119,16 @@ def installed(run: Run, mission: Mission) -> Run:
     return Run(state="READY", mission_id=mission.id, revision=mission.revision)
 
 
-def rebooted(run: Run) -> Change:
-    """After a reboot nothing moves until somebody resumes; an unfinished scan will be taken again."""
+def rebooted(run: Run, became: ScanResult | ScanFailed | None = None) -> Change:
+    """After a reboot nothing moves until somebody resumes.
+
+    `became` is what the scanner says of the scan that was under way; one that has ended is verified, any
+    other is taken again, under a number of its own.
+    """
     if run.over:
         return Change(run)
+    if run.stop_state == "SCANNING" and isinstance(became, ScanResult):
+        run = changed(run, stop_state="VERIFYING", scan=became)
     change = paused(run, "reboot", stands=False)
     return Change(changed(change.run, reason=run.reason), change.events) if run.state == "PAUSED" else change
 
@@ -191,7 +199,7 @@ def settled(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Chang
     if deviation_m > mission.stops[run.at].tolerance_m:
         return reached(run, mission, pose, deviation_m)
     telling = partial(Settled, stop=mission.stops[run.at].id, pose=pose)
-    return Change(changed(run, stop_state="SCANNING"), (telling,))
+    return Change(changed(run, stop_state="SCANNING", scans=run.scans + 1), (telling,))
 
 
 def scan_ended(run: Run, mission: Mission, result: ScanResult | ScanFailed) -> Change:

@@ -20,19 +20,26 @@ def main(folder: Path) -> None:
         field.station().push(corridor())
         field.order("start")
         ballast = folder / "ballast"
-        fill(ballast)
+        for _ in range(3):  # what was kept free for stops is let go, and filled by the others, too
+            fill(ballast)
+            field.order("pause")
+            field.order("resume")
         # Orders are stored in ever new pages, so sooner or later there is no room.
-        refused = [field.order("pause" if number % 2 else "resume").reason for number in range(2000)]
-        print(field.controller.run.state)
-        print("storage" if "storage" in refused else "stored")
+        answers = [field.order("pause" if number % 2 else "resume") for number in range(2000)]
+        stops = {
+            answer.outcome for answer in answers if answer.verb == "pause" and answer.reason != "wrong_state"
+        }
+        print("storage" if "storage" in {answer.reason for answer in answers} else "stored")
+        print(*stops, field.base.speed())
         ballast.unlink()
-        field.order("retry")
+        field.controller.hear_of_link(0.0)
+        field.order("resume" if field.controller.run.state == "PAUSED" else "retry")
         field.work()
         print(field.controller.run.state)
 
 
 def fill(ballast: Path) -> None:
-    with ballast.open("wb", buffering=0) as file:
+    with ballast.open("ab", buffering=0) as file:
         try:
             while True:
                 file.write(b"x" * 4096)

@@ -78,6 +78,10 @@ class MavlinkScanner:
         lost = self._autopilot.out_of_reach()
         return ScanFailed(reason=f"no result within {scan.timeout_s:g} s" + (f": {lost}" if lost else ""))
 
+    def what_became(self, label: str) -> ScanResult | ScanFailed | None:
+        """Nobody knows: a camera's last picture does not say which of two triggers it followed."""
+        return None
+
     def _pictures_taken(self, waiting: MessageQueue) -> int | None:
         """The least number of the next picture, if the camera tells; all that was told so far is old."""
         status = self._asked(MessageId.CAMERA_CAPTURE_STATUS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from threading import Event
 
 import msgspec
 import pytest
@@ -11,7 +12,7 @@ from bridge.robot.base import Rest
 from bridge.robot.simulator import Fault, Faults, read_fault
 from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError
-from mission.events import Pose
+from mission.events import Pose, Scanned
 from mission.run.orders import Verb
 from tests.bridge.world import Field, corridor
 
@@ -35,6 +36,30 @@ def test_a_failed_scan_is_taken_again() -> None:
     field.work()
     assert field.controller.run.done == ("s1", "s2", "s3")
     assert "Failed s2" not in field.told()
+
+
+def test_a_scan_that_ended_while_the_program_was_away_is_not_taken_again() -> None:
+    field = started(corridor())
+    field.work_until(lambda run: run.stop_state == "SCANNING")
+    run = field.controller.run
+    field.scanner.scan(f"{run.run_id}-s1-1", corridor().stops[0].scan, interrupt=Event())
+    field.boot()
+    assert field.controller.run.state == "PAUSED"
+    field.work()
+    assert (field.controller.run.done, field.controller.run.state) == (("s1",), "PAUSED")
+    field.order("resume")
+    field.work()
+    assert field.controller.run.scans == 3
+
+
+def test_every_scan_has_a_name_of_its_own() -> None:
+    field = started(corridor())
+    field.work_until(lambda run: run.stop_state == "SCANNING")
+    field.boot()
+    field.order("resume")
+    field.work()
+    scanned = [event for event in field.journal.events() if isinstance(event, Scanned)]
+    assert [event.file.rpartition("-")[2] for event in scanned] == ["2.e57", "3.e57", "4.e57"]
 
 
 def test_a_scan_without_points_is_not_a_scan() -> None:
