@@ -62,7 +62,7 @@ def vehicle(tmp_path: Path) -> Iterator[Vehicle]:
         made.process.wait(60)
 
 
-HOURS = Scan(profile="default", duration_s=3e3, timeout_s=6e3)
+HOURS = Scan(profile="default", duration_s=6e4, timeout_s=7e4)
 """A scan during which a run is under way however slow the machine is."""
 
 
@@ -81,7 +81,8 @@ def test_a_mission_is_pushed_started_and_watched_to_its_end(vehicle: Vehicle, tm
 
     killed = subprocess.Popen(vehicle.command("watch"), stdout=subprocess.PIPE, text=True)
     assert killed.stdout is not None
-    assert any("Scanned" in line for line in killed.stdout)
+    # Unconfirmed, if the vehicle had left the stop before anybody watched.
+    assert any("Scanned" in line or "Unconfirmed" in line for line in killed.stdout)
     killed.send_signal(signal.SIGKILL)
     killed.wait()
 
