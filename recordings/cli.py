@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 def add_commands(app: typer.Typer) -> None:
     """Add this folder's verbs to the front door."""
     app.command(epilog="Example: stopgo review plan.rrd field.rrd --html report.html")(review)
+    app.command(epilog="Example: stopgo runs recordings")(runs)
     app.command(
         epilog="Example: stopgo replay field.bag --mission plan/mission.json --align stops -o replay.rrd"
     )(replay)
@@ -80,6 +81,26 @@ def review(
 
         open_viewer([item.recording.path for item in found.recordings])
     return found.check_code if check else found.exit_code
+
+
+def runs(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="A folder; those below it count too.")
+    ],
+    json_: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+) -> None:
+    """List plans and runs in a folder, the newest run first, with what each acquired.
+
+    Keeps an index in the folder, and reads only recordings that have come or changed since.
+    """
+    from mission.table import printable, printable_lines
+    from recordings.run_index import index_json, index_of, index_text
+
+    index = index_of(folder, say=lambda line: typer.echo(printable(line), err=True))
+    told = json.dumps(index_json(index), ensure_ascii=False) if json_ else printable_lines(index_text(index))
+    typer.echo(told)
+    for fault in index.faults():
+        typer.echo(f"stopgo: {printable(fault)}", err=True)
 
 
 def replay(

@@ -99,6 +99,11 @@ def review(paths: Iterable[Path]) -> Review:
             read.append(read_recording(path))
         except InputError as error:
             faults.append(str(error))
+    return reviewed(read, faults)
+
+
+def reviewed(read: Sequence[Recording], faults: Sequence[str] = ()) -> Review:
+    """Set the runs of recordings beside the plans that are among them."""
     return Review(tuple(_review(item, read) for item in read), tuple(faults))
 
 

@@ -1,0 +1,91 @@
+"""`stopgo runs` finds every plan and run in a folder, and reads each recording once."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mission.__main__ import main
+from recordings import run_index
+from recordings.run_index import INDEX, index_of, index_text
+from tests.recordings import run, world
+
+
+@pytest.fixture(scope="module")
+def folder(sighted: Path, skipping: Path, field: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("runs")
+    (place / "site").mkdir()
+    shutil.copy(sighted, place / "plan.rrd")
+    shutil.copy(skipping, place / "site" / "skip.rrd")
+    (place / "broken.rrd").write_bytes(b"RRF2junk")
+    for number in range(200):
+        (place / f"photo-{number}.jpg").touch()
+    index_of(place)
+    return place
+
+
+def test_runs_and_plans_are_listed_with_what_they_acquired(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["runs", str(folder), "--json"]) == 0
+    out, err = capsys.readouterr()
+    told = json.loads(out)
+    (found,) = told["runs"]
+    assert (found["file"], found["run_id"], found["robot"]) == ("site/skip.rrd", run.RUN, "r1")
+    assert (found["scanned"], found["asked"], found["answer"]) == (1, 2, "no")
+    assert found["coverage"] == pytest.approx(8 / 14)
+    assert found["began_ns"] == run.BEGAN_NS
+    assert told["plans"][0]["mission_id"] == world.MISSION_ID
+    assert err.count("broken.rrd") == 1
+    assert main(["runs", str(folder)]) == 0
+    assert "57.1 %" in capsys.readouterr().out
+
+
+def test_what_is_known_is_not_read_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = index_of(folder)
+
+    def never(*args: object) -> None:
+        raise AssertionError("read again")
+
+    monkeypatch.setattr(run_index, "_read", never)
+    assert index_of(folder) == before
+
+
+def test_a_run_that_comes_later_is_compared_with_the_plan_that_is_known(folder: Path, field: Path) -> None:
+    late = folder / "late.rrd"
+    shutil.copy(field, late)
+    try:
+        runs = dict(index_of(folder).runs())
+        assert runs["late.rrd"].coverage == pytest.approx(11 / 14)
+        assert list(runs) == ["late.rrd", "site/skip.rrd"]
+    finally:
+        late.unlink()
+    assert "late.rrd" not in index_of(folder).files
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b'{"version": 99, "files": {}}', b"\xff\xfe"])
+def test_an_index_that_cannot_be_read_is_made_anew(folder: Path, content: bytes) -> None:
+    whole = index_of(folder)
+    (folder / INDEX).write_bytes(content)
+    assert index_of(folder) == whole
+    assert (folder / INDEX).read_bytes() != content
+
+
+def test_a_recording_that_changed_is_read_again(folder: Path) -> None:
+    path = folder / "broken.rrd"
+    os.utime(path, (0, 0))
+    assert index_of(folder).files["broken.rrd"].changed_ns == 0
+
+
+def test_a_folder_without_recordings_has_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["runs", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == "no runs\n"
+    assert main(["runs", str(tmp_path / "none")]) == 2
+
+
+def test_texts_of_recordings_do_not_reach_the_terminal_as_they_are(folder: Path) -> None:
+    assert "\x1b" not in index_text(index_of(folder))
