@@ -7,7 +7,16 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from mission.document import Mission
-from mission.events import AnyEvent, Arrived, Failed, Scanned, Skipped, Unconfirmed
+from mission.events import (
+    Aborted,
+    AnyEvent,
+    Arrived,
+    Failed,
+    Finished,
+    Scanned,
+    Skipped,
+    Unconfirmed,
+)
 
 
 @dataclass(frozen=True)
@@ -57,9 +66,26 @@ def run_report(
         "| stop | arrived s | deviation mm | outcome |",
         "|---|---|---|---|",
     ]
-    lines += [_row(stop.id, records.get(stop.id)) for stop in mission.stops]
-    lines += [f"| {stop} | | | withdrawn by revision {by} |" for stop, by in _withdrawn(revisions).items()]
-    return "\n".join(lines)
+    rows = [_row(stop, records.get(stop)) for stop in _listed(mission, latest)]
+    rows += [f"| {stop} | | | withdrawn by revision {by} |" for stop, by in _withdrawn(revisions).items()]
+    rest = len(mission.stops) - MOST_STOPS
+    note = ["", f"*{rest} stops farther off are listed when the run is over.*"]
+    return "\n".join([*lines, *rows, *(note if len(rows) < len(mission.stops) else [])])
+
+
+MOST_STOPS = 60
+"""Stops that are listed while a run goes on: of more, a report for each event would fill the disk."""
+
+
+def _listed(mission: Mission, latest: AnyEvent) -> list[str]:
+    """All stops once the run is over; before that those around the one that was last told of."""
+    ids = [stop.id for stop in mission.stops]
+    if len(ids) <= MOST_STOPS or isinstance(latest, Finished | Aborted):
+        return ids
+    told = getattr(latest, "stop", None)
+    middle = ids.index(told) if told in ids else 0
+    first = max(0, min(middle - MOST_STOPS // 2, len(ids) - MOST_STOPS))
+    return ids[first : first + MOST_STOPS]
 
 
 def _numbers(revisions: Sequence[Mission]) -> str:

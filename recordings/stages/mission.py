@@ -28,6 +28,8 @@ ABOVE_FLOOR = 0.05
 """How high above the floor 3D lines lie, in metres, so that the floor does not hide them."""
 ARROW = 0.6
 """Length of a stop's heading, in metres."""
+MOST_NAMES = 60
+"""With more stops than these their names hide the plan, and are shown where the mouse points."""
 HEAD = 1.5
 """Height of the marks on stops in 3D, in metres."""
 
@@ -181,7 +183,7 @@ def stop_marks(
     size, order = 1 + above, ORDER["stop"] + above
     look: dict[str, Any] = {
         "labels": list(labels) or [stop.id for stop in stops],
-        "show_labels": not labels,
+        "show_labels": not labels and len(stops) <= MOST_NAMES,
         "colors": [colour or (palette.DOORWAY if stop.doorway else palette.STOP) for stop in stops],
     }
     poles = np.stack([strokes.level(xy, 0.0), heads], axis=1)

@@ -11,6 +11,7 @@ from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
 from recordings.pens import ORDER, THICK
 from recordings.stages.floor import CUT
+from recordings.stages.mission import MOST_NAMES
 
 SKIN = 0.01
 """How far the painted targets stand clear of the cut walls, so that both are seen."""
@@ -86,19 +87,20 @@ def _final(first_step: IntArray, steps: int) -> IntArray:
 
 
 def _draw_chosen(canvas: Canvas, selection: Selection, index: rr.TimeColumn) -> None:
-    """The stops chosen so far, numbered in the order of choice."""
+    """The stops chosen so far, numbered in the order of choice as long as numbers do not bury the plan."""
     stops = entities.SELECTION_STOPS
     counts = np.arange(len(selection.chosen) + 1)
     xy = canvas.local(selection.xy)
     labels = [str(number + 1) for number in range(len(xy))]
+    numbered = len(xy) <= MOST_NAMES
     columns = rr.Points2D.columns(
         positions=np.concatenate([xy[:count] for count in counts]),
-        labels=[label for count in counts for label in labels[:count]],
+        labels=[label for count in counts for label in labels[:count]] if numbered else None,
     )
     canvas.columns(stops, index, columns.partition(counts))
     canvas.at(stops, rr.Points2D.from_fields(positions=xy, labels=labels), mission_s=0.0, candidate=0)
     style = rr.Points2D.from_fields(
-        colors=palette.STOP, radii=on_screen(4), show_labels=True, draw_order=ORDER["stop"]
+        colors=palette.STOP, radii=on_screen(4), show_labels=numbered, draw_order=ORDER["stop"]
     )
     canvas.show(stops, style)
 

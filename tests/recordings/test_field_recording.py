@@ -21,6 +21,7 @@ from recordings import entities, pieces
 from recordings.compact import compact
 from recordings.field import FieldRecording
 from recordings.read import check
+from recordings.runs.report import run_report
 from tests.disk import ROOMY, small_disk
 from tests.recordings import run, world
 from tests.recordings.conftest import tell, write_field, write_plan
@@ -325,3 +326,23 @@ def test_a_killed_writer_leaves_what_it_was_told(tmp_path: Path) -> None:
 
 def _fields(report: StateReport) -> dict[str, object]:
     return {name: getattr(report, name) for name in report.__struct_fields__}
+
+
+def test_the_report_of_a_large_mission_stays_short_until_the_run_is_over(mission: Mission) -> None:
+    stops = tuple(msgspec.structs.replace(mission.stops[0], id=f"S{number}") for number in range(1, 1001))
+    large = msgspec.structs.replace(mission, stops=stops)
+    events = [item for item in run.reports(mission) if not isinstance(item, PoseReport | StateReport)]
+    arrived, finished = events[1], events[-1]
+    going = run_report([large], "run-1", {}, arrived)
+    assert (going.count("| S"), "| S1 |" in going, "| S999 |" in going) == (60, True, False)
+    assert "940 stops farther off" in going
+    assert run_report([large], "run-1", {}, finished).count("| S") == 1000
+
+
+def test_names_of_a_thousand_stops_do_not_bury_the_plan(tmp_path: Path, mission: Mission) -> None:
+    stops = tuple(msgspec.structs.replace(mission.stops[0], id=f"S{number}") for number in range(1, 1001))
+    path = tmp_path / "field.rrd"
+    with FieldRecording(path, msgspec.structs.replace(mission, stops=stops)):
+        pass
+    assert static(path, entities.STOPS, "Points2D:show_labels") == [False]
+    assert len(static(path, entities.STOPS, "Points2D:labels")) == 1000
