@@ -7,7 +7,7 @@ from pathlib import Path
 from mission.errors import InputError
 from recordings.carried.reading import read_recording
 from recordings.logs.field_log import FieldLog, Reading, poses_of
-from recordings.logs.own import SITE, own_log
+from recordings.logs.own import SITE, own_log, poses_of_events
 
 
 def read_run_recording(path: Path, reading: Reading) -> FieldLog:
@@ -26,4 +26,5 @@ def read_run_recording(path: Path, reading: Reading) -> FieldLog:
     poses = (
         poses_of("robot", SITE, track.ns, track.xy, track.heading, robot=run.robot) if len(track) else None
     )
-    return own_log(path, "stopgo recording", run.events, recording.missions, poses)
+    told = poses_of_events(run.events)
+    return own_log(path, "stopgo recording", run.events, recording.missions, poses, told)

@@ -42,9 +42,9 @@ def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight
     """
     laid = placed(log, mission, how)
     matches = _matches(laid, mission)
-    _must_belong(log, laid.track, mission, matches, how)
     offset = laid.alignment.time_offset_ns
     events = _own_events(log, mission, offset)
+    _must_belong(log, laid.track, mission, matches, how)
     remarks = [replace(remark, ns=remark.ns + offset) for remark in log.remarks]
     told = events or _inferred(log, laid, mission, matches, remarks)
     run = RunLog(

@@ -1,0 +1,80 @@
+"""stopgo's own logs are replayed by their own events, and in no frame but the mission's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bridge.robot.journal import open_journal
+from mission.document import Mission
+from mission.errors import InputError
+from mission.events import Arrived, Finished, Scanned, Skipped, Started
+from mission.run_log import RunLog
+from recordings.field import FieldRecording
+from recordings.logs import read_log
+from recordings.replay.judged import judged
+from recordings.replay.log_placing import Placing
+from recordings.replay.replayed import Replay
+from recordings.replay.replaying import replay
+from tests.mission.comparing.told import SCAN, at, told
+from tests.recordings.replay.driving import wandering
+
+MISSION = wandering(1)
+SKIPPED = MISSION.stops[3].id
+
+
+def run_of(mission: Mission) -> RunLog:
+    """Every stop 12 mm beside its place and scanned, but for one that was skipped."""
+    events: list[tuple[type, float, dict[str, Any]]] = [(Started, 0.0, {"commander": "me"})]
+    for number, stop in enumerate(mission.stops):
+        seconds, pose = 60.0 * (number + 1), at(stop.x + 0.012, stop.y, stop.heading)
+        if stop.id == SKIPPED:
+            events.append((Skipped, seconds, {"stop": stop.id, "reason": "blocked"}))
+            continue
+        events.append((Arrived, seconds, {"stop": stop.id, "pose": pose, "deviation_m": 0.012}))
+        events.append((Scanned, seconds + 14, {"stop": stop.id, "pose": pose, **SCAN}))
+    events.append((Finished, 60.0 * (len(mission.stops) + 1), {}))
+    return told(mission, *events)
+
+
+def written_journal(folder: Path) -> Path:
+    with open_journal(folder / "state", "r1") as journal:
+        for event in run_of(MISSION).events:
+            journal.append(event)
+    return folder / "state"
+
+
+def written_recording(folder: Path) -> Path:
+    with FieldRecording(folder / "field.rrd", MISSION) as recording:
+        for event in run_of(MISSION).events:
+            recording.event(event)
+    return folder / "field.rrd"
+
+
+def replayed(path: Path) -> Replay:
+    return replay(read_log(path), MISSION, Placing())
+
+
+@pytest.mark.parametrize("written", [written_journal, written_recording])
+def test_our_own_logs_are_told_by_their_own_events(tmp_path: Path, written: Callable[[Path], Path]) -> None:
+    found = replayed(written(tmp_path))
+    outcomes = {item.stop: item.outcome for item in found.comparison.stops}
+    assert outcomes.pop(SKIPPED) == "skipped"
+    assert set(outcomes.values()) == {"scanned"}
+    assert not found.inferred
+    assert found.comparison.greatest_deviation_m == pytest.approx(0.012, abs=1e-6)
+    assert judged(found).answer == "no"
+    assert len(found.scanned_from) == len(MISSION.stops) - 1
+
+
+def test_a_run_of_another_mission_is_refused_by_name(tmp_path: Path) -> None:
+    from msgspec.structs import replace
+
+    from mission.document import sealed
+
+    other = sealed(replace(MISSION, id="f" * 32))
+    with pytest.raises(InputError, match="no run of mission ffff"):
+        replay(read_log(written_journal(tmp_path)), other, Placing())
