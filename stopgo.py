@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from mission.plan import Plan
     from mission.problems import Problem
     from mission.settings import Settings
+    from recordings.replay.replayed import Replay
 
 FOLDERS = ("mission", "planner", "bridge", "recordings")
 _HERE = Path(__file__).resolve().parent
@@ -188,6 +189,40 @@ def follow(station: Station) -> Iterator[Followed]:
     return station.reports()
 
 
+def replay(
+    log: str | Path,
+    mission: Mission,
+    *,
+    align: Literal["first", "stops"] | None = None,
+    to_map: tuple[float, float, float] | None = None,
+    time_offset_s: float = 0.0,
+) -> Replay:
+    """A robot's own log laid beside the mission that it was to drive.
+
+    Parameters
+    ----------
+    align
+        `first`: the log begins at the mission's start; `stops`: it is laid by where it halts.
+    to_map
+        x, y, heading (m, radians) of the site in the log's frame.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, nothing tells how its frame lies, or it is of another mission.
+    AnswerIsNo
+        When its halts fit the stops in no way, or in several.
+    """
+    from mission.document import Transform
+    from recordings.logs import read_log
+    from recordings.replay.log_placing import Placing
+    from recordings.replay.replaying import replay as laid
+
+    seen = None if to_map is None else Transform(x=to_map[0], y=to_map[1], heading=to_map[2])
+    how = Placing(to_map=seen, align=align, time_offset_s=time_offset_s)
+    return laid(read_log(Path(log)), mission, how)
+
+
 def main() -> int:
     """The `stopgo` command."""
     trouble = _too_old() or _shadow()
@@ -231,6 +266,7 @@ __all__ = [
     "push",
     "read_floor",
     "read_mission",
+    "replay",
     "settings",
     "write_mission",
 ]

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as changed
 
+import stopgo
 from mission.__main__ import main
 from mission.document import Frame, Mission, SiteOrigin, Transform, sealed
 from mission.errors import InputError
@@ -209,6 +210,16 @@ def test_the_command_reads_a_bag_and_writes_table_and_recording(
     (run,) = review([tmp_path / "replay.rrd"]).comparisons
     assert run.log.ended
     assert [item.outcome for item in run.stops] == ["unconfirmed"] * len(MISSION.stops)
+
+
+def test_from_python_a_log_is_replayed_in_one_call(tmp_path: Path) -> None:
+    track = logged(driven(MISSION))
+    table = zip(track.ns.tolist(), track.xy.tolist(), track.heading.tolist(), strict=True)
+    rows = "".join(f"{ns},{x},{y},{heading}\n" for ns, (x, y), heading in table)
+    (tmp_path / "run.csv").write_text("time_ns,x,y,heading\n" + rows)
+    found = stopgo.replay(tmp_path / "run.csv", MISSION, align="stops")
+    assert judged(found).answer == "yes"
+    assert stopgo.replay(tmp_path / "run.csv", MISSION, to_map=(0.0, 0.0, 0.0)).run.alignment is not None
 
 
 @pytest.mark.parametrize(
