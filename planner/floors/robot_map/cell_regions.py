@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from mission.geometry import FloatArray
 
-SMOOTHED = 0.75
-"""Outlines are straightened by at most this share of a cell: a slanted wall's steps, and no more."""
+SMOOTHED = 1.01
+"""Outlines are straightened by at most so many cells: steps of a slanted wall, and bumps of one cell."""
 
 
 def polygons_of_cells(mask: NDArray[np.bool_]) -> list[shapely.Polygon]:
