@@ -135,4 +135,4 @@ def test_a_disk_that_is_really_full_stops_the_robot_until_there_is_room(
     if "cannot mount" in result.stderr or "unshare:" in result.stderr:
         pytest.skip(result.stderr.strip())
     assert result.returncode == 0, result.stderr
-    assert result.stdout.split() == ["storage", "ok", "0.0", "FINISHED"]
+    assert result.stdout.split() == ["resume", "0.0", "FINISHED"]
