@@ -11,6 +11,7 @@ import numpy as np
 from mission.comparison import Comparison
 from mission.document import Mission, Stop
 from mission.events import Held, LinkLost, Paused
+from mission.files.svg import text_width
 from mission.geometry import BoolArray, FloatArray, bounds
 from mission.run.way import legs_of
 from mission.seen import runs_of
@@ -20,8 +21,10 @@ from recordings.page.words import shown, tag
 
 FILLED = {"walls": PALE, "columns": "#b9bcc4", "stairs": "#e3e4e8", "other": "#e3e0d8"}
 """Kinds of elements that are filled; of the others the outline is drawn."""
-MOST_LABELS = 60
+MOST_LABELS = 300
 """With more stops than these, only those that need somebody are named."""
+SLACK_M = 0.5
+"""How far outside its room's bounds a name may stand."""
 STOOD = (Held, Paused, LinkLost)
 """Events whose place is marked."""
 
@@ -62,6 +65,11 @@ class _Frame:
             left - margin, high + margin, right - left + 2 * margin, high - low + 2 * margin,
             min(0.013 * size, 0.35 * _spacing(mission)),
         )  # fmt: skip
+
+    @property
+    def least(self) -> float:
+        """The least size of a text that is read, metres; a name that would be smaller is left out."""
+        return 0.0055 * max(self.width, self.height)
 
     @property
     def view(self) -> str:
@@ -108,9 +116,21 @@ def _floor(subject: ReportSubject, frame: _Frame) -> Iterator[str]:
         yield _stroke(frame.path(lines, close=True), "#9a9da5", 0.6, **fill)
     for name, x, y in floor.names:
         px, py = frame.place(x, y)
-        size = 0.011 * max(frame.width, frame.height)
+        fitting = _room_width(floor.rooms, x, y) / max(text_width(name, 1.0), 1.0)
+        size = min(0.011 * max(frame.width, frame.height), fitting)
+        if size < frame.least:
+            continue
         at = {"x": f"{px:.3f}", "y": f"{py + 1.6 * size:.3f}", "font_size": f"{size:.3f}"}
         yield tag("text", shown(name), fill="#5a5e66", text_anchor="middle", **at)
+
+
+def _room_width(rooms: Sequence[FloatArray], x: float, y: float) -> float:
+    """The width of the smallest room about a place; without bounds where there is none."""
+    boxes = [(*ring.min(axis=0).tolist(), *ring.max(axis=0).tolist()) for ring in rooms if len(ring)]
+    about = [
+        box for box in boxes if box[0] <= x <= box[2] and box[1] - SLACK_M <= y <= box[3] + SLACK_M
+    ]  # fmt: skip
+    return min((box[2] - box[0] for box in about), default=np.inf)
 
 
 def _coverage(subject: ReportSubject, comparison: Comparison | None, frame: _Frame) -> Iterator[str]:

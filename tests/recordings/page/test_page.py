@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import msgspec
+import numpy as np
 import pytest
 
 from mission.__main__ import main
@@ -16,6 +17,7 @@ from mission.comparing.judging import judge
 from mission.document import Mission, sealed
 from mission.events import Finished, Paused, Resumed, Skipped
 from mission.run_log import Alignment
+from recordings.carried.floor_lines import FloorLines
 from recordings.page import ReportSubject, report_html
 from recordings.page.from_recordings import subject_of
 from recordings.page.words import number, shown
@@ -143,3 +145,17 @@ def test_recordings_of_two_missions_are_no_one_report(
 def test_numbers_have_one_minus_and_none_before_zero() -> None:
     assert (number(-0.04, sign=True), number(-1.26, sign=True), number(None)) == ("+0.0", "−1.3", "")
     assert shown('<a b="c">') == "&lt;a b=&quot;c&quot;&gt;"
+
+
+def test_a_name_is_as_small_as_its_room_needs_and_left_out_where_nobody_could_read_it() -> None:
+    mission, sight = planned()
+    ring = np.array([(0, 0), (8, 0), (8, 6), (0, 6), (0, 0)], dtype=float)
+    long, endless = "a name that is quite long, yet not too long", "x" * 400
+    names = tuple((name, 4.0, 5.0 - row) for row, name in enumerate(("hall", long, endless, "")))
+    floor = FloorLines((ring,), (ring,), {}, (), names)
+    page = tree(report_html(ReportSubject((mission,), sight=sight, floor=floor)))
+    texts = [item for item in page.iter("text") if item.get("fill") == "#5a5e66"]
+    sizes = {item.text: float(item.attrib["font-size"]) for item in texts}
+    assert sizes["hall"] == pytest.approx(0.011 * 8 * 1.04, rel=1e-2)
+    assert sizes[long] <= sizes["hall"]
+    assert endless not in sizes
