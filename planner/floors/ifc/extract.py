@@ -127,8 +127,15 @@ def _chosen(model: ifcopenshell.file) -> list[tuple[Any, str]]:
     found: dict[int, tuple[Any, str]] = {}
     for name, role in ROLES.items():
         for entity in _by_type(model, name):
-            found.setdefault(entity.id(), (entity, role))
+            if role != "openings" or _holds_a_door(entity):
+                found.setdefault(entity.id(), (entity, role))
     return [found[key] for key in sorted(found)]
+
+
+def _holds_a_door(opening: Any) -> bool:
+    """Other openings are seen by what they cut out of their walls."""
+    fillings = [item.RelatedBuildingElement for item in opening.HasFillings]
+    return any(item is not None and item.is_a("IfcDoor") for item in fillings)
 
 
 def _by_type(model: ifcopenshell.file, name: str) -> list[Any]:
@@ -191,8 +198,8 @@ def _arrays(
     clear: dict[int, bool] = {}
     first_vertex = first_face = 0
     for number, geometry in shapes:
-        points = np.array(geometry.verts, dtype=np.float64).reshape(-1, 3)
-        corners = np.array(geometry.faces, dtype=np.int64).reshape(-1, 3)
+        points = np.frombuffer(geometry.verts_buffer, dtype=np.float64).reshape(-1, 3).copy()
+        corners = np.frombuffer(geometry.faces_buffer, dtype=np.int32).reshape(-1, 3).astype(np.int64)
         if not len(corners) or not np.isfinite(points).all() or np.abs(points).max() > LARGEST:
             continue
         where[number] = (first_vertex, first_vertex + len(points), first_face, first_face + len(corners))
@@ -301,6 +308,7 @@ def _application(model: ifcopenshell.file) -> str:
 
 def _left_out(model: ifcopenshell.file) -> dict[str, int]:
     chosen = {entity.id() for entity, _ in _chosen(model)}
+    chosen |= {entity.id() for entity in _by_type(model, "IfcOpeningElement")}
     counts = Counter(
         entity.is_a()
         for entity in _by_type(model, "IfcProduct")

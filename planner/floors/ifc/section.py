@@ -63,6 +63,16 @@ def _inside(point: FloatArray, segments: FloatArray) -> bool:
     return winding != 0 or crossings % 2 == 1
 
 
+def same_throughout(body: Surface, low: float, high: float) -> bool:
+    """Whether every cut between two heights is the same: no corner lies there, and the faces stand."""
+    z = body.triangles[..., 2]
+    if ((z > low) & (z < high)).any():
+        return False
+    a, b, c = (body.triangles[(z.min(axis=1) <= low) & (z.max(axis=1) >= high)][:, k] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    return bool((np.abs(normal[:, 2]) <= 1e-6 * np.linalg.norm(normal, axis=1)).all())
+
+
 def tidy(region: Region) -> Region:
     """Without the corners of triangulations and slivers thinner than the grid shows."""
     whole = region.simplify(STRAIGHT)

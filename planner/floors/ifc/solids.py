@@ -9,7 +9,7 @@ import shapely
 
 from planner.floors.ifc.levels import Level
 from planner.floors.ifc.model import Model, Product, Surface
-from planner.floors.ifc.section import NOTHING, cut, footprint, tidy
+from planner.floors.ifc.section import NOTHING, cut, footprint, same_throughout, tidy
 from planner.floors.rings import Region
 
 OFF_LEVEL = 1.37e-3
@@ -130,9 +130,12 @@ def _below_the_cut(found: list[Solid], model: Model, level: Level, heights: Heig
     regions = [item.region for item in standing]
     tree = shapely.STRtree(regions)
     steps = [level.z + KERB + OFF_LEVEL, level.z + heights.top / 2, level.z + heights.top - OFF_LEVEL]
+    plane = level.z + heights.scan + OFF_LEVEL
     upright = [item for item in found if item.kind in ("walls", "columns")]
     for item in (item for item in upright if item.product.role != "slabs"):
         mesh = model.meshes[item.product.global_id]
+        if same_throughout(mesh, steps[0], max(plane, steps[-1])):
+            continue
         below = shapely.union_all([cut(mesh, height) for height in steps if mesh.z[0] < height < mesh.z[1]])
         if below.is_empty:
             continue
