@@ -266,6 +266,8 @@ def _supplements(
 def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
     """The drawing the mission was planned on, in the unit it was planned in."""
     from mission.files.exports.format import FloorDrawing
+    from mission.settings import read_settings
+    from planner.floors import options_of
     from planner.floors.drawing import open_drawing
     from planner.floors.dxf import metres_in
 
@@ -277,7 +279,9 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
         raise InputError(f"--floor {path}: is not the floor of this mission: its digest {problem.message}")
     data = path.read_bytes()
     drawing, _ = open_drawing(data, source=path)
-    return FloorDrawing(lambda: open_drawing(data, source=path)[0], metres_in(drawing, source=path))
+    options = options_of(read_settings(None, mission.origin.parameters))
+    metres = metres_in(drawing, source=path, options=options)
+    return FloorDrawing(lambda: open_drawing(data, source=path)[0], metres)
 
 
 def _say_notes(notes: Iterable[str]) -> None:

@@ -18,13 +18,11 @@ from typing import Annotated, Any, Literal, get_type_hints
 
 from mission.errors import InputError
 from mission.kinds import KINDS
+from mission.layer_kinds import check_entries, entries_in, kinds_by_name
 from mission.parameter import Parameter, words
 
 LEAST_SHARE = 0.7
 """Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""
-LAYER_ROLES = ("floor", "rooms", "names", "doors", "openings", "passages", *KINDS, "furniture", "ignore")
-"""What a layer of a drawing can stand for; names are of rooms, openings are doors and windows alike."""
-
 _floor, _plan, _robot, _scanner, _policy = (
     partial(Parameter, table) for table in ("floor", "plan", "robot", "scanner", "policy")
 )
@@ -83,9 +81,12 @@ class Settings:
         ),
     ] = None
     layer_map: Annotated[
-        str | None,
+        tuple[str, ...] | None,
         _floor(
-            "File of stopgo floors --write-map: what layers stand for",
+            "What layers stand for, by a file of stopgo floors --write-map",
+            form="FILE",
+            example="layers.toml",
+            read=entries_in,
             option="layers",
             undecided="by their names",
         ),
@@ -210,8 +211,7 @@ class Settings:
     @property
     def layer_roles(self) -> dict[str, str]:
         """What layers stand for, by their names in capitals, where the user says so."""
-        told = (entry.rpartition("=") for entry in self.layers)
-        return {name.strip().upper(): role.strip().lower() for name, _, role in told}
+        return kinds_by_name(self.layers)
 
     @property
     def least_of_room(self) -> float | None:
@@ -379,10 +379,8 @@ def _check_lists(settings: Settings) -> None:
     for kind in settings.targets or ():
         if kind not in KINDS:
             raise InputError(f"targets = {kind}: unknown kind; known: {', '.join(KINDS)}")
-    for entry in settings.layers:
-        name, _, role = entry.rpartition("=")
-        if not name.strip() or role.strip().lower() not in LAYER_ROLES:
-            raise InputError(f"layers = {entry}: write NAME=KIND; kinds: {', '.join(LAYER_ROLES)}")
+    check_entries(settings.layers, key="layers")
+    check_entries(settings.layer_map or (), key="layer_map")
     for x, y, radius in settings.avoid:
         if radius <= 0:
             raise InputError(f"avoid = {x:g},{y:g},{radius:g}: the radius must be greater than 0")

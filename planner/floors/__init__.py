@@ -13,10 +13,10 @@ from typing import cast
 
 from mission.errors import InputError
 from mission.floor import FloorPlan
+from mission.layer_kinds import kinds_by_name
 from mission.plugins import Variant
 from mission.settings import FLOOR_PARAMETERS, Settings
 from planner.floors.foreign import foreign_readers, sound
-from planner.floors.layer_map import read_layer_map
 from planner.floors.reader import FloorFile, FloorOptions, Reader
 from planner.floors.survey import Survey
 
@@ -89,7 +89,7 @@ def options_of(settings: Settings) -> FloorOptions:
     told = {name: getattr(settings, name) for name in FLOOR_PARAMETERS}
     columns = (entry.partition("=") for entry in told.pop("schedule_columns"))
     schedule = told.pop("schedule")
-    told["layer_map"] = read_layer_map(Path(settings.layer_map)) if settings.layer_map else {}
+    told["layer_map"] = kinds_by_name(settings.layer_map or ())
     return FloorOptions(
         d_dis=settings.d_dis,
         layers=settings.layer_roles,

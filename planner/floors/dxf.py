@@ -128,9 +128,9 @@ def _known(sheet: DxfSheet) -> frozenset[str]:
     )
 
 
-def metres_in(drawing: Drawing, *, source: Path) -> float:
+def metres_in(drawing: Drawing, *, source: Path, options: FloorOptions | None = None) -> float:
     """Length of one drawing unit in metres, as `read` takes it: what is drawn over a floor needs it."""
-    return sheet_of(drawing, FloorOptions(), source=source).scale
+    return sheet_of(drawing, options or FloorOptions(), source=source).scale
 
 
 def survey(file: FloorFile, options: FloorOptions) -> Survey:

@@ -33,6 +33,7 @@ OTHER: dict[str, Any] = {
     "fov": 180.0,
     "battery_min": 0.2,
     "drawing": 2,
+    "layer_map": ("A-WALL=walls", "DIM=ignore"),
     "region": (0.0, 0.0, 30.0, 20.0),
     "level": 3.2,
     "scan_height": 1.5,

@@ -15,8 +15,9 @@ from floor_drawings import codes, new_drawing, rectangle
 
 from mission.errors import InputError
 from mission.floor import FloorPlan
+from mission.layer_kinds import entries_in, kinds_by_name
 from planner.floors import FloorOptions, read_floor, survey_floor
-from planner.floors.layer_map import layer_map, read_layer_map
+from planner.floors.layer_map import layer_map
 
 
 def flat(
@@ -286,7 +287,7 @@ def test_a_map_says_the_same_as_the_survey_that_wrote_it(tmp_path: Path) -> None
     drawing.modelspace().add_line((1, 1), (2, 2), dxfattribs={"layer": "TEMP"})
     path = saved(drawing, tmp_path)
     (tmp_path / "layers.toml").write_text(layer_map(survey_floor(path)), encoding="utf-8")
-    mapped = read_layer_map(tmp_path / "layers.toml")
+    mapped = kinds_by_name(entries_in(str(tmp_path / "layers.toml")))
     assert mapped == {"A-WALL": "walls", "A-DOOR": "doors", "TEMP": "other"}
     again = read_floor(path, FloorOptions(layer_map=mapped))
     plain = read_floor(path)
@@ -308,9 +309,9 @@ def test_a_faulty_map_is_refused_in_one_line(tmp_path: Path, text: str, says: st
     path = tmp_path / "layers.toml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=says):
-        read_layer_map(path)
+        entries_in(str(path))
     with pytest.raises(InputError, match="write one with: stopgo floors"):
-        read_layer_map(tmp_path / "none.toml")
+        entries_in(str(tmp_path / "none.toml"))
 
 
 def test_walls_that_enclose_nothing_are_refused(tmp_path: Path) -> None:
