@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import rerun as rr
 
@@ -34,12 +35,15 @@ class Pen:
     radius: float
 
 
-def draw(canvas: Canvas, entity: str, strips: Iterable[FloatArray], pen: Pen) -> None:
-    """Draw line strips, if there are any."""
+def draw(
+    canvas: Canvas, entity: str, strips: Iterable[FloatArray], pen: Pen, *, names: list[str] | None = None
+) -> None:
+    """Draw line strips, if there are any; `names`, one for each, are shown where the mouse points."""
     local = canvas.strips(strips)
     if local:
-        shape = rr.LineStrips2D(local, colors=pen.colour, radii=pen.radius, draw_order=ORDER[pen.order])
-        canvas.show(entity, shape)
+        named: dict[str, Any] = {"labels": names, "show_labels": False} if names else {}
+        look: dict[str, Any] = {"colors": pen.colour, "radii": pen.radius, "draw_order": ORDER[pen.order]}
+        canvas.show(entity, rr.LineStrips2D(local, **look, **named))
 
 
 def style(canvas: Canvas, entity: str, pen: Pen) -> None:

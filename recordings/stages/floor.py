@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 import rerun as rr
 
-from mission.floor import Finding, FloorPlan, Room
+from mission.floor import Element, Finding, FloorPlan, Room
 from mission.geometry import FloatArray, Polygon
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
@@ -82,16 +82,28 @@ def _draw_elements(canvas: Canvas, floor: FloorPlan, kind: str) -> None:
         )
         canvas.show(entities.part(element, "fill"), shape)
     edges = strokes.outlines(solids) + lines
-    draw(canvas, element, edges, Pen(colour, "solid", THIN))
+    draw(canvas, element, edges, Pen(colour, "solid", THIN), names=_names(floor, kind))
+
+
+def _names(floor: FloorPlan, kind: str) -> list[str]:
+    """What each edge of a kind belongs to, by the model's GlobalIds; empty where no element has one."""
+    elements = _of_kind(floor, kind)
+    if not any(item.global_id for item in elements):
+        return []
+    rings = [item for item in elements for polygon in item.solids for _ in polygon.rings]
+    owners = [*rings, *(item for item in elements for _ in item.lines)]
+    return [f"{item.id} {item.global_id or ''}".rstrip() for item in owners]
+
+
+def _of_kind(floor: FloorPlan, kind: str) -> list[Element]:
+    """Elements of one kind; kinds without a colour count as `other`."""
+    known = palette.KIND_COLOURS
+    return [item for item in floor.elements if kind == (item.kind if item.kind in known else "other")]
 
 
 def _shapes(floor: FloorPlan, kind: str) -> tuple[list[Polygon], list[FloatArray]]:
-    """Solids and open lines of one kind; kinds without a colour count as `other`."""
-    elements = [
-        item
-        for item in floor.elements
-        if kind == (item.kind if item.kind in palette.KIND_COLOURS else "other")
-    ]
+    """Solids and open lines of one kind."""
+    elements = _of_kind(floor, kind)
     solids = [polygon for item in elements for polygon in item.solids]
     return solids, [line for item in elements for line in item.lines]
 

@@ -163,3 +163,14 @@ def test_stages_that_found_nothing_are_recorded_too(tmp_path: Path) -> None:
     recording.observe(replace(selection, visibility=blind, chosen=nothing, coverage_steps=frozen([])))
     recording.write(tmp_path / "plan.rrd")
     assert check(tmp_path / "plan.rrd").complete
+
+
+def test_edges_are_called_by_their_elements_and_global_ids_where_a_model_has_them(tmp_path: Path) -> None:
+    floor = world.floor_at()
+    named = replace(floor.elements[1], global_id="0LiOMJvJv5Bu0hPkJYEFGw")
+    recording = PlanRecording(world.MISSION_ID)
+    recording.observe(replace(floor, elements=(floor.elements[0], named, *floor.elements[2:])))
+    recording.write(tmp_path / "plan.rrd")
+    labels = static(tmp_path / "plan.rrd", "/plan/floor/columns", "LineStrips2D:labels")
+    assert list(labels) == ["c1 0LiOMJvJv5Bu0hPkJYEFGw", "c2"]
+    assert not cells(tmp_path / "plan.rrd", "/plan/floor/walls", "LineStrips2D:labels")
