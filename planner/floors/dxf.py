@@ -20,7 +20,7 @@ from mission.geometry import bounds
 from planner.floors.drawing import METRES, open_drawing
 from planner.floors.drawn_shapes import ignored_in
 from planner.floors.dxf_sheet import DxfSheet, drawings_told, sheet_of
-from planner.floors.linework import Derived, completed, derived
+from planner.floors.linework import Derived, as_room_name, completed, derived
 from planner.floors.parts import in_order, parts_of
 from planner.floors.reader import FloorFile, FloorOptions
 from planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine
@@ -80,12 +80,20 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
     roles = {stroke.role for stroke in sheet.strokes}
     if not sheet.outlined and "walls" not in roles:
         raise InputError(f"{path}: {_no_walls(sheet)}")
+    size = _size(sheet)
     if sheet.outlined:
-        return completed(sheet.strokes, sheet.words)
+        named = [as_room_name(word) for word in sheet.words]
+        large = size > LARGEST_FLOOR
+        return Derived(sheet.strokes, named, []) if large else completed(sheet.strokes, sheet.words)
     if len(sheet.drawings) > 1 and sheet.chosen is None:
         count = len(sheet.drawings)
         told = drawings_told(sheet.drawings)
         raise InputError(f"{path}: {count} drawings side by side, choose one with --drawing N{told}")
+    if size > LARGEST_FLOOR:
+        raise InputError(
+            f"{path}: the walls are {size:.4g} m across, read in {_unit_name(sheet)}; "
+            "say the drawing's unit with --units, or the part that is meant with --region"
+        )
     made = derived(sheet.strokes, sheet.words)
     if made.cells >= _PATTERN:
         raise InputError(
@@ -101,6 +109,15 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
     return made
 
 
+def _size(sheet: DxfSheet) -> float:
+    """The longer side in metres of what the walls' layers show."""
+    points = [item.points for item in sheet.strokes if item.role == "walls"]
+    x0, y0, x1, y1 = bounds(points)
+    return max(x1 - x0, y1 - y0)
+
+
+LARGEST_FLOOR = 2000.0
+"""No storey is longer than this, in metres."""
 _PATTERN = 150
 """So many small cells among the lines of walls are a pattern of tiles or a hatch."""
 
@@ -161,9 +178,13 @@ def survey(file: FloorFile, options: FloorOptions) -> Survey:
 
 def _unit(sheet: DxfSheet) -> str:
     """The unit's name and what says so."""
-    name = next((word for word, factor in METRES.values() if factor == sheet.scale), f"{sheet.scale:g} m")
+    name = _unit_name(sheet)
     why = next((item.message for item in sheet.findings if item.code.startswith("units_")), "")
     return f"{name} ({why})" if why else f"{name}, as the header says"
+
+
+def _unit_name(sheet: DxfSheet) -> str:
+    return next((word for word, factor in METRES.values() if factor == sheet.scale), f"{sheet.scale:g} m")
 
 
 _LEFT = ("other", "ignore")

@@ -162,7 +162,7 @@ def _one_drawing(sheet: DxfSheet, options: FloorOptions, source: Path) -> DxfShe
     sheet = replace(sheet, drawings=drawings)
     if options.drawing is not None and not 1 <= options.drawing <= len(drawings):
         raise InputError(
-            f"{source}: --drawing {options.drawing}: there are {len(drawings)}{drawings_told(drawings)}"
+            f"{source}: --drawing {options.drawing}: found are {len(drawings)}{drawings_told(drawings)}"
         )
     chosen = chosen_of(drawings) if options.drawing is None else drawings[options.drawing - 1]
     if chosen is None:

@@ -5,12 +5,21 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 
+from mission.errors import InputError
 from mission.layer_kinds import LAYER_ROLES
 from planner.floors.survey import LayerUse, Survey
 
 
 def layer_map(found: Survey) -> str:
-    """The layers of a surveyed drawing as such a file."""
+    """The layers of a surveyed drawing as such a file.
+
+    Raises
+    ------
+    InputError
+        When there are none, as in a robot's map.
+    """
+    if not found.layers:
+        raise InputError(f"{found.file}: has no layers to write down; leave --write-map out")
     return "\n".join(
         [
             f"# What the layers of {found.file} stand for. Correct the kinds, then plan with: --layers FILE",

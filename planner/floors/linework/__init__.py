@@ -102,7 +102,7 @@ def _is_clockwise(ring: FloatArray) -> bool:
 def completed(strokes: Sequence[Stroke], words: Sequence[Word]) -> Derived:
     """All strokes of a floor whose outline is drawn, and the rooms and doors that no layer shows."""
     roles = {item.role for item in strokes}
-    named = [_as_room_name(word) for word in words]
+    named = [as_room_name(word) for word in words]
     if "walls" not in roles or ("rooms" in roles and roles & {"doors", "passages"}):
         return Derived(list(strokes), named, [])
     site = _Site(_origin(strokes), strokes, words)
@@ -129,7 +129,7 @@ def derived(strokes: Sequence[Stroke], words: Sequence[Word]) -> Derived:
         *_room_strokes(site, rooms),
         *_things(site),
     ]
-    return Derived(made, [_as_room_name(word) for word in words], site.findings, walls.cells)
+    return Derived(made, [as_room_name(word) for word in words], site.findings, walls.cells)
 
 
 def _origin(strokes: Sequence[Stroke]) -> FloatArray:
@@ -288,5 +288,6 @@ def _things(site: _Site) -> list[Stroke]:
     return things
 
 
-def _as_room_name(word: Word) -> Word:
+def as_room_name(word: Word) -> Word:
+    """The word, on the layer of rooms if it names one."""
     return replace(word, role="rooms") if word.role == "names" else word

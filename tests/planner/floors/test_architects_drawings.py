@@ -214,6 +214,15 @@ def test_a_corridor_of_kilometres_is_refused(tmp_path: Path) -> None:
         read(drawing, tmp_path, units="m")
 
 
+def test_walls_of_kilometres_are_refused_whatever_the_unit(tmp_path: Path) -> None:
+    """The header says metre, the leaves are of 0.9 m, and the walls go on for 4 km."""
+    drawing = new_drawing(6)
+    flat(drawing.modelspace())
+    drawing.modelspace().add_line((0, 0), (4000, 0), dxfattribs={"layer": "A-WALL"})
+    with pytest.raises(InputError, match="walls are 4000 m across, read in metre; say the drawing's unit"):
+        read(drawing, tmp_path)
+
+
 def two_plans(folder: Path, *, doors: str = "A-DOOR") -> Drawing:
     drawing = new_drawing()
     flat(drawing.modelspace())
@@ -233,7 +242,7 @@ def test_of_two_plans_a_person_chooses_one(tmp_path: Path) -> None:
         read(drawing, tmp_path)
     is_the_flat(read(drawing, tmp_path, drawing=2), x=20.0)
     is_the_flat(read(drawing, tmp_path, region=(19.0, -1.0, 30.0, 6.0)), x=20.0)
-    with pytest.raises(InputError, match="--drawing 3: there are 2"):
+    with pytest.raises(InputError, match="--drawing 3: found are 2"):
         read(drawing, tmp_path, drawing=3)
     with pytest.raises(InputError, match="nothing is drawn in the region 50,50,60,60"):
         read(drawing, tmp_path, region=(50.0, 50.0, 60.0, 60.0))
