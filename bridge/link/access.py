@@ -9,7 +9,7 @@ the message's whole key. What is denied looks to the other end like no answer.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bridge.link.keys import Holder
@@ -37,8 +37,11 @@ class Flow:
 
 def access_control(keys: KeyExpressions) -> dict[str, Any]:
     """zenoh's `access_control` at one robot: default deny; its own tunnel's end may join it as well."""
-    every = _served(_everything(keys), "ingress", "egress")
-    # An end of the tunnel in a process of its own; and another robot of this name, looking for itself.
+    every = [
+        *_served(_everything(keys), "ingress", "egress"),
+        *_served(_looking_for_twins(keys, "look out for"), "egress", "ingress"),
+    ]
+    # An end of the tunnel in a process of its own.
     own = _served(_own_tunnel(keys), "egress", "ingress")
     return _control(
         [*every, *own],
@@ -108,11 +111,9 @@ def _commanding(keys: KeyExpressions, name: str) -> Flow:
 
 
 def _everything(keys: KeyExpressions) -> Flow:
-    """What any station may want of one robot, and of all robots at once: who is there."""
+    """What anybody may want of one robot; and of all robots at once: who is there."""
     every, own = KeyExpressions.of_every_robot(keys.site), _commanding(keys, "holder")
-    return Flow(
-        "holder", (*own.asked, every.info), own.told, own.said, (*own.shown, every.alive), own.signed_in
-    )
+    return replace(own, asked=(*own.asked, keys.boot), shown=(*own.shown, every.alive))
 
 
 def _own_tunnel(keys: KeyExpressions) -> Flow:
