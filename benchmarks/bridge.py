@@ -21,11 +21,13 @@ from bridge.commands.spawn import end_robot, free_port, start_robot
 from bridge.link.authority import init_site, issue
 from bridge.link.keys import now_utc
 from bridge.station.station import Station, connect
+from mission.document import Mission, sealed
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor
 
 ORDERS = 1000
-STOPS_OF_10_MB = 37_000
+STOPS_OF_10_MB = 9_000
+POINTS_BETWEEN = 50
 
 
 def main() -> None:
@@ -71,9 +73,23 @@ def order_time(station: Station) -> float:
     return timed(lambda: station.link.ask(station.keys.command("retry"), payload, timeout_s=1))
 
 
+def winding(mission: Mission) -> Mission:
+    """The same with ways of many points, for no mission may reach beyond 20 km."""
+    stops = tuple(
+        msgspec.structs.replace(
+            stop,
+            approach=tuple(
+                (stop.approach[0][0] + 2.0 * step / POINTS_BETWEEN, 0.0) for step in range(POINTS_BETWEEN + 1)
+            ),
+        )
+        for stop in mission.stops
+    )
+    return sealed(msgspec.structs.replace(mission, stops=stops))
+
+
 def slow_push(station: Station) -> None:
     """A document of some 10 MB at 8 Mbit/s, with questions asked meanwhile."""
-    mission = corridor(stops=STOPS_OF_10_MB, revision=2)
+    mission = winding(corridor(stops=STOPS_OF_10_MB, revision=2))
     size = len(msgspec.json.encode(mission))
     latencies: list[float] = []
     reading: list[float] = []

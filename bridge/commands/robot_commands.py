@@ -114,6 +114,7 @@ def robot(
     options = RobotOptions(
         name=name, listen=listen, connect=connect, state=state, body=body, site=site, speed_up=speed_up,
         to_map=to_map, insecure=insecure, revisions=read_revisions(revision), keys=keys, faults=faults,
+        say=say,
     )  # fmt: skip
     where = f"listens on {listen}" if connect is None else f"connects to {connect}"
     run_robot(options, ready=lambda: say(f"ready {name} {where}"))

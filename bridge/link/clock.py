@@ -54,8 +54,10 @@ class SimulatedClock:
         heapq.heappush(self._due, (self._now_ns + round(seconds * 1e9), len(self._due), happens))
 
     def jump(self, seconds: float) -> None:
-        """Somebody sets the date, forward or back; nobody waits for that."""
-        self._now_ns += round(seconds * 1e9)
+        """Somebody sets the date, forward or back; nobody waits for that, and what is due is so no sooner."""
+        by_ns = round(seconds * 1e9)
+        self._now_ns += by_ns
+        self._due = [(due_ns + by_ns, order, happens) for due_ns, order, happens in self._due]
 
     def wait(self, seconds: float, until: Event | None = None) -> bool:
         if until is not None and until.is_set():

@@ -178,17 +178,17 @@ class Certificates:
 
     def _issued(self, der: bytes) -> tuple[Holder, Ed25519PublicKey]:
         from cryptography import x509
-        from cryptography.exceptions import InvalidSignature
+        from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
         from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
         try:
             certificate = x509.load_der_x509_certificate(der)
-        except ValueError:
+        except (ValueError, x509.InvalidVersion):
             raise Untrusted("it has no certificate that can be read") from None
         try:
             certificate.verify_directly_issued_by(self._held.authority)
             public, holder = certificate.public_key(), holder_of(certificate)
-        except (InvalidSignature, ValueError, TypeError):
+        except (InvalidSignature, UnsupportedAlgorithm, ValueError, TypeError):
             raise Untrusted("the certificate is of another authority") from None
         except InputError as error:
             raise Untrusted(str(error)) from None
@@ -283,7 +283,7 @@ def read_certificate(path: Path) -> x509.Certificate:
         return x509.load_pem_x509_certificate(path.read_bytes())
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); make keys with stopgo keys") from None
-    except ValueError:
+    except (ValueError, x509.InvalidVersion):
         raise InputError(f"{path}: not a certificate") from None
 
 

@@ -135,12 +135,15 @@ class KeySeals:
         boot_id: str = "",
         now: Callable[[], datetime] = now_utc,
         clock_ns: Callable[[], int] = time.monotonic_ns,
+        refused: Callable[[str, str], None] = lambda key, why: None,
     ) -> None:
+        """`refused` is told of questions that are not believed: their key, and why not."""
         self.distrusted = ""
         self._held = held
         self._boot_id = boot_id
         """Of a robot that answers here; a station has none."""
         self._clock_ns = clock_ns
+        self._refused = refused
         self._certificates = Certificates(held, now)
         self._session = secrets.token_hex(8)
         self._lock = threading.Lock()
@@ -196,6 +199,7 @@ class KeySeals:
                 reply = answer(self._believed(request, seal))
             except Untrusted as error:
                 self.distrusted = str(error)
+                self._refused(request.key, str(error))
                 reply = encode(untrusted(error))
             own = Seal(certificate=self._held.der, nonce=nonce, boot_id=self._boot_id, at_ns=self._clock_ns())
             about = (_parameters(request.parameters), _hash(request.payload))
@@ -282,7 +286,7 @@ def _signed(seal: Seal, payload: bytes, *about: str) -> bytes:
     lines = (f"stopgo/{VERSION} {what}", *rest, seal.nonce, seal.boot_id, str(seal.number), str(seal.at_ns))
     if any("\n" in line for line in lines):
         raise Untrusted("its key or parameters have several lines")
-    return "\n".join(lines).encode() + b"\n" + payload
+    return "\n".join(lines).encode(errors="surrogatepass") + b"\n" + payload
 
 
 def _verify(public: Ed25519PublicKey, seal: Seal, payload: bytes, *about: str) -> None:

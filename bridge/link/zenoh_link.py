@@ -11,7 +11,7 @@ import ipaddress
 import json
 import re
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
@@ -66,11 +66,15 @@ class Guard:
     """zenoh's access control, at the end that is asked."""
     boot_id: str = ""
     """Of a robot, for its seals."""
+    refused: Callable[[str, str], None] = lambda key, why: None
+    """Told of questions that are not believed."""
 
     @property
     def seals(self) -> Seals:
         """What goes beside messages on a link that is so guarded."""
-        return NO_SEALS if self.keys is None else KeySeals(self.keys, boot_id=self.boot_id)
+        if self.keys is None:
+            return NO_SEALS
+        return KeySeals(self.keys, boot_id=self.boot_id, refused=self.refused)
 
 
 UNGUARDED = Guard()

@@ -16,7 +16,7 @@ from typing import TypeVar
 import msgspec
 
 from bridge.link.clock import Clock
-from bridge.link.keys import Untrusted
+from bridge.link.keys import Untrusted, now_utc
 from bridge.link.link import Link, Request
 from bridge.link.protocol import (
     CHUNK_BYTES,
@@ -36,6 +36,7 @@ from bridge.link.protocol import (
 from bridge.robot.inbox import Inbox
 from bridge.robot.journal import Journal
 from bridge.robot.pages import POSES_KEPT, address_of, events_page, part_page, poses_page
+from bridge.robot.refusal_log import RefusalLog
 from bridge.robot.runner import Position, Runner, state_report
 from mission import __version__
 from mission.document import Transform
@@ -114,6 +115,7 @@ class Agent:
         to_map: Transform | None = None,
         failed: Callable[[Exception], None] = lambda error: None,
         stand_still: Callable[[str], None] | None = None,
+        refusals: RefusalLog | None = None,
     ) -> None:
         """`inbox` takes missions, if the robot does; `failed` is told what ended one of its works.
 
@@ -121,6 +123,7 @@ class Agent:
         """
         self._keys = keys
         self._stand_still = stand_still
+        self._refusals = refusals or RefusalLog(lambda line: None, now_utc)
         self._looked_ns = command_clock.now_ns()
         self._link = link
         self._journal = journal
@@ -246,8 +249,12 @@ class Agent:
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             return encode(Malformed(message=f"{kind.__name__}: {error}"))
         except Untrusted as error:
+            self._refusals.note(kind.__name__.lower(), order.commander, str(error))
             return encode(untrusted(error))
-        return encode(carry_out(request, order))
+        reply = carry_out(request, order)
+        what = order.verb if isinstance(order, Order) else f"push of {order.manifest.mission_id[:12]}"
+        self._refusals.note_reply(what, order.commander, reply)
+        return encode(reply)
 
     def _keep(self, request: Request) -> bytes:
         try:

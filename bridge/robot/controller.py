@@ -226,7 +226,7 @@ class Controller:
 
     def _out_of_time(self, commit: Commit, known: bool) -> Refused | None:
         """Why a commit comes too late, or once more."""
-        if self._command_clock.now_ns() > commit.not_after_ns:
+        if self._command_clock.now_ns() >= commit.not_after_ns:
             return Refused("expired", "the commit is older than it allows; push again")
         if not known and commit.boot_id not in (None, self.boot_id):
             return Refused("expired", "the robot has been started anew since the commit; push again")

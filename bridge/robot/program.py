@@ -16,12 +16,13 @@ from bridge.link import keys as key_files
 from bridge.link.access import access_control
 from bridge.link.clock import Clock, WallClock
 from bridge.link.link import Link
-from bridge.link.protocol import KeyExpressions
+from bridge.link.protocol import KeyExpressions, place_of
 from bridge.robot.agent import Agent, on_link, others_of
 from bridge.robot.bodies import OpenBody
 from bridge.robot.controller import Controller, new_boot_id
 from bridge.robot.inbox import Inbox
 from bridge.robot.journal import Journal, open_journal
+from bridge.robot.refusal_log import RefusalLog
 from bridge.robot.simulator import NO_FAULTS, Faults
 from mission.document import Transform
 from mission.errors import AnswerIsNo, InputError
@@ -54,6 +55,8 @@ class RobotOptions:
     """Folder with the robot's keys; required beyond this machine."""
     revisions: RevisionPolicy = "next-stop"
     """What becomes of a new revision that is pushed during a run."""
+    say: Callable[[str], None] = lambda line: None
+    """Tells the person there, or its service's log, what was refused."""
     faults: Faults = NO_FAULTS
     """When its program is to crash; what else goes wrong is its body's."""
 
@@ -66,7 +69,11 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     keys = KeyExpressions(options.name, options.site)
     held = None if options.keys is None else robots_keys(options.keys, options.name)
     boot_id = new_boot_id()
-    guard = Guard(held, options.insecure, None if held is None else access_control(keys), boot_id)
+    refusals = RefusalLog(options.say, key_files.now_utc)
+    guard = Guard(
+        held, options.insecure, None if held is None else access_control(keys), boot_id,
+        refused=lambda key, why: refusals.note(place_of(key)[2], "somebody", why),
+    )  # fmt: skip
     opened = joining(options.connect, guard) if options.connect else listening(options.listen, guard)
     with opened as link:
         if options.connect:
@@ -125,6 +132,7 @@ def robot_on(
                 keys=keys, link=link, journal=journal, runner=controller, clock=clock, command_clock=wall,
                 inbox=Inbox(journal, controller, body.scanner.profiles), speed_up=options.speed_up,
                 to_map=options.to_map, stand_still=controller.hold if options.connect else None,
+                refusals=RefusalLog(options.say, key_files.now_utc),
             )  # fmt: skip
             with on_link(agent):
                 yield agent

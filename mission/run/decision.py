@@ -101,7 +101,7 @@ def _too_late(order: Order, situation: Situation) -> Refused | None:
             "expired", f"the robot has been started anew since {order.verb} was ordered; order it again"
         )
     age = (situation.command_ns - order.issued_ns) / 1e9
-    if not 0 <= age <= order.valid_for_s:
+    if not 0 <= age < order.valid_for_s:
         return Refused(
             "expired", f"{order.verb} is {age:.1f} s old and was valid for {order.valid_for_s:g} s"
         )

@@ -11,6 +11,7 @@ from bridge.link.keys import HolderRole, now_utc, read_keys
 from bridge.link.memory_link import SealedMessage, Switchboard
 from bridge.link.seals import KeySeals
 from bridge.station.station import Station
+from mission.events import StateReport
 from tests.bridge.world import Field
 
 HOLDERS: tuple[tuple[HolderRole, str], ...] = (
@@ -46,6 +47,7 @@ class GuardedField(Field):
     def __init__(self, site: Path, **details: Any) -> None:
         super().__init__(**details)
         self.site = site
+        self.set_forward_ns = 0
         self.board = self.router = Router()
         self.link = self.board.link()
         self.answer_as("r1")
@@ -53,7 +55,20 @@ class GuardedField(Field):
     def seals(self, name: str, *, boot_id: str = "") -> KeySeals:
         """What `name` seals with, on the field's clock."""
         held = read_keys(self.site / name, now=now_utc())
-        return KeySeals(held, boot_id=boot_id, clock_ns=self.clock.now_ns)
+        return KeySeals(held, boot_id=boot_id, clock_ns=self.steady_ns)
+
+    def steady_ns(self) -> int:
+        """Time that no date changes."""
+        return self.clock.now_ns() - self.set_forward_ns
+
+    def set_date(self, seconds: float) -> None:
+        """Somebody sets the robot's date, forward or back."""
+        self.set_forward_ns += round(seconds * 1e9)
+        self.clock.jump(seconds)
+
+    def agent_state(self) -> StateReport:
+        """What the robot says of itself just now."""
+        return self.agent._state()
 
     def answer_as(self, name: str) -> None:
         """Answer for the robot, with the keys of `name`."""

@@ -108,15 +108,19 @@ class Field:
         self.serve()
         return Station(self.board.link(), self.keys, **({"commander": "test", "timeout_s": 0.3} | options))
 
+    def station_at_the_link(self, commander: str) -> Station:
+        """A station; whoever answers for the robot goes on doing so."""
+        return Station(self.board.link(), self.keys, commander=commander, timeout_s=0.3)
+
     def serve(self, seals: Seals = NO_SEALS) -> None:
         """Answer for the robot as it is since its last boot."""
         self.link.close()
         self.link = self.board.link(seals)
-        agent = Agent(
+        self.agent = Agent(
             keys=self.keys, link=self.link, journal=self.journal, runner=self.controller, inbox=self.inbox,
             clock=self.clock, command_clock=self.clock,
         )  # fmt: skip
-        agent.serve()
+        self.agent.serve()
 
     def report(self) -> StateReport:
         """What the robot tells of itself."""

@@ -139,14 +139,14 @@ def test_what_was_meant_for_an_earlier_date_comes_to_nothing() -> None:
     field = Field()
     station = field.station()
     station.push(corridor())
-    start, pause = field.command("start"), field.command("pause")
+    start, skip = field.command("start"), field.command("skip")
     assert field.controller.obey(start).outcome == "ok"
     old = field.commit(manifest_of(corridor(stops=2, revision=2), b""))
     field.base.stop()
     field.clock.jump(YEAR)
     field.boot()
     assert field.controller.obey(start).outcome == "ok"
-    assert field.controller.obey(pause).reason == "expired"
+    assert field.controller.obey(skip).reason == "expired"
     late = field.controller.take(old, corridor(stops=2, revision=2))
     assert isinstance(late, Rejected)
     assert late.reason == "expired"
