@@ -121,6 +121,10 @@ class Tagged(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is"
     """Base of most messages: frozen, and says what it is. What a newer peer adds to one is passed over."""
 
 
+class OwnMap(Transform, frozen=True, forbid_unknown_fields=False):
+    """How a robot was told that the site lies on its map; what a newer peer adds to it is passed over."""
+
+
 class Info(Tagged, frozen=True):
     """What a robot says of itself on `info`."""
 
@@ -137,7 +141,7 @@ class Info(Tagged, frozen=True):
     document_bytes: int
     profiles: tuple[str, ...] | None
     """Scan profiles the scanner knows; `None` if it takes any."""
-    to_map: Transform | None
+    to_map: OwnMap | None
     """Site to map, if the robot was told; else each mission's `frame.to_map` counts."""
 
 

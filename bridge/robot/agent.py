@@ -27,6 +27,7 @@ from bridge.link.protocol import (
     Info,
     KeyExpressions,
     Malformed,
+    OwnMap,
     Reply,
     Watching,
     decode,
@@ -132,7 +133,7 @@ class Agent:
         self._command_clock = command_clock
         self._pose_pause_s = max(POSE_EVERY_S / speed_up, LEAST_POSE_PAUSE_S)
         self._inbox = inbox
-        self._to_map = to_map
+        self._to_map = None if to_map is None else msgspec.convert(to_map, OwnMap, from_attributes=True)
         self._closing = threading.Event()
         self._news = threading.Event()
         self._failed = threading.Event()

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import get_args
+from typing import get_args, get_type_hints
 
 import pytest
 from msgspec import Struct
 
 from bridge.link import protocol
-from bridge.link.protocol import KeyExpressions, Tagged
+from bridge.link.protocol import Info, KeyExpressions, Tagged
 from mission.errors import InputError
 from mission.events import AnyEvent, State, StopState, UnknownKind
 from mission.run.orders import Answer, Order, Reason
@@ -34,6 +34,14 @@ def test_every_message_is_listed_with_its_fields(message: type[Struct]) -> None:
 @pytest.mark.parametrize("event", [kind for kind in get_args(AnyEvent) if kind is not UnknownKind])
 def test_every_event_is_listed(event: type) -> None:
     assert f"`{event.__name__}`" in TEXT
+
+
+def test_what_a_newer_robot_adds_to_its_map_is_passed_over() -> None:
+    """`Transform` is strict, as a part of mission.json; as a part of `Info` it must not stop a station."""
+    decoded = protocol.decode(
+        b'{"x": 1.0, "y": 2.0, "heading": 0.5, "z": 3.0}', get_type_hints(Info)["to_map"]
+    )
+    assert (decoded.x, decoded.y, decoded.heading) == (1.0, 2.0, 0.5)
 
 
 @pytest.mark.parametrize("state", [*get_args(State), *get_args(StopState)])
