@@ -53,8 +53,8 @@ class Bar:
 
 
 def say(line: str) -> None:
-    """One line for the person, on stderr."""
-    print(printable(line), file=sys.stderr, flush=True)  # noqa: T201
+    """One line for the person, on stderr; in one piece, for several threads may say something."""
+    print(f"{printable(line)}\n", end="", file=sys.stderr, flush=True)  # noqa: T201
 
 
 def tell(line: str, *, at_once: bool = False) -> None:
