@@ -187,9 +187,9 @@ class Settings:
     robot_radius: Annotated[
         float | None, _robot("The robot's radius", "m", above=0, undecided="half of door_access")
     ] = None
-    speed: Annotated[float, _robot("The robot's speed", "m/s", above=0)] = 0.5
-    turn_rate: Annotated[float, _robot("How fast it turns", "degrees/s", above=0)] = 45.0
-    acceleration: Annotated[float, _robot("How fast it speeds up", "m/s²", above=0)] = 0.5
+    speed: Annotated[float, _robot("The robot's speed", "m/s", least=0.001)] = 0.5
+    turn_rate: Annotated[float, _robot("How fast it turns", "degrees/s", least=0.01)] = 45.0
+    acceleration: Annotated[float, _robot("How fast it speeds up", "m/s²", least=0.001)] = 0.5
     range: Annotated[float, _scanner("The scanner's range", "m", above=0)] = 5.0
     fov: Annotated[float, _scanner("The scanner's field of view", "degrees", least=10, most=360)] = 360.0
     profile: Annotated[str, _scanner("The scanner's own name for how it scans")] = "default"

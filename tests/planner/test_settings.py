@@ -15,6 +15,7 @@ import stopgo
 from mission.__main__ import main
 from mission.errors import InputError
 from mission.settings import PARAMETERS, Settings, check_settings, read_settings, settings_toml
+from mission.specs import robot_of
 
 OTHER: dict[str, Any] = {
     "room_coverage": 0.5,
@@ -112,6 +113,18 @@ def test_a_value_beyond_a_limit_is_refused_by_name(name: str, value: float) -> N
         check_settings(replace(Settings(), **{name: value}))
 
 
+@pytest.mark.parametrize("name", ["speed", "turn_rate", "acceleration"])
+def test_a_robot_that_hardly_moves_is_refused(name: str) -> None:
+    """Its times would be beyond every number, or its turn rate 0 in the mission's microradians."""
+    with pytest.raises(InputError, match=f"^{name} = 1e-300: must be at least 0.0"):
+        check_settings(replace(Settings(), **{name: 1e-300}))
+
+
+def test_the_slowest_turn_is_not_rounded_away() -> None:
+    slowest = PARAMETERS["turn_rate"].least
+    assert robot_of(replace(Settings(), turn_rate=slowest)).turn_rate == 0.000175  # 0.01 degrees
+
+
 @pytest.mark.parametrize("name", [name for name, p in PARAMETERS.items() if p.plain in (int, float)])
 def test_no_number_is_endless(name: str) -> None:
     for value in (math.nan, math.inf, -math.inf, 1e7):
@@ -120,14 +133,15 @@ def test_no_number_is_endless(name: str) -> None:
 
 
 MESSAGES = {
-    "speed": (0.0, "speed = 0.0: must be greater than 0"),
+    "speed": (0.0, "speed = 0.0: must be at least 0.001"),
+    "range": (0.0, "range = 0.0: must be greater than 0"),
     "settle": (-1.0, "settle = -1.0: must not be negative"),
     "coverage": (90.0, "coverage = 90.0: must be above 0 and at most 1 (0.9 is 90 %)"),
     "battery_min": (1.0, "battery_min = 1.0: must be at least 0 and below 1 (0.15 is 15 %)"),
     "doors": ("ajar", "doors = ajar: known: open, closed"),
     "start": ((1.0,), "start = 1: write X,Y,HEADING, such as 2.5,3.0,90"),
     "use": ((1.0,), "use = 1: write X,Y for each, such as 2.5,3.0"),
-    "range": ("far", "range = far: Expected `float`, got `str`"),
+    "fov": ("far", "fov = far: Expected `float`, got `str`"),
 }
 
 
