@@ -32,7 +32,7 @@ from bridge.commands.connection import (
 )
 from bridge.commands.order_commands import Json, state_line
 from bridge.console import print_json, tell
-from bridge.profile import files, read_profile
+from bridge.profile import counting, files, read_profile
 from mission.errors import InputError, StopgoError
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def doctor(
     Example: stopgo doctor --robot r1 --connect tcp/127.0.0.1:7447
     """
     given = given_in(context)
-    told: dict[str, Any] = {"robot": robot, "connect": connect, "site": site, "keys": keys}
+    told: dict[str, Any] = {"robot": robot, "connect": connect, "site": site, "keys": keys, "mavlink": None}
     checks = [_system(), *_extras(), _viewer(), _disk(Path()), *_checked("profile", lambda: _profile(given))]
     with contextlib.suppress(InputError):  # which the profile's line tells
         told = with_presets(given, told)
@@ -83,6 +83,8 @@ def doctor(
     if told["robot"] is not None:
         connection = connection_of(given, **told, timeout=timeout, insecure=insecure)
         checks += [*_port(connection.endpoint), *_checked("robot", lambda: _asked(connection))]
+    else:
+        checks += _checked("port", lambda: _unasked(told, insecure=insecure))
     say_checks(checks, as_json=json_)
     return 0 if all(check.ok for check in checks) else 1
 
@@ -90,6 +92,21 @@ def doctor(
 def _asked(connection: Connection) -> Iterator[Check]:
     with reached(connection) as station:
         yield from robot_checks(station.info(), time.time_ns())
+
+
+def _unasked(told: dict[str, Any], *, insecure: bool) -> Iterator[Check]:
+    """What can be told of where to connect while nobody says to which robot."""
+    if told["mavlink"] is not None:
+        from bridge.mavlink.line.url import read_url
+
+        yield Check("port", True, f"{read_url(told['mavlink'])} is a MAVLink URL; nobody was asked there")
+    elif told["connect"] != DEFAULT_ENDPOINT:
+        from bridge.link.keys import now_utc, read_keys
+        from bridge.link.zenoh_link import Guard, check_endpoint
+
+        held = None if told["keys"] is None else read_keys(told["keys"], now=now_utc())
+        check_endpoint(told["connect"], Guard(held, insecure), option="--connect")
+        yield from _port(told["connect"])
 
 
 def say_checks(checks: list[Check], *, as_json: bool) -> None:
@@ -154,6 +171,7 @@ def _profile(given: frozenset[str]) -> Iterator[Check]:
             True,
             f"nothing is preset, neither by STOPGO_… nor in {' nor '.join(map(str, files()))}",
         )
+    counting(presets, {option.removeprefix("--") for option in given})
 
 
 def _keys(folder: Path) -> Iterator[Check]:

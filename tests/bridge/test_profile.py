@@ -112,6 +112,32 @@ def test_doctor_tells_of_everything_and_ends_with_1_if_something_is_wrong(
     assert "connect = tcp/127.0.0.1:1, from stopgo.toml" in said
 
 
+@pytest.mark.parametrize(
+    ("preset", "said"),
+    [
+        ('connect = "tcp/127.0.0.1:99999"', "99999 is no port"),
+        ('connect = "http://127.0.0.1:80"', "not an endpoint"),
+        ('connect = "tls/127.0.0.1:7447"', "tls needs --keys DIR"),
+        ('connect = "tcp/127.0.0.1:1"', "nothing answers at tcp/127.0.0.1:1"),
+        ('mavlink = "udp:1"', "not a MAVLink URL"),
+        ('robot = "r1"\nmavlink = "udpout:127.0.0.1:14550"', "robot and mavlink are both preset"),
+    ],
+)
+def test_doctor_finds_wrong_what_every_order_would_refuse(
+    preset: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("stopgo.toml").write_text(preset)
+    assert main(["doctor"]) == 1
+    wrong = [line for line in capsys.readouterr().out.splitlines() if line.startswith("WRONG")]
+    assert [said in line for line in wrong] == [True]
+
+
+def test_doctor_asks_no_vehicle_and_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("stopgo.toml").write_text('mavlink = "udpout:127.0.0.1:14550"')
+    assert main(["doctor"]) == 0
+    assert "udpout:127.0.0.1:14550 is a MAVLink URL; nobody was asked there" in capsys.readouterr().out
+
+
 def test_doctor_compares_the_clocks() -> None:
     info = Field().station().info()
     right = {check.name: check for check in robot_checks(info, info.clock_ns)}
