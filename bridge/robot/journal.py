@@ -333,8 +333,7 @@ def open_journal(directory: Path, robot: str) -> Iterator[Journal]:
     """
     with _lock_file(directory, "lock") as lock:
         _take(lock.fileno(), directory)
-        os.ftruncate(lock.fileno(), 0)
-        os.pwrite(lock.fileno(), str(os.getpid()).encode(), 0)
+        _note_process(lock.fileno(), directory)
         with _opened(directory, robot) as journal:
             yield journal
 
@@ -353,6 +352,14 @@ def shared_journal(directory: Path, robot: str) -> Iterator[Journal]:
         with _opened(directory, robot) as journal:
             locks.flock(opening.fileno(), locks.LOCK_UN)
             yield journal
+
+
+def _note_process(lock: int, directory: Path) -> None:
+    try:
+        os.ftruncate(lock, 0)
+        os.pwrite(lock, str(os.getpid()).encode(), 0)
+    except OSError as error:
+        raise InputError(f"--state {directory}: cannot be used ({error.strerror})") from None
 
 
 def _lock_file(directory: Path, name: str) -> IO[str]:

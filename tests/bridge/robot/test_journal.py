@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import sqlite3
 from pathlib import Path
@@ -74,6 +76,18 @@ def test_a_damaged_journal_is_named(tmp_path: Path) -> None:
 def test_what_another_process_writes_is_waited_for_on_a_slow_machine_too(tmp_path: Path) -> None:
     with shared_journal(tmp_path, "r1") as journal:
         assert journal._connection.execute("PRAGMA busy_timeout").fetchone() == (1000 * LOCKED_S,)
+
+
+def test_a_disk_too_full_for_the_lock_names_the_state_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "pwrite", full)
+    opened = open_journal(tmp_path / "s", "r1")
+    with pytest.raises(InputError, match=r"--state .*s: cannot be used \(No space left"), opened:
+        pass
 
 
 def test_a_state_path_that_is_a_file_is_refused(tmp_path: Path) -> None:
