@@ -81,10 +81,13 @@ def read_fault(text: str) -> Fault:
     kind, _, rest = text.partition("@")
     at, _, amount = rest.partition("=")
     try:
-        return Fault(msgspec.convert(kind, FaultKind), int(at), float(amount or 0.0))
+        fault = Fault(msgspec.convert(kind, FaultKind), int(at), float(amount or 0.0))
     except (ValueError, msgspec.ValidationError):
         kinds = ", ".join(FAULTS)
         raise InputError(f"--fault {text}: write it KIND@N or KIND@N=AMOUNT, KIND of {kinds}") from None
+    if fault.at < 0 or not math.isfinite(fault.amount):
+        raise InputError(f"--fault {text}: N must be 0 or more, and AMOUNT a finite number")
+    return fault
 
 
 @dataclass(frozen=True)

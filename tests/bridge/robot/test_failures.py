@@ -293,7 +293,7 @@ def test_a_full_disk_rejects_a_mission() -> None:
     assert field.controller.run.state == "IDLE"
 
 
-@pytest.mark.parametrize("text", ["slip", "slip@x", "melt@1", "slip@1=much", "@1"])
+@pytest.mark.parametrize("text", ["slip", "slip@x", "melt@1", "slip@1=much", "@1", "slip@1=nan", "slip@-1"])
 def test_a_fault_that_makes_no_sense_is_named(text: str) -> None:
     with pytest.raises(InputError, match="--fault"):
         read_fault(text)
