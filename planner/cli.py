@@ -269,7 +269,9 @@ def demo_command(
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")] = Path(
         "recordings/demo"
     ),
-    speed_up: Annotated[float, typer.Option(help="The simulated robot's time goes this much faster.")] = 60.0,
+    speed_up: Annotated[
+        float, typer.Option(min=0.01, max=1000, help="The simulated robot's time goes this much faster.")
+    ] = 60.0,
 ) -> int:
     """Plan a sample office, send the mission to a simulated robot in its own process, and follow its run."""
     import tempfile
@@ -279,8 +281,6 @@ def demo_command(
     from bridge.station.station import connect
     from mission.settings import read_settings
 
-    if not 0 < speed_up < 1e6:
-        raise InputError(f"speed_up = {speed_up}: must be above 0 and below a million")
     with as_file(files("recordings") / "samples" / "office.dxf") as floor:
         report = plan_files(floor, out, read_settings(None, {}))[0]
     typer.echo(report.as_text())

@@ -581,3 +581,12 @@ def test_a_plan_is_made_where_recordings_are_not_installed(
     assert "rerun is not installed" in told.err
     assert "plan.rrd" not in told.out
     assert {path.name for path in tmp_path.iterdir()} == {"mission.json", "plan.svg", "coverage.json"}
+
+
+@pytest.mark.parametrize("speed_up", ["1001", "0", "nan"])
+def test_a_demo_no_robot_can_run_plans_nothing(
+    speed_up: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["demo", "--speed-up", speed_up, "-o", str(tmp_path / "demo")]) == 2
+    assert "'--speed-up': Input should be" in capsys.readouterr().err
+    assert not (tmp_path / "demo").exists()
