@@ -1,0 +1,53 @@
+"""The JSON Schema of every message on the link, made from the code and shipped as protocol.schema.json.
+
+Regenerate the shipped file with `python -m bridge.link.protocol_schema > bridge/link/protocol.schema.json`.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import msgspec
+
+from bridge.link.protocol import VERSION, Tagged
+from bridge.link.seals import Seal
+from mission.events import KINDS, AnyEvent, PoseReport, StateReport, UnknownKind
+from mission.run.orders import Answer, Order
+
+_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def protocol_schema() -> bytes:
+    """A definition for each message, event, report and seal, by its name on the link, as indented JSON.
+
+    Any further field is valid in each of them, and so is an event of a kind that is not known.
+    """
+    spoken = (*Tagged.__subclasses__(), Order, Answer, AnyEvent, StateReport, PoseReport, Seal)
+    _, defs = msgspec.json.schema_components(spoken)
+    command = str(Order.__struct_config__.tag)
+    defs[command] = defs.pop(Order.__name__) | {"title": command}
+    defs[UnknownKind.__name__] = _of_any_other_kind(defs[UnknownKind.__name__])
+    defs["Event"] = _event()
+    defs["LogPage"]["properties"]["events"]["items"] = {"$ref": "#/$defs/Event"}
+    head = {"$schema": _DIALECT, "title": f"stopgo messages between station and robot, version {VERSION}"}
+    text = msgspec.json.encode({**head, "$defs": defs}, order="deterministic")
+    return msgspec.json.format(text, indent=2) + b"\n"
+
+
+def _event() -> dict[str, Any]:
+    kinds = [{"$ref": f"#/$defs/{kind}"} for kind in KINDS]
+    return {"title": "Event", "description": "One line of the robot's journal.", "anyOf": kinds}
+
+
+def _of_any_other_kind(unknown: dict[str, Any]) -> dict[str, Any]:
+    """On the link it goes by its own name; `UnknownKind` is what a reader makes of it."""
+    known = [kind for kind in KINDS if kind != UnknownKind.__name__]
+    fields = {name: schema for name, schema in unknown["properties"].items() if name != "kind"}
+    fields["event"] = {"type": "string", "not": {"enum": known}}
+    required = [name for name in unknown["required"] if name != "kind"]
+    return unknown | {"properties": fields, "required": required}
+
+
+if __name__ == "__main__":
+    sys.stdout.buffer.write(protocol_schema())
