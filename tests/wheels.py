@@ -72,13 +72,16 @@ def built(folder: Path) -> Path:
     names = zipfile.ZipFile(wheel).namelist()
     top = {name.partition("/")[0] for name in names if ".dist-info/" not in name}
     assert top == {"stopgo.py", "_stopgo"}, top
-    for needed in (*SCHEMAS, "recordings/samples/office.dxf", *TYPED):
+    for needed in (*REFERENCE, "recordings/samples/office.dxf", *TYPED):
         assert f"_stopgo/{needed}" in names, needed
     print(f"{archive.name}: {len(held)} files; {wheel.name}: {len(names)} files", flush=True)
     return wheel
 
 
-SCHEMAS = ("mission/mission.schema.json", "bridge/link/protocol.schema.json")
+REFERENCE = (
+    "mission/mission.schema.json", "mission/canonical.vectors.json",
+    "bridge/link/protocol.schema.json",
+)  # fmt: skip
 TYPED = tuple(f"{name}/py.typed" for name in ("mission", "planner", "bridge", "recordings"))
 
 
