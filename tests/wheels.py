@@ -80,7 +80,7 @@ def built(folder: Path) -> Path:
 
 REFERENCE = (
     "mission/mission.schema.json", "mission/canonical.vectors.json",
-    "bridge/link/protocol.schema.json",
+    "bridge/link/protocol.schema.json", "bridge/link/seal.vectors.json",
 )  # fmt: skip
 TYPED = tuple(f"{name}/py.typed" for name in ("mission", "planner", "bridge", "recordings"))
 

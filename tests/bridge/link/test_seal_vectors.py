@@ -1,0 +1,148 @@
+"""Seals are, byte for byte, what docs/reference/protocol.md says: a dialogue with fixed keys and clocks."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from datetime import datetime
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from cryptography import x509
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
+
+from bridge.link.keys import HeldKeys, KeyFiles, holder_of
+from bridge.link.link import Request
+from bridge.link.seals import KeySeals
+
+VECTORS: dict[str, Any] = json.loads(files("bridge.link").joinpath("seal.vectors.json").read_bytes())
+MESSAGES: list[dict[str, Any]] = VECTORS["messages"]
+each_message = pytest.mark.parametrize("message", MESSAGES, ids=lambda message: str(message["shows"]))
+
+
+def test_our_own_ends_say_exactly_this(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert dialogue(held_keys(tmp_path), monkeypatch) == MESSAGES
+
+
+@each_message
+def test_a_seal_verifies_as_the_document_says(message: dict[str, Any]) -> None:
+    seal = json.loads(message["seal"])
+    assert by_the_document(message, seal) == message["signed"].encode()
+    key = public_key(message["by"])
+    key.verify(msgspec.convert(seal["signature"], bytes), message["signed"].encode())
+
+
+@each_message
+@pytest.mark.parametrize("line", ["nonce", "boot_id", "number", "at_ns"])
+def test_whatever_is_changed_in_a_seal_breaks_it(message: dict[str, Any], line: str) -> None:
+    seal = json.loads(message["seal"])
+    changed = {**seal, line: seal.get(line, 0) + 1 if line in ("number", "at_ns") else "other"}
+    with pytest.raises(InvalidSignature):
+        public_key(message["by"]).verify(
+            msgspec.convert(seal["signature"], bytes), by_the_document(message, changed)
+        )
+
+
+def test_the_document_names_the_vectors() -> None:
+    page = Path(__file__).parents[3] / "docs" / "reference" / "protocol.md"
+    assert "bridge/link/seal.vectors.json" in page.read_text(encoding="utf-8")
+
+
+def by_the_document(message: dict[str, Any], seal: dict[str, Any]) -> bytes:
+    """The bytes that are signed, written once more after docs/reference/protocol.md alone."""
+    parameters = ";".join(f"{name}={value}" for name, value in sorted(message["parameters"].items()))
+    asked = hashlib.sha256(message.get("question", "").encode()).hexdigest()
+    about = {
+        "question": [message["key"], parameters],
+        "answer": [message["key"], parameters, asked],
+        "told": [message["key"]],
+    }[message["kind"]]
+    bound = [seal.get("nonce", ""), seal.get("boot_id", ""), seal.get("number", 0), seal.get("at_ns", 0)]
+    lines = "".join(f"{line}\n" for line in (f"stopgo/1 {message['kind']}", *about, *bound))
+    return lines.encode() + message["payload"].encode()
+
+
+def public_key(name: str) -> Ed25519PublicKey:
+    held = VECTORS["holders"][name]
+    key = x509.load_der_x509_certificate(bytes.fromhex(held["certificate"])).public_key()
+    assert isinstance(key, Ed25519PublicKey)
+    return key
+
+
+def held_keys(folder: Path) -> dict[str, HeldKeys]:
+    """The keys of the vectors, as they were on the day of the vectors."""
+    authority = x509.load_der_x509_certificate(bytes.fromhex(VECTORS["authority"]))
+    held = {}
+    for name, told in VECTORS["holders"].items():
+        certificate = x509.load_der_x509_certificate(bytes.fromhex(told["certificate"]))
+        key = Ed25519PrivateKey.from_private_bytes(bytes.fromhex(told["private_key"]))
+        held[name] = HeldKeys(KeyFiles(folder / name), holder_of(certificate), authority, certificate, key)
+    return held
+
+
+def dialogue(held: dict[str, HeldKeys], monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """Alice asks robot r1 what it is, hears its state, asks for its log and orders a pause."""
+    nonces: Iterator[int] = iter(range(1, 100))
+    monkeypatch.setattr("secrets.token_hex", lambda size: f"{next(nonces):0{2 * size}x}")
+    day = datetime.fromisoformat(VECTORS["now"])
+    station = KeySeals(held["alice"], now=lambda: day, clock_ns=lambda: 5_000_000_000)
+    robot = KeySeals(held["r1"], boot_id="b7", now=lambda: day, clock_ns=lambda: 1_700_000_000_000_000_000)
+    said: list[dict[str, Any]] = []
+
+    def say(shows: str, kind: str, by: str, key: str, payload: str, seal: bytes, **more: Any) -> None:
+        sealed = json.loads(seal)
+        message = {
+            "shows": shows,
+            "kind": kind,
+            "by": by,
+            "key": key,
+            "parameters": {},
+            "payload": payload,
+            **more,
+        }
+        said.append({**message, "signed": by_the_document(message, sealed).decode(), "seal": seal.decode()})
+
+    def ask(shows: str, key: str, payload: str, reply: str, **parameters: str) -> None:
+        question = station.question(key, payload.encode(), parameters)
+        say(shows, "question", "alice", key, payload, question.seal, parameters=parameters)
+        answered = robot.answering(lambda request: reply.encode())
+        got, seal = answered(Request(key, payload.encode(), parameters, question.seal))
+        assert station.opened(question, got, seal) == reply.encode(), station.distrusted
+        more = {"parameters": parameters, "question": payload}
+        say(f"the answer to {shows}", "answer", "r1", key, reply, seal, **more)
+
+    def tell(shows: str, speaker: KeySeals, by: str, key: str, payload: str, listener: KeySeals) -> None:
+        heard: list[bytes] = []
+        seal = speaker.telling(key, payload.encode())
+        listener.hearing(lambda key, payload: heard.append(payload))(key, payload.encode(), seal)
+        assert heard == [payload.encode()], listener.distrusted
+        say(shows, "told", by, key, payload, seal)
+
+    root = "north/hall/sx/1/r1"
+    ask("a first question, without payload", f"{root}/info", "", '{"is":"Malformed","message":"Büro 😀"}')
+    tell("what a robot publishes", robot, "r1", f"{root}/tel/state", '{"robot":"r1","more":1}', station)
+    tell(
+        "the same once more, by another number",
+        robot,
+        "r1",
+        f"{root}/tel/state",
+        '{"robot":"r1","more":1}',
+        station,
+    )
+    ask(
+        "a question with parameters",
+        f"{root}/log",
+        "",
+        '{"is":"LogPage","events":[],"newest":0}',
+        since="0",
+        run="x",
+    )
+    ask("a question with a payload", f"{root}/cmd/pause", '{"is":"Command"}', '{"is":"Answer"}')
+    ask("a question to the tunnel", f"{root}/mavlink/hello", "", "{}")
+    tell("what a station publishes", station, "alice", f"{root}/mavlink/up", "frames", robot)
+    return said
