@@ -16,7 +16,7 @@ from mission.document import Transform
 from mission.errors import InputError
 from mission.events import AnyEvent, PoseReport, StateReport, event_of
 from mission.run.lease import Lease
-from mission.run.orders import Answer, Count, Reason, ShortText
+from mission.run.orders import Answer, Count, ShortText
 
 VERSION: Final = 1
 CHUNK_BYTES: Final = 32 * 1024
@@ -214,7 +214,8 @@ class Accepted(Tagged, frozen=True):
 class Rejected(Tagged, frozen=True):
     """The mission was not taken; what the robot held before is unchanged."""
 
-    reason: Reason
+    reason: str
+    """One of `Reason`, or what a newer robot calls it."""
     messages: tuple[str, ...]
 
 

@@ -62,10 +62,12 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is"
     cmd_id: str
     verb: str
     outcome: Literal["ok", "refused"]
-    reason: Reason | None
+    reason: str | None
+    """One of `Reason`, or what a newer robot calls it."""
     message: str
     run_id: str | None
-    state: State
+    state: str
+    """One of `State`, or what a newer robot calls it."""
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 import pytest
 
 from bridge.link.memory_link import MemoryLink, Switchboard
+from bridge.link.protocol import KeyExpressions, encode
 from bridge.station import station as stations
 from bridge.station.station import LEAST_S, PATIENCE_S, Station
-from mission.errors import OutcomeUnknown, RobotUnreachable
+from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from tests.bridge.world import Field, corridor
 
 
@@ -119,3 +120,32 @@ def test_an_order_may_be_waited_for_longer_than_it_may_be_valid() -> None:
     field.station().push(corridor())
     station = Station(field.board.link(), field.keys, commander="test", timeout_s=300.0)
     assert station.command("start").outcome == "ok"
+
+
+@pytest.mark.parametrize(
+    ("outcome", "reason", "state"), [("ok", None, "DOCKED"), ("refused", "too_dark", "PAUSED")]
+)
+def test_states_and_reasons_of_a_newer_robot_are_passed_on(
+    outcome: str, reason: str | None, state: str
+) -> None:
+    """An order that was carried out, or refused, is not *unknown* because of a word that is new."""
+    board, keys = Switchboard(), KeyExpressions("r1")
+    told = {"is": "Answer", "cmd_id": "c1", "verb": "pause", "outcome": outcome, "reason": reason,
+            "message": "m", "run_id": None, "state": state}  # fmt: skip
+    board.link().serve(keys.command("*"), lambda request: encode(told))
+    station = Station(board.link(), keys, commander="test", timeout_s=5.0)
+    if outcome == "ok":
+        assert station.give(station.stop_order("pause")).state == "DOCKED"
+    else:
+        with pytest.raises(AnswerIsNo, match="refused pause: too_dark: m") as refused:
+            station.give(station.stop_order("pause"))
+        assert refused.value.reason == "too_dark"
+
+
+def test_a_mission_that_a_newer_robot_rejects_is_rejected() -> None:
+    board, keys = Switchboard(), KeyExpressions("r1")
+    told = {"is": "Rejected", "reason": "too_dark", "messages": ["m"]}
+    board.link().serve(keys.command("*"), lambda request: encode(told))
+    station = Station(board.link(), keys, commander="test", timeout_s=5.0)
+    with pytest.raises(AnswerIsNo, match="rejected pause: too_dark: m"):
+        station.give(station.stop_order("pause"))
