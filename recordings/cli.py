@@ -14,7 +14,7 @@ from mission.errors import InputError
 from mission.files.atomic import must_be_writable
 
 if TYPE_CHECKING:
-    from mission.document import Mission, Transform
+    from mission.document import Mission
     from mission.measured import Measured
     from planner.further import PlannedFloor
     from recordings.logs import FieldLog, Reading
@@ -282,6 +282,7 @@ def _mission(path: Path | None, logs: list[FieldLog]) -> Mission:
 def _placing(
     map_: str | None, align: str | None, time_offset: float, poses: str | None, robot: str | None
 ) -> Placing:
+    from mission.files.exports.placing import map_transform
     from recordings.replay.log_placing import Placing
 
     if align is not None and map_ is not None:
@@ -291,22 +292,8 @@ def _placing(
     ways: dict[str | None, Align | None] = {None: None, "first": "first", "stops": "stops"}
     if align not in ways:
         raise InputError(f"--align {align}: must be first or stops")
-    to_map = None if map_ is None else _transform(map_)
+    to_map = None if map_ is None else map_transform(map_)
     return Placing(to_map, ways[align], time_offset, poses, robot)
-
-
-def _transform(text: str) -> Transform:
-    from mission.document import Transform
-
-    try:
-        x, y, heading = map(float, text.split(","))
-    except ValueError:
-        raise InputError(
-            f"--map {text}: must be X,Y,HEADING in metres and degrees, such as 2.5,3,90"
-        ) from None
-    if not all(map(math.isfinite, (x, y, heading))):
-        raise InputError(f"--map {text}: must be numbers")
-    return Transform(x=x, y=y, heading=math.radians(heading))
 
 
 def _write_replays(replays: list[Replay], out: Path | None, csv: Path | None) -> None:

@@ -26,9 +26,26 @@ def placed(mission: Mission, *, origin: str | None, to_map: str | None) -> Missi
     if origin is not None:
         mission = msgspec.structs.replace(mission, georeference=_site_origin(origin))
     if to_map is not None:
-        frame = Frame(name=mission.frame.name, to_map=_transform(to_map))
+        frame = Frame(name=mission.frame.name, to_map=map_transform(to_map))
         mission = msgspec.structs.replace(mission, frame=frame)
     return mission
+
+
+def map_transform(text: str) -> Transform:
+    """How the site lies on a map or in a log's frame, as `--map X,Y,HEADING` tells.
+
+    Raises
+    ------
+    InputError
+        When it is not three numbers, or one is beyond any site.
+    """
+    try:
+        found = numbers(text)
+    except ValueError:
+        raise InputError(f"--map {text}: {MAP}") from None
+    if len(found) != 3 or not all(abs(number) < FAR for number in found):
+        raise InputError(f"--map {text}: {MAP}")
+    return Transform(x=found[0], y=found[1], heading=math.radians(found[2]))
 
 
 def moved(mission: Mission, there: Mission) -> tuple[str, ...]:
@@ -48,13 +65,3 @@ def _site_origin(text: str) -> SiteOrigin:
     assert place is not None
     lat, lon, alt, heading = place
     return SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=heading)
-
-
-def _transform(text: str) -> Transform:
-    try:
-        found = numbers(text)
-    except ValueError:
-        raise InputError(f"--map {text}: {MAP}") from None
-    if len(found) != 3 or not all(abs(number) < FAR for number in found):
-        raise InputError(f"--map {text}: {MAP}")
-    return Transform(x=found[0], y=found[1], heading=math.radians(found[2]))

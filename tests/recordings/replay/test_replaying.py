@@ -227,6 +227,7 @@ def test_from_python_a_log_is_replayed_in_one_call(tmp_path: Path) -> None:
     [
         (["--map", "1,2"], "--map 1,2"),
         (["--map", "1,2,nan"], "--map 1,2,nan"),
+        (["--map", "1e308,2,3"], "--map 1e308,2,3"),
         (["--align", "best"], "--align best"),
         (["--map", "1,2,3", "--align", "first"], "one of them"),
         (["--time-offset", "inf"], "--time-offset"),
