@@ -161,9 +161,8 @@ def _outcome(events: Sequence[AnyEvent]) -> str:
 
 
 def _reason(events: Sequence[AnyEvent]) -> str:
-    """Why a stop was not scanned: a skip after a failure tells both."""
+    """Why a stop was not scanned: what was told last, and with a skip after a failure both."""
     told = [event for event in events if type(event) in OUTCOMES]
-    if not told or isinstance(told[-1], Scanned):
-        return ""
-    reasons = [getattr(event, "reason", "") for event in told[-2:] if not isinstance(event, Scanned)]
+    both = [type(event) for event in told[-2:]] == [Failed, Skipped]
+    reasons = [getattr(event, "reason", "") for event in told[-2 if both else -1 :]]
     return "; ".join(dict.fromkeys(reason for reason in reasons if reason))

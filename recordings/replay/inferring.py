@@ -72,7 +72,7 @@ DRIVES = ("AUTO", "MISSION")
 def _told(
     matches: Sequence[Match], mission: Mission, track: Track, remarks: Sequence[Remark]
 ) -> Iterator[Happening]:
-    farthest, left_ns = -1, int(track.ns[0])
+    farthest, left_ns, stood = -1, int(track.ns[0]), set[int]()
     for match in matches:
         if match.stop is None:
             continue
@@ -81,7 +81,11 @@ def _told(
             reason = "no halt there in the log"
             yield Happening(left_ns, Skipped, {"stop": mission.stops[passed].id, "reason": reason})
         farthest, left_ns = max(farthest, match.stop), match.standing.end_ns
-        yield from _visit(mission.stops[match.stop], match.standing, remarks)
+        stop = mission.stops[match.stop]
+        enough = long_enough(match.standing, stop)
+        if enough or match.stop not in stood:  # a short halt takes nothing from a long one before
+            yield from _visit(stop, match.standing, remarks)
+        stood |= {match.stop} if enough else set()
 
 
 def _during(halt: Standing, remark: Remark) -> bool:

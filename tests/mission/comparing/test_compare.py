@@ -261,3 +261,14 @@ def test_standing_still_is_counted_between_two_times() -> None:
     assert stood_s(events, since_s=0.0, until_s=30.0) == 15.0
     assert stood_s(events, since_s=20.0, until_s=50.0) == 5.0 + 10.0
     assert stood_s(events[:1], since_s=0.0, until_s=50.0) == 0.0
+
+
+def test_of_repeated_visits_the_last_reason_counts_and_of_a_skip_after_a_failure_both() -> None:
+    told_of = {"stop": "S1", "pose": at(0, 0)}
+    again = [(Unconfirmed, s, {**told_of, "reason": f"stood {s:g} s; no word"}) for s in (8.0, 9.0)]
+    assert run(*again).stops[0].reason == "stood 9 s; no word"
+    given_up = run(
+        (Failed, 8.0, {"stop": "S1", "reason": "scan: timeout"}),
+        (Skipped, 9.0, {"stop": "S1", "reason": "skip by ann"}),
+    )
+    assert given_up.stops[0].reason == "scan: timeout; skip by ann"

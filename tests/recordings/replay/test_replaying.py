@@ -153,6 +153,18 @@ def test_a_halt_too_short_for_a_scan_is_none() -> None:
     assert "of 14.0 s" in found.comparison.stops[4].reason
 
 
+def test_a_short_halt_takes_nothing_from_a_long_one_before() -> None:
+    drive = driven(MISSION, Odd(repeated=frozenset({4})))
+    rows = np.array(drive.rows)
+    again = [halt for halt in drive.halts if halt.stop == 4][1]
+    rows = rows[(rows[:, 0] <= again.begin_s + 5) | (rows[:, 0] > again.end_s)]
+    rows[:, 0] = np.arange(len(rows)) / 10
+    found = replay(log_of(Track.of(rows[:, 0] * 1e9, rows[:, 1:3], rows[:, 3])), MISSION, FIRST)
+    stop = found.comparison.stops[4]
+    assert stop.outcome == "unconfirmed"
+    assert stop.reason.count("stood") == 1
+
+
 def test_time_lost_is_found_where_it_was() -> None:
     drive = driven(MISSION, Odd(extra_before=frozenset({5})))
     found = replay(log_of(logged(drive)), MISSION, FIRST)
