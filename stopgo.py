@@ -234,6 +234,12 @@ def main() -> int:
     return run()
 
 
+def rerun_importer() -> int:
+    """The `rerun-importer-stopgo` command, which Rerun calls for every file that it opens."""
+    sys.argv[1:1] = ["rerun-importer"]
+    return main()
+
+
 def _too_old() -> str:
     """Whether this Python is one that stopgo does not run on; empty if it does."""
     if sys.version_info >= (3, 11):  # noqa: UP036  a copied folder is not held to requires-python

@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -155,6 +157,14 @@ def open_canvas(sheet: Sheet, *, port: int | None = None) -> Iterator[Canvas]:
         canvas = Canvas(stream, sheet.origin, drawn)
         _prepare(canvas)
         yield canvas
+
+
+def layout_alone(sheet: Sheet) -> bytes:
+    """The blueprint of a recording, in Rerun's format."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "layout.rbl")
+        blueprint(sheet.local_extent, sheet.runs).save(entities.APPLICATION, path)
+        return path.read_bytes()
 
 
 def _prepare(canvas: Canvas) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import sys
@@ -23,10 +24,20 @@ if TYPE_CHECKING:
     from recordings.review import Review
 
 
+IMPORTER = "rerun-importer"
+"""The command behind the executable `rerun-importer-stopgo`."""
+
+
 def add_commands(app: typer.Typer) -> None:
     """Add this folder's verbs to the front door."""
     app.command(epilog="Example: stopgo review plan.rrd field.rrd --html report.html")(review)
     app.command(epilog="Example: stopgo runs recordings")(runs)
+    app.command(
+        IMPORTER,
+        hidden=True,
+        context_settings={"ignore_unknown_options": True, "allow_extra_args": True},
+        epilog="Example: rerun-importer-stopgo mission.json --recording-id r1 > mission.rrd",
+    )(rerun_importer)
     app.command(
         epilog="Example: stopgo replay field.bag --mission plan/mission.json --align stops -o replay.rrd"
     )(replay)
@@ -99,6 +110,27 @@ def runs(
     typer.echo(told)
     for fault in index.faults():
         typer.echo(f"stopgo: {printable(fault)}", err=True)
+
+
+def rerun_importer(
+    path: Annotated[Path, typer.Argument(metavar="FILE", help="Whatever is opened in Rerun.")],
+    recording_id: Annotated[str | None, typer.Option(help="Of a floor's recording.")] = None,
+) -> int:
+    """Write a mission or a floor to stdout as a recording, as Rerun asks of its importers.
+
+    Exit code 66: the file is neither. Rerun's further options mean nothing here: how stopgo's recordings are
+    named and timed is the same whoever opens them.
+    """
+    from recordings.importer import NOT_OURS, is_ours, recording_of
+
+    if not is_ours(path):
+        return NOT_OURS
+    with contextlib.redirect_stdout(sys.stderr):
+        from planner.floors import read_floor
+
+        recording = recording_of(path, recording_id, read_floor)
+    sys.stdout.buffer.write(recording)
+    return 0
 
 
 def replay(

@@ -16,7 +16,15 @@ from mission.geometry import bounds
 from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
 from mission.sight import Sight
 from recordings import entities
-from recordings.canvas import Canvas, LocalOrigin, Sheet, local_origin, mission_origin, open_canvas
+from recordings.canvas import (
+    Canvas,
+    LocalOrigin,
+    Sheet,
+    layout_alone,
+    local_origin,
+    mission_origin,
+    open_canvas,
+)
 from recordings.carried.checking import carry_end
 from recordings.carried.findings import carry_findings
 from recordings.carried.missions import carry_mission
@@ -75,10 +83,16 @@ class PlanRecording:
         path.write_bytes(_drawn(self.recording_id, self._nouns))
         check(path)
 
+    def streamed(self) -> bytes:
+        """The nouns as a recording, behind its layout: a viewer that reads it from a pipe draws what it has
+        so far, and would make a layout of its own for a recording that comes first.
+        """
+        layout = layout_alone(_sheet(self.recording_id, self._nouns))
+        return layout + _drawn(self.recording_id, self._nouns)
+
 
 def _drawn(recording_id: str, nouns: Nouns) -> bytes:
-    sheet = Sheet(recording_id=recording_id, name=_name(nouns), origin=_origin(nouns), extent=_extent(nouns))
-    with open_canvas(sheet) as canvas:
+    with open_canvas(_sheet(recording_id, nouns)) as canvas:
         for kind, drawings in DRAWINGS.items():
             for draw in drawings if kind in nouns else ():
                 draw(canvas, nouns[kind])
@@ -86,6 +100,10 @@ def _drawn(recording_id: str, nouns: Nouns) -> bytes:
         _tell(canvas, nouns)
         carry_end(canvas)
         return canvas.taken()
+
+
+def _sheet(recording_id: str, nouns: Nouns) -> Sheet:
+    return Sheet(recording_id=recording_id, name=_name(nouns), origin=_origin(nouns), extent=_extent(nouns))
 
 
 def _origin(nouns: Nouns) -> LocalOrigin:
