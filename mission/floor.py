@@ -28,7 +28,7 @@ GRAVE = (
     *("open_outline", "missing_block", "no_outline", "bad_coordinates"),
 )
 NOTES = (
-    *("floor_from_rooms", "floor_from_proxies", "rooms_derived", "spaces_overlap", "off_floor"),
+    *("floor_from_rooms", "floor_from_proxies", "rooms_derived", "spaces_overlap", "beside_floor"),
     *("duplicate", "repeated_points", "no_length", "text_outside_rooms", "gap_closed", "repaired"),
     "joint_closed",
     *("layer_as_told", "exterior_opening", "rooms_overlap"),

@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 import unicodedata
 from dataclasses import dataclass
-from functools import lru_cache
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,6 @@ def reading_of(name: str) -> LayerReading | None:
     return _reading(_plain(name))
 
 
-@lru_cache(maxsize=4096)
 def _reading(plain: str) -> LayerReading | None:
     for role, pattern in _PATTERNS:
         found = pattern.search(plain)

@@ -20,7 +20,7 @@ from planner.floors.survey import FloorChoice, LayerUse, Survey
 
 WORKED_OUT = (
     *("floor_from_rooms", "floor_from_proxies", "floor_from_walls", "rooms_derived"),
-    *("spaces_overlap", "off_floor"),
+    *("spaces_overlap", "beside_floor"),
 )
 """Findings about what the model does not say and was worked out."""
 

@@ -145,7 +145,7 @@ def _near_the_floor(solids: list[Solid], floor: Region) -> tuple[list[Solid], li
     if len(near) == len(solids):
         return near, []
     text = f"{len(solids) - len(near)} elements more than {BESIDE:g} m beside the floor are left out"
-    return near, [Finding("off_floor", text)]
+    return near, [Finding("beside_floor", text)]
 
 
 def _rings(layer: str, region: Region, global_id: str | None = None) -> list[Stroke]:

@@ -119,7 +119,7 @@ def test_a_vehicle_that_cannot_keep_its_state_ends_and_says_so(tmp_path: Path) -
         wire(there(port)) as station,
         process("--mavlink", str(here(port)), "--state", str(state)) as running,
     ):
-        state.rmdir()
+        state.rename(tmp_path / "elsewhere")  # at once, whatever it is just writing
         state.touch()
         station.send(dialect.MAVLink_mission_clear_all_message(1, 1, 0))
         assert running.wait(PATIENCE_S) == 2
