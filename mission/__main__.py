@@ -9,7 +9,7 @@ import sys
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from mission.errors import MissingExtra, StopgoError
+from mission.errors import InputError, MissingExtra, StopgoError
 from mission.json_answer import answering
 from mission.process import PIPE_CLOSED, Signals, drop_output, have_output, reader_is_gone
 
@@ -105,12 +105,22 @@ def front_door() -> Any:
 
 def _run(arguments: list[str]) -> int:
     """The command's own exit code, if it does not raise."""
+    _must_be_text(arguments)
     command = front_door()
     if COMPLETING in os.environ:  # a shell asks what the words typed so far may become
         command.main(list(arguments), prog_name="stopgo")
     with command.make_context("stopgo", list(arguments) or ["--help"]) as context:
         result = command.invoke(context)
     return result if isinstance(result, int) else 0
+
+
+def _must_be_text(arguments: list[str]) -> None:
+    """Refuse a name of bytes that are not UTF-8 before anything is written: no answer could tell it."""
+    from mission.table import printable
+
+    for argument in arguments:
+        if any("\ud800" <= letter <= "\udfff" for letter in argument):
+            raise InputError(f"{printable(argument)}: is not UTF-8 text; rename the file or folder")
 
 
 def _ended_by(error: BaseException, signals: Signals) -> tuple[str, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import re
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import stopgo
+from mission.__main__ import main
 from mission.errors import InputError
 from mission.plan import Plan
 
@@ -58,3 +60,12 @@ def test_importing_it_loads_nothing_slow() -> None:
     code = f"import sys, stopgo; print(sorted({slow} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_name_that_is_not_text_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    """Linux lets a name be any bytes; one that cannot be told is refused before a file is written."""
+    assert main(["check", "caf\udce9.json", "--json"]) == 2
+    told = capsys.readouterr()
+    line = "caf\ufffd.json: is not UTF-8 text; rename the file or folder"
+    assert told.err == f"stopgo: {line}\n"
+    assert json.loads(told.out) == {"error": {"message": line, "exit_code": 2}}
