@@ -76,7 +76,7 @@ def next_revision(path: Path | str, mission: Mission) -> int:
     Its own where nothing or another mission is; of a mission with the same id, the same revision
     when only the revision differs, else one more.
     """
-    if not Path(path).exists():
+    if not Path(path).is_file():  # a device has no end to read to; whoever writes there refuses it
         return mission.revision
     try:
         there = read(path)

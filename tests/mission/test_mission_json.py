@@ -239,3 +239,8 @@ def test_an_id_that_cannot_stand_in_a_key_is_refused(bad: str) -> None:
     document["digest"] = hashlib.sha256(canonical(document)).hexdigest()
     with pytest.raises(InputError, match=r"\$\.id"):
         parse(json.dumps(document).encode(), "m")
+
+
+def test_only_a_file_has_a_revision_to_follow(tmp_path: Path) -> None:
+    """A device such as /dev/full has no end to read to; who writes there refuses it."""
+    assert next_revision(tmp_path, square_tour()) == square_tour().revision
