@@ -105,7 +105,7 @@ def comparison_json(comparison: Comparison) -> dict[str, Any]:
         "held_s": comparison.stood_s("HELD"),
         "greatest_deviation_m": comparison.greatest_deviation_m,
         "greatest_beside_route_m": comparison.beside.greatest_m,
-        "travelled_m": comparison.log.poses.length_m,
+        "travelled_m": comparison.log.poses.length_m if len(comparison.log.poses) else None,
         "coverage": None if comparison.acquired is None else _acquired_json(comparison.acquired),
         "stops": [_stop_json(item) for item in comparison.stops],
         "states": [

@@ -19,6 +19,8 @@ from recordings.logs.files import digest_of
 
 SITE = "site"
 """What the mission's own frame is called in a log."""
+AT_EVENTS = "events"
+"""The source of poses that are told with events alone: where the robot stood, and not how it came there."""
 BESIDE = ("-wal", "-shm")
 
 
@@ -81,7 +83,7 @@ def poses_of_events(events: Iterable[AnyEvent]) -> Poses | None:
     if not told:
         return None
     xy = [(pose.x, pose.y) for _, pose in told]
-    return poses_of("events", SITE, [ns for ns, _ in told], xy, [pose.heading for _, pose in told], rank=1)
+    return poses_of(AT_EVENTS, SITE, [ns for ns, _ in told], xy, [pose.heading for _, pose in told], rank=1)
 
 
 def own_log(
@@ -99,7 +101,7 @@ def own_log(
         path=str(path),
         format=form,
         digest=digest_of([path]),
-        messages=len(events) + sum(len(track.ns) for track in poses if track.source != "events"),
+        messages=len(events) + sum(len(track.ns) for track in poses if track.source != AT_EVENTS),
         clock="wall",
         begin_ns=min(times, default=0),
         end_ns=max(times, default=0),

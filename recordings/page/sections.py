@@ -143,7 +143,9 @@ def _tiles(comparison: Comparison) -> Iterator[str]:
         yield _tile("coverage acquired", percent(shares.whole.coverage), planned_text)
     yield _tile("run time", driven, f"planned {duration(comparison.planned_s)}")
     yield _tile("greatest offset at a stop", _millimetres(away), f"tolerance {1000 * tolerance:.0f} mm")
-    yield _tile("off the route, worst", _millimetres(beside), f"{comparison.log.poses.length_m:.1f} m driven")
+    poses = comparison.log.poses
+    driven_m = f"{poses.length_m:.1f} m driven" if len(poses) else "the way is not in the log"
+    yield _tile("off the route, worst", _millimetres(beside), driven_m)
     stood = comparison.stood_s("PAUSED", "HELD")
     yield _tile("stood still", duration(stood), f"paused {paused}, held {held}")
 

@@ -15,7 +15,7 @@ from mission.geometry import FloatArray
 from mission.mavlink.local_frame import is_elsewhere
 from mission.run_log import Alignment, Track
 from recordings.logs.field_log import FieldLog, Poses
-from recordings.logs.own import SITE
+from recordings.logs.own import AT_EVENTS, SITE
 from recordings.replay.fitting import Fit, fitted, turning
 from recordings.replay.standing import standings
 
@@ -25,6 +25,9 @@ FAR_M = 20_000.0
 
 FIRST_NS = 3 * 10**8
 """A robot that halts as soon after a log's beginning has its first pose where it halted, noise apart."""
+
+
+NO_WAY = Track.of((), (), ())
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,11 @@ class PlacedLog:
     """Whether headings were measured; else they are the direction of driving."""
     truth: Track | None = None
     """Where a simulator says the robot was."""
+
+    @property
+    def way(self) -> Track:
+        """The poses that tell how the robot drove; none where it told its poses with events alone."""
+        return NO_WAY if self.source.source == AT_EVENTS else self.track
 
 
 def placed(log: FieldLog, mission: Mission, how: Placing) -> PlacedLog:

@@ -27,7 +27,7 @@ def as_text(replay: Replay) -> str:
     judgement = judged(replay)
     lines = [
         _head(replay.log),
-        f"  poses      {replay.placed.source.source}, {len(replay.run.poses)} of them",
+        f"  poses      {replay.placed.source.source}, {len(replay.placed.track)} of them",
         f"  placed     {alignment_text(replay.run.alignment)}",
         *(f"  note       {line}" for line in notes_of(replay)),
         "",
@@ -79,6 +79,8 @@ def truth_lines(replay: Replay) -> list[str]:
 
 def way_lines(replay: Replay) -> list[str]:
     way = way_of(replay)
+    if way.driven_m is None or way.extra_m is None:
+        return [f"  way        not in the log; {way.planned_m:.1f} m planned to the last stop visited"]
     lines = [
         f"  way        {way.driven_m:.1f} m driven, {way.planned_m:.1f} m planned to the last stop visited "
         f"({way.extra_m:+.1f} m)"
@@ -142,7 +144,7 @@ def as_json(replay: Replay) -> dict[str, Any]:
         "sha256": replay.log.digest,
         "lost": replay.log.lost,
         "notes": list(notes_of(replay)),
-        "poses": {"source": replay.placed.source.source, "count": len(replay.run.poses)},
+        "poses": {"source": replay.placed.source.source, "count": len(replay.placed.track)},
         "alignment": None if alignment is None else vars(alignment),
         "inferred": replay.inferred,
         "answer": judgement.answer,

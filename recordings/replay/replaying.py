@@ -22,7 +22,8 @@ from recordings.replay.inferring import events_of
 from recordings.replay.log_placing import PlacedLog, Placing, placed
 from recordings.replay.matching import Match, matched, reaches
 from recordings.replay.replayed import Replay
-from recordings.replay.standing import standings
+from recordings.replay.standing import Standing, standings
+from recordings.replay.told_visits import told_visits
 from recordings.replay.uploaded import differences_of
 
 NEAR_ROUTE_M = 2.0
@@ -41,9 +42,10 @@ def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight
         When `--align stops` finds no placing, or several.
     """
     laid = placed(log, mission, how)
-    matches = _matches(laid, mission)
     offset = laid.alignment.time_offset_ns
     events = _own_events(log, mission, offset)
+    halts = _halts(laid, mission)
+    matches = told_visits(events, mission, halts) if events else matched(halts, mission, laid.track)
     _must_belong(log, laid.track, mission, matches, how)
     remarks = [replace(remark, ns=remark.ns + offset) for remark in log.remarks]
     told = events or _inferred(log, laid, mission, matches, remarks)
@@ -53,7 +55,7 @@ def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight
         mission_id=mission.id,
         revision=told[-1].revision if told else mission.revision,
         source=_source(log, laid),
-        poses=laid.track,
+        poses=laid.way,
         events=told,
         alignment=laid.alignment,
     )
@@ -69,9 +71,9 @@ def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight
     )
 
 
-def _matches(laid: PlacedLog, mission: Mission) -> tuple[Match, ...]:
-    halts = standings(laid.track, speed=mission.robot.speed, turns=laid.turns)
-    return matched(halts, mission, laid.track)
+def _halts(laid: PlacedLog, mission: Mission) -> tuple[Standing, ...]:
+    """Where the robot stood, as its poses between the stops show."""
+    return standings(laid.way, speed=mission.robot.speed, turns=laid.turns)
 
 
 def _inferred(

@@ -22,7 +22,8 @@ SMOOTHED_S = 0.5
 class Way:
     """The way driven, in metres; distances beside the route are positive to its left."""
 
-    driven_m: float
+    driven_m: float | None
+    """None where the log has no poses between the stops; so are all below but the next."""
     planned_m: float
     """Of the legs up to the last stop that was visited, and of the return if all were."""
     mean_m: float | None
@@ -35,8 +36,8 @@ class Way:
     """When it was that far, in seconds since the run began."""
 
     @property
-    def extra_m(self) -> float:
-        return self.driven_m - self.planned_m
+    def extra_m(self) -> float | None:
+        return None if self.driven_m is None else self.driven_m - self.planned_m
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def way_of(replay: Replay) -> Way:
     when = None if at is None else float(replay.run.seconds([beside.ns[at]])[0])
     told = bool(len(metres))
     return Way(
-        driven_m=way_track(replay.run.poses, replay.matches).length_m,
+        driven_m=way_track(replay.run.poses, replay.matches).length_m if len(replay.run.poses) else None,
         planned_m=_planned_m(replay.mission, replay.matches),
         mean_m=float(metres.mean()) if told else None,
         rms_m=float(np.sqrt((metres**2).mean())) if told else None,
@@ -69,17 +70,25 @@ def way_of(replay: Replay) -> Way:
 
 def way_track(track: Track, matches: tuple[Match, ...]) -> Track:
     """The way without its noise: means of half a second, and of each halt the place where the robot stood."""
+    if not len(track):
+        return track
     halts = [match.standing for match in matches]
     moving = np.ones(len(track), bool)
     for halt in halts:
         moving &= (track.ns < halt.begin_ns) | (track.ns > halt.end_ns)
     rows = [(ns, halt.x, halt.y, halt.heading) for halt in halts for ns in (halt.begin_ns, halt.end_ns)]
+    rows += [_row(track, k) for k in (0, -1) if moving[k]]  # a mean lies behind where the way begins
     stood = np.array([row[1:] for row in rows]).reshape(-1, 3)
     ns, means = _means(track.ns[moving], track.xy[moving], np.unwrap(track.heading)[moving])
     all_ns = np.concatenate([ns, np.array([row[0] for row in rows], np.int64)])
     return Track.of(
         all_ns, np.concatenate([means[:, :2], stood[:, :2]]), np.concatenate([means[:, 2], stood[:, 2]])
     )
+
+
+def _row(track: Track, index: int) -> tuple[int, float, float, float]:
+    x, y = track.xy[index].tolist()
+    return int(track.ns[index]), x, y, float(track.heading[index])
 
 
 def _means(ns: IntArray, xy: FloatArray, heading: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -1,0 +1,84 @@
+"""Runs of a simulated robot with everything going wrong: each figure of their reports is the simulator's."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from mission.comparing.compare import arriving
+from mission.comparison import StopComparison
+from mission.document import Stop
+from recordings.logs import read_log
+from recordings.replay.log_placing import Placing
+from recordings.replay.replayed import Replay
+from recordings.replay.replaying import replay
+from recordings.replay.way_and_time import way_of
+from tests.faults.sizes import size
+from tests.recordings.replay.driving import wandering
+from tests.recordings.replay.witnessed import Witness, run_of, troubles_of
+
+SEEDS = range(size(short=3, full=40))
+NS = 2e-9
+UM = 1e-6
+SHAKEN = 300
+"""There and back, as long as a robot shakes; the way driven is without that."""
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_journal_and_a_recording_tell_the_truth_of_each_stop(tmp_path: Path, seed: int) -> None:
+    mission = wandering(seed, stops=4, scan_s=8.0)
+    witness = run_of(mission, troubles_of(seed, mission), tmp_path, seed=seed)
+    for name in ("journal.sqlite", "field.rrd"):  # the last one has the way
+        told = replay(read_log(tmp_path / name), mission, Placing())
+        for stop, item in zip(mission.stops, told.comparison.asked, strict=True):
+            _is_true_of_stop(witness, stop, item)
+        _is_true_of_run(witness, told)
+    _is_true_of_way(witness, told)
+
+
+def _is_true_of_stop(witness: Witness, stop: Stop, told: StopComparison) -> None:
+    arrivals, shots = witness.arrivals(stop), witness.shots_at(stop)
+    good = [shot for shot in shots if shot.good]
+    assert (told.outcome == "scanned") == bool(good), told
+    assert told.tries == len(shots)
+    first = witness.seconds(arrivals[0][0]) if arrivals else None
+    assert told.arrived_s == pytest.approx(first, abs=NS)
+    if not arrivals:
+        assert told.deviation_m is None
+        return
+    pose = good[-1].pose if good else arrivals[-1][1]
+    near = UM if good else UM + 2 * witness.shakes_m
+    x, y, ahead = pose.x - stop.x, pose.y - stop.y, arriving(stop)
+    assert told.along_m == pytest.approx(x * math.cos(ahead) + y * math.sin(ahead), abs=near)
+    assert told.across_m == pytest.approx(y * math.cos(ahead) - x * math.sin(ahead), abs=near)
+    assert told.deviation_m == pytest.approx(math.hypot(x, y), abs=near)
+    assert told.heading_rad == pytest.approx(math.remainder(pose.heading - stop.heading, math.tau), abs=UM)
+
+
+def _is_true_of_run(witness: Witness, told: Replay) -> None:
+    comparison = told.comparison
+    assert comparison.driven_s == pytest.approx(witness.seconds(witness.ended_ns), abs=NS)
+    assert comparison.stood_s("PAUSED") == pytest.approx(witness.stood_s("pause"), abs=NS)
+    assert comparison.stood_s("HELD") == pytest.approx(witness.stood_s("held"), abs=NS)
+    for number, stop in enumerate(told.mission.stops):
+        shots, visits = witness.shots_at(stop), told.at(number)
+        assert len(visits) == bool(witness.arrivals(stop))
+        if shots and shots[-1].good:
+            halt = visits[0].standing
+            assert (halt.begin_ns, halt.end_ns) == (witness.arrivals(stop)[0][0], shots[-1].end_ns)
+
+
+def _is_true_of_way(witness: Witness, told: Replay) -> None:
+    """The way and the halts beside it, from poses of which those that hardly differ were left out."""
+    way, travelled = way_of(told), told.comparison.log.poses.length_m
+    assert travelled == pytest.approx(witness.length_m, rel=0.002, abs=0.02 + SHAKEN * witness.shakes_m)
+    assert way.driven_m == pytest.approx(witness.length_m, rel=0.005, abs=0.02 + SHAKEN * witness.shakes_m)
+    visits = [match.standing for match in told.matches if match.how == "visit"]
+    rests = [
+        rest for rest in witness.rests(least_s=3.5)
+        if not any(rest[0] <= one.end_ns and one.begin_ns <= rest[1] for one in visits)
+    ]  # fmt: skip
+    extra = [match.standing for match in told.extra if match.standing.seconds >= 3.5]
+    assert [halt.seconds for halt in extra] == pytest.approx([(b - a) / 1e9 for a, b in rests], abs=2.0)
