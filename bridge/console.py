@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from mission.errors import AnswerIsNo
+from mission.errors import AnswerIsNo, OutcomeUnknown
 from mission.table import printable, printable_lines
 
 if TYPE_CHECKING:
@@ -76,6 +76,24 @@ def refusals_in(as_json: bool) -> Iterator[None]:
         if as_json:
             print_json({"outcome": "refused", "reason": no.reason, "message": str(no)})
         raise
+
+
+@contextmanager
+def carried_out(what: str) -> Iterator[None]:
+    """Tells of what a robot has done; where that cannot be told, nobody may believe that nothing was sent.
+
+    Raises
+    ------
+    OutcomeUnknown
+        If the output takes no more.
+    """
+    try:
+        yield
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OutcomeUnknown(f"{what}, and could not be told: output: {error.strerror}") from None
 
 
 def print_json(document: dict[str, Any]) -> None:

@@ -216,7 +216,7 @@ def export(
 
     Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
     """
-    from mission.files.atomic import write_checked
+    from mission.files.atomic import must_not_replace, write_checked
     from mission.files.exports import check_uses, exported, form_of, format_named
     from mission.files.exports.placing import moved, placed
     from mission.files.mission_json import read
@@ -230,20 +230,13 @@ def export(
     writing = {"autopilot": autopilot, "trigger": trigger, "scan-wait": scan_wait, "settle": settle}
     drawn = {"floor": floor, "coverage": coverage}
     check_uses(name, {**drawn, **writing, "origin": origin, "map": map_})
-    _keep(out, {"the mission": mission, "the floor": floor, "the coverage": coverage})
+    must_not_replace(out, mission, floor, coverage)
     supplements = _supplements(document, floor, coverage, writing)
     data = exported(there, name, supplements)
     write_checked(out, data)
     notes = (*moved(document, there), *form_of(name).notes(there, supplements))
     report = {"mission": str(mission), "file": str(out), "format": name, "stops": len(there.stops)}
     _say_export({**report, "bytes": len(data), "notes": notes}, form_of(name).title, as_json)
-
-
-def _keep(out: Path, read_from: dict[str, Path | None]) -> None:
-    """Refuse to write over what is exported from."""
-    for what, path in read_from.items():
-        if path is not None and path.exists() and out.exists() and out.samefile(path):
-            raise InputError(f"{out}: is {what} itself; choose another file for the export")
 
 
 def _supplements(

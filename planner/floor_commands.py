@@ -42,13 +42,15 @@ def floors_command(
 
     Exit code 1: no floor can be made of it as it is; the last line says why, and the way out.
     """
-    from mission.files.atomic import write_atomic
+    from mission.files.atomic import must_not_replace, write_atomic
     from mission.settings import read_settings
     from mission.table import printable_lines
     from planner.floors import options_of, survey_floor
     from planner.floors.layer_map import layer_map
     from planner.options import values_of
 
+    for out in (svg, write_map):
+        must_not_replace(out, file)
     options = options_of(read_settings(None, values_of(given)))
     found = survey_floor(file, options)
     if svg is not None:
@@ -70,7 +72,7 @@ def convert_command(
     **given: Any,
 ) -> int:
     """Write a floor as a layered DXF in metres, which plans to the same stops and may be drawn on before."""
-    from mission.files.atomic import write_atomic
+    from mission.files.atomic import must_not_replace, write_atomic
     from mission.files.layered_dxf import layered_dxf
     from mission.settings import read_settings
     from planner.floors import options_of, read_floor
@@ -78,6 +80,7 @@ def convert_command(
 
     if out.suffix.lower() != ".dxf":
         raise InputError(f"{out}: must end in .dxf")
+    must_not_replace(out, file)
     floor = read_floor(file, options_of(read_settings(None, values_of(given))))
     write_atomic(out, layered_dxf(floor))
     lost = list(_not_in_a_drawing(floor))

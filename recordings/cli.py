@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mission.errors import InputError
-from mission.files.atomic import must_be_writable
+from mission.files.atomic import must_be_writable, must_not_replace
 
 if TYPE_CHECKING:
     from mission.document import Mission
@@ -64,9 +64,11 @@ def review(
     Given together, a run is set beside its plan: what its scans really saw is recomputed. Exit code 1: less
     was seen than the plan was asked for; 3: it is not known; 2: a file cannot be read.
     """
+    from mission.files.atomic import must_not_replace
     from mission.table import printable, printable_lines
     from recordings.review import review as read
 
+    must_not_replace(html, *recordings)
     found = read(recordings)
     if html is not None and found.recordings:
         from mission.files.atomic import write_atomic
@@ -199,6 +201,7 @@ def replay(
     for path in (out, csv, top_up, html):
         if path is not None:
             must_be_writable(path)
+            must_not_replace(path, *logs, mission, floor)
     if csv is not None and len(read) > 1:
         raise InputError("--csv: is a table of one log; give one log")
     driven = _mission(mission, read)

@@ -21,9 +21,10 @@ from bridge.commands.connection import (
     with_connection,
 )
 from bridge.commands.order_commands import Json, TakeOver
-from bridge.console import Bar, print_json, refusals_in, say, tell
+from bridge.console import Bar, carried_out, print_json, refusals_in, say, tell
 
 if TYPE_CHECKING:
+    from bridge.link.protocol import Accepted
     from mission.document import Mission, Transform
 
 PushTimeout = Annotated[
@@ -118,6 +119,11 @@ def push_over_zenoh(document: Mission, connection: Connection, *, take_over: boo
         accepted = station.push(document, progress=bar.show, take_over=take_over)
     if told:
         say(told)
+    with carried_out(f"{robot}: the mission is stored"):
+        _report_accepted(robot, document, accepted, json_)
+
+
+def _report_accepted(robot: str, document: Mission, accepted: Accepted, json_: bool) -> None:
     if json_:
         print_json({"robot": robot, "mission_id": accepted.mission_id, "revision": accepted.revision,
                     "digest": accepted.digest, "already": accepted.already,

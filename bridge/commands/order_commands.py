@@ -28,7 +28,7 @@ from bridge.commands.connection import (
     with_connection,
     with_presets,
 )
-from bridge.console import print_json, refusals_in, tell
+from bridge.console import carried_out, print_json, refusals_in, tell
 
 if TYPE_CHECKING:
     from bridge.station.roster import LastSeen
@@ -237,11 +237,12 @@ def status_json(report: StateReport) -> dict[str, Any]:
 
 
 def report_answer(answer: Answer, robot: str, json_: bool) -> None:
-    if json_:
-        print_json({"robot": robot, "verb": answer.verb, "outcome": answer.outcome,
-                    "run_id": answer.run_id, "state": answer.state})  # fmt: skip
-    else:
-        tell(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
+    with carried_out(f"{robot}: {answer.verb} was carried out"):
+        if json_:
+            print_json({"robot": robot, "verb": answer.verb, "outcome": answer.outcome,
+                        "run_id": answer.run_id, "state": answer.state})  # fmt: skip
+        else:
+            tell(f"{robot}: {answer.verb} ok; {answer.state}, run {answer.run_id}")
 
 
 def state_line(report: StateReport) -> str:

@@ -86,6 +86,19 @@ def must_be_writable(path: Path) -> None:
     _try_beside(path)
 
 
+def must_not_replace(out: Path | None, *inputs: Path | None) -> None:
+    """Refuse to write over what is read.
+
+    Raises
+    ------
+    InputError
+        Naming the file.
+    """
+    for path in inputs:
+        if out is not None and path is not None and out.exists() and path.exists() and out.samefile(path):
+            raise InputError(f"{out}: is read, and would be written over; choose another file")
+
+
 def _try_beside(path: Path) -> None:
     """Make a file beside `path` and take it away: what is allowed does not tell what is possible."""
     try:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from mission.__main__ import main
 from mission.errors import InputError
 from mission.files import atomic
 from mission.files.atomic import replacing, write_atomic
@@ -84,3 +85,22 @@ def test_if_one_of_them_finds_no_room_none_changes(tmp_path: Path) -> None:
         second.write_bytes(bytes(101))
     assert os.listdir(tmp_path) == ["a"]
     assert (tmp_path / "a").read_bytes() == b"old"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["floors", "office.dxf", "--svg", "office.dxf"],
+        ["floors", "office.dxf", "--write-map", "./office.dxf"],
+        ["convert", "office.dxf", "-o", "office.dxf"],
+        ["review", "office.dxf", "--html", "office.dxf"],
+    ],
+)
+def test_what_is_read_is_never_written_over(
+    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("office.dxf").write_text("a drawing")
+    assert main(command) == 2
+    assert "is read, and would be written over" in capsys.readouterr().err
+    assert Path("office.dxf").read_text() == "a drawing"

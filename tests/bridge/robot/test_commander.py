@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from bridge.console import refusals_in
+from bridge.console import carried_out, refusals_in, tell
 from bridge.link.link import Link
 from bridge.link.protocol import encode
-from mission.errors import AnswerIsNo
+from mission.errors import AnswerIsNo, OutcomeUnknown
 from mission.events import STOPS_LISTED, TakenOver
 from mission.run.lease import LEASE_S, Lease, claimed
 from mission.run.orders import Refused, Verb
@@ -229,3 +232,19 @@ def test_watching_writes_the_lease_down_twice_a_minute() -> None:
     field.journal.edge = written.append
     watched(field, "test", seconds=300)
     assert written.count("committed") == 10
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_what_a_robot_has_done_and_cannot_be_told_is_unknown_not_unsent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        with (
+            pytest.raises(OutcomeUnknown, match="start was carried out"),
+            carried_out("start was carried out"),
+        ):
+            tell("r1: start ok")
+        monkeypatch.undo()
+        with contextlib.suppress(OSError):
+            full.close()

@@ -112,7 +112,7 @@ def test_the_mission_itself_is_never_overwritten(path: str, capsys: Captured) ->
     before = Path(path).read_bytes()
     code, _, err = exit_of([path, "-o", path, "--to", "csv"], capsys)
     assert code == 2
-    assert "is the mission itself" in err
+    assert "is read, and would be written over" in err
     assert Path(path).read_bytes() == before
 
 
@@ -127,7 +127,7 @@ def test_neither_floor_nor_coverage_is_overwritten(
     for out in (name, "link"):
         code, _, err = exit_of([*arguments, "-o", str(tmp_path / out)], capsys)
         assert code == 2
-        assert "itself; choose another file for the export" in err
+        assert "would be written over; choose another file" in err
     assert (tmp_path / name).read_bytes() == b"kept"
 
 
