@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby
+from itertools import accumulate, groupby
 
 from mission.document import Mission
-from mission.events import AnyEvent, Arrived, Pose
+from mission.events import AnyEvent, Arrived, Homing, Pose
 from recordings.replay.matching import HaltKind, Match
 from recordings.replay.standing import Standing
 
@@ -21,12 +21,17 @@ def told_visits(events: Sequence[AnyEvent], mission: Mission, halts: Iterable[St
 
 
 def _visits(events: Sequence[AnyEvent], mission: Mission) -> Iterator[Match]:
-    """From an arrival to the last that is told of the stop before the robot is elsewhere."""
+    """From an arrival to the last that is told of the stop before another one, or before the way home."""
     numbers = {stop.id: k for k, stop in enumerate(mission.stops)}
     known: set[int] = set()
-    of_stops = [event for event in events if getattr(event, "stop", None) in numbers]
-    for stop, told in groupby(of_stops, key=lambda event: str(getattr(event, "stop", ""))):
-        group = list(told)
+    homeward = accumulate(isinstance(event, Homing) for event in events)
+    of_stops = [
+        (str(stop), home, event)
+        for event, home in zip(events, homeward, strict=True)
+        if (stop := getattr(event, "stop", None)) in numbers
+    ]
+    for (stop, _), told in groupby(of_stops, key=lambda item: item[:2]):
+        group = [event for _, _, event in told]
         arrived = next((k for k, event in enumerate(group) if isinstance(event, Arrived)), None)
         if arrived is None:
             continue
