@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from recordings.logs import FieldLog, Reading
     from recordings.replay.log_placing import Align, Placing
     from recordings.replay.replayed import Replay
-    from recordings.review import Review
+    from recordings.review import RecordingReview, Review
 
 
 IMPORTER = "rerun-importer"
@@ -57,6 +57,10 @@ def review(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="MERGED.rrd", help="Write them as one recording.")
     ] = None,
+    png: Annotated[
+        Path | None,
+        typer.Option("--png", metavar="DIR", help="Write a picture of every view, without a screen."),
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Open them together in the Rerun viewer.")] = False,
 ) -> int:
     """Read recordings to their end, and tell what the plan was, and what the runs acquired.
@@ -80,6 +84,10 @@ def review(
         from recordings.merging import merge
 
         merge([item.recording for item in found.recordings], out)
+    if png is not None and found.recordings:
+        from recordings.headless import write_pictures
+
+        write_pictures([item.recording.path for item in _of_one_mission(found, png)], png)
     if json_:
         told = [item.as_json() for item in found.recordings]
         alone = len(told) == 1 and not found.faults
@@ -94,6 +102,16 @@ def review(
 
         open_viewer([item.recording.path for item in found.recordings])
     return found.check_code if check else found.exit_code
+
+
+def _of_one_mission(found: Review, folder: Path) -> tuple[RecordingReview, ...]:
+    ids = sorted({item.recording.mission_id for item in found.recordings})
+    if len(ids) > 1:
+        raise InputError(
+            f"{folder}: views show one mission; these are of {len(ids)}: {', '.join(ids)}; "
+            "name the recordings of one"
+        )
+    return found.recordings
 
 
 def runs(
