@@ -22,6 +22,8 @@ from tests.recordings.replay.witnessed import Witness, run_of, troubles_of
 SEEDS = range(size(short=3, full=40))
 NS = 2e-9
 UM = 1e-6
+THIN_NS = 2e9
+"""A recording keeps a standing robot's pose as seldom."""
 SHAKEN = 300
 """There and back, as long as a robot shakes; the way driven is without that."""
 
@@ -76,9 +78,10 @@ def _is_true_of_way(witness: Witness, told: Replay) -> None:
     assert travelled == pytest.approx(witness.length_m, rel=0.002, abs=0.02 + SHAKEN * witness.shakes_m)
     assert way.driven_m == pytest.approx(witness.length_m, rel=0.005, abs=0.02 + SHAKEN * witness.shakes_m)
     visits = [match.standing for match in told.matches if match.how == "visit"]
-    rests = [
-        rest for rest in witness.rests(least_s=3.5)
-        if not any(rest[0] <= one.end_ns and one.begin_ns <= rest[1] for one in visits)
-    ]  # fmt: skip
-    extra = [match.standing for match in told.extra if match.standing.seconds >= 3.5]
-    assert [halt.seconds for halt in extra] == pytest.approx([(b - a) / 1e9 for a, b in rests], abs=2.0)
+    halts = [(match.standing.begin_ns, match.standing.end_ns) for match in told.extra]
+    for rest in witness.rests(least_s=6.0):
+        at_stop = any(rest[0] <= one.end_ns and one.begin_ns <= rest[1] for one in visits)
+        assert at_stop or any(rest == pytest.approx(halt, abs=THIN_NS, rel=0) for halt in halts)
+    rests = witness.rests(least_s=1.0)
+    for halt in halts:
+        assert any(halt == pytest.approx(rest, abs=THIN_NS, rel=0) for rest in rests)

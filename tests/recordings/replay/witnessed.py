@@ -116,10 +116,13 @@ class Witness:
         return found
 
     def rests(self, *, least_s: float) -> list[tuple[int, int]]:
-        """When the robot did not move at all for so long."""
-        rows = self.rows
-        cuts = [0, *(k for k in range(1, len(rows)) if rows[k][1:] != rows[k - 1][1:]), len(rows)]
-        spans = [(rows[a][0], rows[b - 1][0]) for a, b in pairwise(cuts)]
+        """When the robot was where it was for so long, but for what it shook."""
+        spans, first = [], self.rows[0]
+        for before, row in pairwise([*self.rows, (self.rows[-1][0], math.inf, 0.0, 0.0)]):
+            shaken = math.dist(first[1:3], row[1:3]) <= 2 * self.shakes_m and first[3] == row[3]
+            if not shaken:
+                spans.append((first[0], before[0]))
+                first = row
         return [span for span in spans if span[1] - span[0] >= least_s * 1e9]
 
     def shots_at(self, stop: Stop) -> list[Shot]:
