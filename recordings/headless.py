@@ -19,6 +19,7 @@ from rerun.experimental import ViewerClient
 from mission.errors import InputError
 from mission.files.atomic import write_atomic
 from mission.files.file_name import file_name
+from recordings import entities
 from recordings.compact import VIEWER
 
 PATIENCE_S = 120.0
@@ -152,9 +153,22 @@ def _pictures(client: ViewerClient, folder: Path) -> Iterator[tuple[str, bytes]]
             client.set_blueprint(parts, of="recording")
             time.sleep(REDRAW_S)
             shown = front
+        name = view_name(parts, f"/{part}") or "view"
+        _go_to_the_end(client, name)
         path = folder / "view.png"
         client.save_screenshot(str(path), part.partition("/")[2])
-        yield view_name(parts, f"/{part}") or "view", path.read_bytes()
+        yield name, path.read_bytes()
+
+
+def _go_to_the_end(client: ViewerClient, name: str) -> None:
+    """Of the timeline that the view's name tells, else of the mission's."""
+    told = re.search(r"\(timeline: (\w+)\)", name)
+    wanted = told[1] if told else entities.MISSION_TIME
+    state = client.get_state()
+    active = next(item for item in state.recordings if item.store_id == state.active_recording)
+    if active.current_timeline != wanted and wanted in {line.name for line in active.timelines}:
+        client.set_time(wanted, play_state="following")
+        time.sleep(REDRAW_S)
 
 
 def _leaves(parts: Blueprint, part: str, front: Front = ()) -> Iterator[tuple[str, Front]]:

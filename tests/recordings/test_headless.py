@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from recordings import headless
+from recordings import headless, palette
 from recordings.headless import has_vulkan
 from tests.called import stopgo
 from tests.recordings import world
@@ -29,6 +29,10 @@ def test_every_view_is_drawn_to_a_file_of_its_own(plan: Path, field: Path, tmp_p
         for path in pictures
     ]
     assert min(colours) > 10, "no picture is empty"
+    sight = next(path for path in pictures if "What-a-candidate-sees" in path.name)
+    pixels = np.asarray(Image.open(sight).convert("RGB")).astype(int)
+    off = np.abs(pixels - palette.EYE[:3]).max(axis=2)
+    assert (off < 40).sum() > 20, "drawn where its timeline ends: the candidate is there"
 
 
 def test_without_a_driver_it_says_which_to_install(
