@@ -36,6 +36,8 @@ from mission.run.scans import ScanFailed, ScanResult
 from mission.run.states import Change, Run
 
 SETTLE_SAMPLE_S = 0.1
+FACING_RAD = math.radians(2)
+"""A robot that is turned by more goes on turning; every base stands truer than this."""
 SETTLE_LIMIT_S = 30.0
 """How much longer than `settle_s` a robot may take to stand still."""
 
@@ -334,7 +336,7 @@ class Controller:
         at_stop = run.leg > run.at
         path = ((stop.x, stop.y),) if at_stop else way.forward(mission.stops[run.leg].approach, pose)
         outcome = "arrived"
-        if not (at_stop and runs.deviation(pose, stop) <= stop.tolerance_m):
+        if not (at_stop and runs.deviation(pose, stop) <= stop.tolerance_m and _faces(pose, stop)):
             heading = stop.heading if run.leg >= run.at else None
             outcome = self._base.goto(path, heading=heading, limits=mission.robot, interrupt=self._interrupt)
         here = self._base.pose()
@@ -499,6 +501,11 @@ WORK: dict[str, Callable[[Controller, Run, Mission], None]] = {
     "SCANNING": Controller._scan,
     "VERIFYING": Controller._verify,
 }
+
+
+def _faces(pose: Pose, stop: Stop) -> bool:
+    """Whether the robot has turned to the stop's heading; a pause may have ended its turn."""
+    return abs(math.remainder(pose.heading - stop.heading, math.tau)) <= FACING_RAD
 
 
 def _label(run: Run, stop: Stop) -> str:

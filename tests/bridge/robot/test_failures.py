@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sqlite3
 from threading import Event
 
@@ -166,6 +167,21 @@ def test_a_robot_carried_off_its_route_is_not_resumed() -> None:
     assert field.order("resume").reason == "off_route"
     field.base.stand_at(Pose(x=1.0, y=0.02, heading=0.0))
     assert field.order("resume").outcome == "ok"
+
+
+def test_a_turn_that_a_pause_ended_is_finished_before_the_scan() -> None:
+    mission = corridor()
+    first = msgspec.structs.replace(mission.stops[0], heading=math.pi / 2)
+    mission = sealed(msgspec.structs.replace(mission, stops=(first, *mission.stops[1:])))
+    field = started(mission, Fault("slip", 1, 0.2))
+    field.work_until(lambda run: run.leg > run.at)
+    run_s = (field.clock.now_ns() - field.controller.run.started_ns) / 1e9
+    field.clock.at(run_s + 1.0, lambda: field.order("pause"))
+    field.work()
+    assert 0.1 < field.base.pose().heading < 1.4
+    field.order("resume")
+    field.work_until(lambda run: run.stop_state == "SCANNING")
+    assert abs(field.base.pose().heading - math.pi / 2) < 1e-3
 
 
 def test_home_while_paused_drives_home() -> None:
