@@ -238,7 +238,7 @@ def test_a_link_is_closed_when_the_robots_certificate_ends(site: Path, tmp_path:
         end_robot(robot)
 
 
-def test_a_viewer_that_forges_is_not_heard_and_a_forged_name_is_not_believed(
+def test_a_viewer_that_orders_is_refused_and_a_forged_name_is_not_believed(
     site: Path, tmp_path: Path
 ) -> None:
     keys = KeyExpressions("r1")
@@ -249,10 +249,13 @@ def test_a_viewer_that_forges_is_not_heard_and_a_forged_name_is_not_believed(
         key = keys.command("start")
         vera = read_keys(site / "site" / "vera", now=NOW)
         with connecting(endpoint, Guard(vera)) as link:
-            assert link.ask(key, encode(order), timeout_s=1) is None
+            Station(link, keys, commander="vera").reach(endpoint)
+            refused = link.ask(key, encode(order), timeout_s=2)
         with connect(endpoint, robot="r1", keys=site / "site" / "bob") as other:
             forged = other.link.ask(key, encode(order), timeout_s=1)
             assert other.status().state == "READY"
+    assert refused is not None
+    assert "vera is a viewer" in msgspec.json.decode(refused, type=Reply).messages[0]
     assert forged is not None
     assert "signed by bob, not by alice" in msgspec.json.decode(forged, type=Reply).messages[0]
 
