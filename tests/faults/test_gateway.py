@@ -21,7 +21,7 @@ from tests.bridge.mavlink.driving.world import Operator, Rover, rover, site_miss
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.faults.sizes import size
 
-SEEDS = range(size(short=5, full=40))
+SEEDS = range(size(short=2, full=40))
 AWAY = 60
 """Poses told while the line is cut or the vehicle is off: three seconds."""
 

@@ -258,7 +258,7 @@ def count(outcomes: list[Outcome]) -> None:
 
 
 def test_kills_of_the_robot_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:
-    count([trial(seed, tmp_path / str(seed)) for seed in range(size(short=3, full=300))])
+    count([trial(seed, tmp_path / str(seed)) for seed in range(size(short=2, full=300))])
 
 
 def test_kills_of_a_robot_with_keys_lose_nothing_and_repeat_nothing(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults.sizes import FULL
+from tests.faults.sizes import FULL, some
 
 STOPS = ("s1", "s2", "s3")
 EVENTS = [f"{what} {stop}" for stop in STOPS for what in ("Arrived", "Settled", "Scanned")]
@@ -33,7 +33,7 @@ LINES = {
 
 
 @pytest.mark.skipif(not (shutil.which("unshare") and shutil.which("ip")), reason="needs unshare and ip")
-@pytest.mark.parametrize("line", LINES)
+@pytest.mark.parametrize("line", some([*LINES], every=2))
 def test_a_whole_mission_over_a_line_that_loses_delays_and_reorders_packets(
     tmp_path: Path, line: str
 ) -> None:

@@ -15,6 +15,7 @@ from mission.errors import AnswerIsNo, InputError, StopgoError
 from mission.floor import Element, FloorPlan, Opening
 from mission.geometry import Polygon, frozen
 from mission.settings import Settings
+from tests.faults.sizes import size
 from tests.planner.checks import check_plan
 from tests.planner.worlds import (
     box,
@@ -326,7 +327,12 @@ def plan_or_refuse(floor: FloorPlan, chosen: Settings) -> Any:
         return None
 
 
-@settings(max_examples=30, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(
+    max_examples=size(short=20, full=200),
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=list(HealthCheck),
+)
 @given(floors(), options())
 def test_a_random_floor_is_planned_well_or_refused(floor: FloorPlan, chosen: Settings) -> None:
     plan_or_refuse(floor, chosen)

@@ -21,6 +21,7 @@ from planner.routing.tour import (
     trials,
 )
 from planner.routing.tour_bound import one_tree, one_tree_bound, useful_edges
+from tests.faults.sizes import size
 
 
 def scattered(n: int, seed: int) -> np.ndarray:
@@ -89,7 +90,7 @@ def test_points_at_the_same_place_are_visited_after_each_other() -> None:
     assert length_of(nanometres(lengths), shortest_tour(lengths, seed=1)) == 10_000_000_000
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", range(size(short=1, full=2)))
 def test_two_hundred_points_are_within_one_percent_of_the_shortest_known(seed: int) -> None:
     lengths = scattered(200, seed)
     cost = nanometres(lengths)
