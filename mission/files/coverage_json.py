@@ -43,6 +43,8 @@ class CoverageCounts(msgspec.Struct, frozen=True):
 class CoverageElement(CoverageCounts, frozen=True):
     id: str
     segments: tuple[CoverageSegment, ...]
+    global_id: str | None = None
+    """Of the element in the building's model."""
 
 
 class CoverageOf(msgspec.Struct, frozen=True):

@@ -64,14 +64,27 @@ def _legs(mission: Mission, origin: SiteOrigin) -> Iterator[Feature]:
 
 
 def _coverage(supplements: Supplements, origin: SiteOrigin) -> Iterator[Feature]:
-    if supplements.coverage is not None:
-        yield _many(supplements.coverage.seen, "seen", origin)
-        yield _many(supplements.coverage.unseen, "not_seen", origin)
+    found = supplements.coverage
+    if found is not None:
+        yield from _by_element(found.seen, found.seen_of, "seen", origin)
+        yield from _by_element(found.unseen, found.unseen_of, "not_seen", origin)
 
 
-def _many(stretches: FloatArray, kind: str, origin: SiteOrigin) -> Feature:
+def _by_element(
+    stretches: FloatArray, elements: Sequence[str], kind: str, origin: SiteOrigin
+) -> Iterator[Feature]:
+    """One feature of all stretches, or one for each element of the model that they are of."""
+    if not any(elements):
+        yield _many(stretches, {"kind": kind}, origin)
+        return
+    for element in sorted(set(elements)):
+        mine = stretches[[of == element for of in elements]]
+        yield _many(mine, {"kind": kind, "global_id": element or None}, origin)
+
+
+def _many(stretches: FloatArray, told: dict[str, Any], origin: SiteOrigin) -> Feature:
     lines = [line for stretch in stretches.tolist() for line in _lines(stretch, origin)]
-    return _feature({"type": "MultiLineString", "coordinates": lines}, {"kind": kind})
+    return _feature({"type": "MultiLineString", "coordinates": lines}, told)
 
 
 def _line(leg: Sequence[Point], origin: SiteOrigin) -> dict[str, Any]:

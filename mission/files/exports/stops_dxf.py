@@ -31,6 +31,9 @@ STOPS, ROUTE, SEEN, UNSEEN = "SCAN_STOPS", "SCAN_ROUTE", "SCAN_COVERAGE", "SCAN_
 LAYERS = {STOPS: (6, 30), ROUTE: (5, 35), SEEN: (3, 50), UNSEEN: (1, 50)}
 """Colour (AutoCAD's index) and line weight (hundredths of a millimetre) of each layer."""
 
+MODEL = "IFC"
+"""Names the data of a line that hold the GlobalId of its element."""
+
 BROKEN_DRAWING = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
 """What ezdxf raises where a drawing it read does not hold what it trusts in."""
 
@@ -45,9 +48,13 @@ def write(mission: Mission, supplements: Supplements) -> bytes:
     drawing, size = _paper(supplements)
     _make_layers(drawing)
     space = drawing.modelspace()
-    for stretches, layer in _stretches(supplements):
-        for a, b in stretches:
-            space.add_line(_at(a, size), _at(b, size), dxfattribs={"layer": layer})
+    found = supplements.coverage
+    if found is not None and any((*found.seen_of, *found.unseen_of)) and MODEL not in drawing.appids:
+        drawing.appids.add(MODEL)
+    for (a, b), layer, element in _stretches(supplements):
+        line = space.add_line(_at(a, size), _at(b, size), dxfattribs={"layer": layer})
+        if element:
+            line.set_xdata(MODEL, [(1000, element)])
     _draw_route(drawing, mission, size)
     _draw_stops(drawing, mission, size)
     return _written(drawing)[0]
@@ -103,10 +110,16 @@ def _make_layers(drawing: Drawing) -> None:
         drawing.layers.add(name, color=colour, lineweight=weight)
 
 
-def _stretches(supplements: Supplements) -> Iterator[tuple[list[list[Point]], str]]:
-    if supplements.coverage is not None:
-        yield supplements.coverage.seen.tolist(), SEEN
-        yield supplements.coverage.unseen.tolist(), UNSEEN
+def _stretches(supplements: Supplements) -> Iterator[tuple[list[Point], str, str]]:
+    """Each stretch with its layer, and the GlobalId of the element that it is of."""
+    found = supplements.coverage
+    if found is not None:
+        for stretches, elements, layer in (
+            (found.seen, found.seen_of, SEEN), (found.unseen, found.unseen_of, UNSEEN),
+        ):  # fmt: skip
+            of = elements or ("",) * len(stretches)
+            for stretch, element in zip(stretches.tolist(), of, strict=True):
+                yield stretch, layer, element
 
 
 def _draw_route(drawing: Drawing, mission: Mission, size: float) -> None:

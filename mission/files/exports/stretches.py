@@ -23,6 +23,9 @@ class Stretches:
 
     seen: FloatArray
     unseen: FloatArray
+    seen_of: tuple[str, ...] = ()
+    """GlobalId of the element that each piece of `seen` is of, or an empty text; none without a model."""
+    unseen_of: tuple[str, ...] = ()
 
 
 def read_stretches(path: Path, mission: Mission) -> Stretches:
@@ -34,11 +37,14 @@ def read_stretches(path: Path, mission: Mission) -> Stretches:
         When the file cannot be read, or tells the coverage of another mission.
     """
     coverage = read_coverage(path, mission)
-    segments = [segment for element in coverage.elements for segment in element.segments]
-    _check_segments(segments, path)
-    seen = [piece for segment in segments for piece in _pieces(segment, segment.seen)]
-    unseen = [piece for segment in segments for piece in _pieces(segment, _between(segment.seen))]
-    return Stretches(*(frozen(pieces).reshape(-1, 2, 2) for pieces in (seen, unseen)))
+    segments = [
+        (segment, element.global_id or "") for element in coverage.elements for segment in element.segments
+    ]
+    _check_segments([segment for segment, _ in segments], path)
+    seen = [(piece, of) for segment, of in segments for piece in _pieces(segment, segment.seen)]
+    unseen = [(piece, of) for segment, of in segments for piece in _pieces(segment, _between(segment.seen))]
+    boundary, rest = (frozen([piece for piece, _ in pieces]).reshape(-1, 2, 2) for pieces in (seen, unseen))
+    return Stretches(boundary, rest, tuple(of for _, of in seen), tuple(of for _, of in unseen))
 
 
 def _check_segments(segments: Sequence[CoverageSegment], path: Path) -> None:

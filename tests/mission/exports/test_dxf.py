@@ -120,6 +120,15 @@ def test_coverage_has_two_layers() -> None:
     ]
 
 
+def test_lines_of_a_models_elements_carry_their_global_ids() -> None:
+    named = Stretches(COVERAGE.seen, COVERAGE.unseen, ("A",), ("A", ""))
+    drawing = opened(exported(square_tour(), "dxf", Supplements(floor=floor(), coverage=named)))
+    lines = [line for line in drawing.query("LINE") if line.dxf.layer in ("SCAN_COVERAGE", "SCAN_NOT_SEEN")]
+    told = [line.get_xdata("IFC")[0].value if line.has_xdata("IFC") else "" for line in lines]
+    assert told == ["A", "A", ""]
+    assert not drawing.audit().errors
+
+
 def tags_of(drawing: Drawing) -> dict[str, list[tuple[int, object]]]:
     """All tags of every entity of the model space, by handle."""
     return {

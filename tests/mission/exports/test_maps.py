@@ -118,3 +118,14 @@ def test_coverage_becomes_two_features() -> None:
     made = features(square_tour(), Supplements(coverage=Stretches(seen, unseen)))[-2:]
     assert [item["properties"]["kind"] for item in made] == ["seen", "not_seen"]
     assert [len(item["geometry"]["coordinates"]) for item in made] == [1, 2]
+
+
+def test_stretches_of_a_models_elements_name_them() -> None:
+    seen, unseen = np.array([[[0.0, 0], [1, 0]]]), np.array([[[1.0, 0], [2, 0]], [[2, 0], [2, 5.0]]])
+    found = Stretches(seen, unseen, ("A",), ("A", "B"))
+    made = [item["properties"] for item in features(square_tour(), Supplements(coverage=found))[-3:]]
+    assert made == [
+        {"kind": "seen", "global_id": "A"},
+        {"kind": "not_seen", "global_id": "A"},
+        {"kind": "not_seen", "global_id": "B"},
+    ]
