@@ -24,9 +24,10 @@ lint: $(STAMP)
 types: $(STAMP)
 	$(BIN)/mypy
 
-# Most tests of links wait for something, so four files at a time are run even on two processors.
+# Most tests of links wait for something, so four files at a time are run even on two processors; in the order of their
+# names, for the longest have the fewest tests and would come last.
 test: lint types
-	$(BIN)/python -m pytest -n 4 --dist loadfile
+	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
 # The long forms (docs/contributing.md): every fault and every sweep at full size, and every table of figures.
 faults: $(STAMP)
