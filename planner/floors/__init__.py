@@ -142,6 +142,8 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def _bytes_of(path: Path) -> bytes:
+    if path.is_char_device() or path.is_block_device():
+        raise InputError(f"{path}: is a device, which may never end; name a file")
     try:
         data = path.read_bytes()
     except FileNotFoundError:

@@ -61,6 +61,11 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
     assert "no such file" in refusal(tmp_path / "missing.dxf")
 
 
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs /dev/zero")
+def test_a_device_is_not_read_without_end() -> None:
+    assert "is a device" in refusal(Path("/dev/zero"))
+
+
 def test_a_directory_is_named(tmp_path: Path) -> None:
     (tmp_path / "folder.dxf").mkdir()
     assert "is a directory" in refusal(tmp_path / "folder.dxf")
