@@ -6,20 +6,17 @@ of application IFC, group 1000.
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mission.files.dxf_bytes import encoded, reproducible
 from mission.floor import FloorPlan, Room
 from mission.geometry import FloatArray, Polygon
 from mission.kinds import KINDS
 from mission.table import printable
 
 if TYPE_CHECKING:
-    from ezdxf.document import Drawing
     from ezdxf.entities import DXFEntity
     from ezdxf.layouts import Modelspace
 
@@ -37,34 +34,13 @@ def layered_dxf(floor: FloorPlan) -> bytes:
     import ezdxf
     import ezdxf.units
 
-    with _fixed_dates():
+    with reproducible():
         drawing = ezdxf.new("R2010", units=ezdxf.units.M)
         drawing.appids.add("IFC")
         for name, colour in COLOURS.items():
             drawing.layers.add(name, color=colour)
         _draw(drawing.modelspace(), floor)
-        return _encoded(drawing)
-
-
-@contextmanager
-def _fixed_dates() -> Iterator[None]:
-    """ezdxf writes dates and random identifiers into a file unless told not to."""
-    import ezdxf
-
-    before = ezdxf.options.write_fixed_meta_data_for_testing
-    ezdxf.options.write_fixed_meta_data_for_testing = True
-    try:
-        yield
-    finally:
-        ezdxf.options.write_fixed_meta_data_for_testing = before
-
-
-def _encoded(drawing: Drawing) -> bytes:
-    drawing.classes.add_required_classes(drawing.dxfversion)
-    drawing.classes.classes = dict(sorted(drawing.classes.classes.items()))  # a set's order is no order
-    text = io.StringIO()
-    drawing.write(text)
-    return text.getvalue().encode("utf-8")
+        return encoded(drawing)
 
 
 def _draw(space: Modelspace, floor: FloorPlan) -> None:

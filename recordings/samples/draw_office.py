@@ -8,16 +8,16 @@ The same bytes come out every time, so that a plan of the sample can be repeated
 from __future__ import annotations
 
 import hashlib
-import io
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 
 import ezdxf
 from ezdxf.document import Drawing
 from ezdxf.enums import TextEntityAlignment
 from ezdxf.layouts import Modelspace
+
+from mission.files.dxf_bytes import encoded, reproducible
 
 Interval = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -104,30 +104,10 @@ OPEN_BOUNDARY = ((16.06, 5.66), (16.06, 7.34))
 
 def draw() -> bytes:
     """The DXF file."""
-    with _fixed_dates():
+    with reproducible():
         drawing = _empty_drawing()
         _draw_all(drawing.modelspace())
-        _sort_classes(drawing)
-        text = io.StringIO()
-        drawing.write(text)
-    return text.getvalue().encode("utf-8")
-
-
-@contextmanager
-def _fixed_dates() -> Iterator[None]:
-    """ezdxf writes dates and random identifiers into a file unless told not to."""
-    before = ezdxf.options.write_fixed_meta_data_for_testing
-    ezdxf.options.write_fixed_meta_data_for_testing = True
-    try:
-        yield
-    finally:
-        ezdxf.options.write_fixed_meta_data_for_testing = before
-
-
-def _sort_classes(drawing: Drawing) -> None:
-    """ezdxf lists the classes of a file in the order of a set, which differs from run to run."""
-    drawing.classes.add_required_classes(drawing.dxfversion)
-    drawing.classes.classes = dict(sorted(drawing.classes.classes.items()))
+        return encoded(drawing)
 
 
 def _empty_drawing() -> Drawing:

@@ -1,0 +1,33 @@
+"""DXF drawings as bytes, the same for the same drawing: ezdxf's dates, identifiers and set orders kept out."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing
+
+
+@contextmanager
+def reproducible() -> Iterator[None]:
+    """ezdxf writes dates and random identifiers into a file unless told not to; drawings are made inside."""
+    import ezdxf
+
+    before = ezdxf.options.write_fixed_meta_data_for_testing
+    ezdxf.options.write_fixed_meta_data_for_testing = True
+    try:
+        yield
+    finally:
+        ezdxf.options.write_fixed_meta_data_for_testing = before
+
+
+def encoded(drawing: Drawing) -> bytes:
+    """The file; ezdxf lists its classes in the order of a set, which differs from run to run."""
+    drawing.classes.add_required_classes(drawing.dxfversion)
+    drawing.classes.classes = dict(sorted(drawing.classes.classes.items()))
+    text = io.StringIO()
+    drawing.write(text)
+    return text.getvalue().encode("utf-8")
