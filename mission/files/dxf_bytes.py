@@ -1,4 +1,4 @@
-"""DXF drawings as bytes, the same for the same drawing: ezdxf's dates, identifiers and set orders kept out."""
+"""DXF drawings as bytes, the same for the same drawing: without ezdxf's dates, identifiers and set orders."""
 
 from __future__ import annotations
 
