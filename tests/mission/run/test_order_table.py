@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mission.run.order_table import PLACES, VERBS, effect, table_text
+from tests.mission.run.order_table import PLACES, VERBS, effect, table_text
 
 PROTOCOL = Path(__file__).parents[3] / "docs" / "reference" / "protocol.md"
 

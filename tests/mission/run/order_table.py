@@ -4,22 +4,11 @@ from __future__ import annotations
 
 from typing import get_args
 
-from mission.document import (
-    Frame,
-    Mission,
-    Origin,
-    Policy,
-    RobotSpec,
-    Scan,
-    ScannerSpec,
-    Sees,
-    Start,
-    Stop,
-)
 from mission.events import Pose
 from mission.run.decision import Decision, Situation, decide
 from mission.run.orders import FREE_VERBS, Order, Verb
 from mission.run.states import DetailedState, Run
+from tests.bridge.world import corridor
 
 VERBS: tuple[Verb, ...] = get_args(Verb)
 PLACES: tuple[DetailedState, ...] = (
@@ -71,25 +60,10 @@ def _run(place: DetailedState) -> Run:
     state, _, homing = place.partition(" ")
     under_way = state not in ("IDLE", "READY")
     return Run(
-        state=state,  # type: ignore[arg-type]
+        state=state,
         mission_id=None if place == "IDLE" else _MISSION.id, revision=None if place == "IDLE" else 1,
         run_id="run" if under_way else None, homing=bool(homing) or state == "HOMING", then="ABORTED",
     )  # fmt: skip
 
 
-def _stop(name: str, x: float) -> Stop:
-    return Stop(
-        id=name, x=x, y=0.0, heading=0.0, doorway=False, tolerance_m=0.05, settle_s=0.0,
-        scan=Scan(profile="default", duration_s=1.0, timeout_s=2.0), on_failure="ask", retries=0,
-        approach=((0.0, 0.0), (x, 0.0)), sees=Sees(units=1, new_units=1),
-    )  # fmt: skip
-
-
-_MISSION = Mission(
-    id="example", revision=1, name="example", digest="", frame=Frame(name="site"), georeference=None,
-    robot=RobotSpec(radius=0.35, speed=0.5, turn_rate=1.0, acceleration=0.5),
-    scanner=ScannerSpec(profile="default", range=5.0), start=Start(x=0.0, y=0.0, heading=0.0, reason="given"),
-    stops=(_stop("s1", 1.0), _stop("s2", 2.0)), return_=None,
-    policy=Policy(link_loss="continue", link_loss_after_s=30.0, battery_min=0.15),
-    origin=Origin(floor="example", floor_digest="", parameters={}, stopgo=""),
-)  # fmt: skip
+_MISSION = corridor(stops=2)
