@@ -148,7 +148,7 @@ def _blaming(who: str) -> Iterator[None]:
         yield
     except StopgoError:
         raise
-    except Exception as error:
+    except Exception as error:  # the code of others may raise anything; here it becomes one line
         raise InputError(f"{who}: {_told(error)}") from error
 
 

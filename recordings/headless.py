@@ -25,6 +25,7 @@ from recordings.compact import VIEWER
 PATIENCE_S = 120.0
 """Of real time: the last net."""
 REDRAW_S = 0.3
+"""A picture taken sooner shows the view as it was: the viewer does not tell when it has drawn."""
 SIZE = "1600x1000"
 DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d")
 """Where Vulkan's loader looks for drivers."""

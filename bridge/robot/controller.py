@@ -20,8 +20,8 @@ from bridge.link.protocol import Commit, Rejected
 from bridge.robot.answers import answer_to, answered, remember_answer, situation_of
 from bridge.robot.base import Base, Rest, Scanner
 from bridge.robot.journal import Journal
-from bridge.robot.owed import Owed
 from bridge.robot.runner import Position
+from bridge.robot.unstored import Unstored
 from mission.document import Mission, Stop
 from mission.events import AnyEvent, Pose
 from mission.files.file_name import file_name
@@ -86,7 +86,7 @@ class Controller:
         self._silent_s = 0.0
         self._mission: Mission | None = None
         self._run = Run()
-        self._owed = Owed()
+        self._unstored = Unstored()
         self._recover()
 
     @property
@@ -139,7 +139,7 @@ class Controller:
     def obey(self, order: Order) -> Answer:
         """Carry out an order once, however often it comes, and remember what was answered."""
         with self._lock:
-            before = self._owed.answered(order) or answered(self._journal, order, self._run)
+            before = self._unstored.answered(order) or answered(self._journal, order, self._run)
             if before is not None:
                 return before
             decision = decide(order, self._situation())
@@ -266,7 +266,7 @@ class Controller:
         """Told how long no station has been heard; the mission's policy may want something of it."""
         with self._lock:
             self._silent_s = silent_s
-            self._store_owed()
+            self._store_late()
             run, mission = self._run, self._mission
             if mission is None or not self._link_is_lost(mission) or run.state != "RUNNING":
                 return
@@ -415,7 +415,7 @@ class Controller:
         change = revision.dropped(change)
         run = change.run
         with self._journal.transaction():
-            self._owed.store(self._journal)
+            self._unstored.store(self._journal)
             self._put(change)
             if run.next_revision is None or run.at <= self._run.at:
                 return run
@@ -436,7 +436,7 @@ class Controller:
 
     def _adopt(self, run: Run, *, ordered: bool = False) -> None:
         """What is stored is now what is; an order interrupts the work, except a scan that may end."""
-        self._owed.clear()
+        self._unstored.clear()
         self._become(run, ordered=ordered)
 
     def _become(self, run: Run, *, ordered: bool) -> None:
@@ -456,7 +456,7 @@ class Controller:
             self._base.stop()
             if not self._run.over:
                 held = runs.held(self._run, reason)
-                self._owed.add(self._told_of(held))
+                self._unstored.add(self._told_of(held))
                 self._become(held.run, ordered=True)
         return Refused("storage", reason)
 
@@ -470,13 +470,13 @@ class Controller:
         if isinstance(decision, Refused):
             return answer
         answer = msgspec.structs.replace(answer, message=f"done; the journal cannot be written yet: {error}")
-        self._owed.add(self._told_of(decision.change), order, answer)
+        self._unstored.add(self._told_of(decision.change), order, answer)
         self._become(decision.change.run, ordered=True)
         return answer
 
-    def _store_owed(self) -> None:
+    def _store_late(self) -> None:
         """Once there is room again; until then the robot stands as it was told to."""
-        if self._owed:
+        if self._unstored:
             with contextlib.suppress(sqlite3.OperationalError):
                 self._keep(Change(self._run))
 

@@ -10,7 +10,7 @@ from mission.events import AnyEvent
 from mission.run.orders import Answer, Order
 
 
-class Owed:
+class Unstored:
     """Events and answers in the order in which they came to be; gone if the power fails before."""
 
     def __init__(self) -> None:
