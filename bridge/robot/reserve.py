@@ -24,7 +24,10 @@ class Reserve:
         if self._path.exists() or self._free() < RESERVE_BYTES + LEAST_FREE_BYTES:
             return
         with contextlib.suppress(OSError), self._path.open("wb") as file:
-            os.posix_fallocate(file.fileno(), 0, RESERVE_BYTES)
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, RESERVE_BYTES)
+            else:  # macOS
+                file.write(bytes(RESERVE_BYTES))
 
     def release_if_needed(self) -> None:
         """Let the space go when the disk is nearly full."""

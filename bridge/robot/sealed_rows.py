@@ -17,6 +17,7 @@ FORMAT = 2
 """Of the journal: 1 had no hashes; a newer one is refused, an older one is brought up to date."""
 SEALED = ("facts", "events", "answers", "missions", "nonces", "transfers", "chunks")
 SLOT_BYTES = 24
+_to_disk = getattr(os, "fdatasync", os.fsync)  # macOS has the second only
 
 
 class DamagedRow(sqlite3.DatabaseError):
@@ -108,7 +109,7 @@ class NewestTransaction:
         """On disk when this returns."""
         value = number.to_bytes(8, "big")
         os.pwrite(self._file, value + seal_of("newest", (number,)), (number % 2) * SLOT_BYTES)
-        os.fdatasync(self._file)
+        _to_disk(self._file)
 
     def read(self) -> int:
         """The number, 0 if none was ever stored.
