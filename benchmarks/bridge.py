@@ -17,11 +17,12 @@ from pathlib import Path
 
 import msgspec
 
-from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.commands.spawn import end_robot, start_robot
 from bridge.link.authority import init_site, issue
 from bridge.link.keys import now_utc
 from bridge.station.station import Station, connect
 from mission.document import Mission, sealed
+from mission.ports import free_port
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor
 

@@ -26,9 +26,9 @@ from bridge.mavlink.transfer.upload import upload
 from mission.errors import StopgoError
 from mission.mavlink.items import ItemList
 from mission.mavlink.read_back import differences, upload_of
+from mission.ports import free_port
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
-from tests.bridge.mavlink.scripted import free_udp_port
 
 DELAY_S = 0.02
 RATES = (0.0, 0.05, 0.1, 0.2, 0.3)
@@ -116,7 +116,7 @@ def told(outcomes: Sequence[Outcome]) -> Row:
 @contextmanager
 def line(profile: str, rate: float, seed: int) -> Iterator[tuple[Url, Url]]:
     """An empty vehicle behind a line that loses, and the same vehicle without the line."""
-    port = free_udp_port()
+    port = free_port()
     with (
         vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES[profile])),
         Lossy(port, Roughness(delay_s=DELAY_S, loss=rate), seed=seed) as rough,

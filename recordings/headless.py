@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import socket
 import subprocess
 import sys
 import time
@@ -19,6 +18,7 @@ from rerun.experimental import ViewerClient
 from mission.errors import InputError
 from mission.files.atomic import write_atomic
 from mission.files.file_name import file_name
+from mission.ports import free_port
 from recordings import entities
 from recordings.compact import VIEWER
 
@@ -84,7 +84,7 @@ def viewer(files: Sequence[Path | str], *, size: str = SIZE) -> Iterator[ViewerC
 
     The files are given on the command line, as a person would: opened later they would not be merged.
     """
-    port = _free_port()
+    port = free_port()
     command = [str(VIEWER), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
     command += ["--window-size", size, *map(str, files)]
     process = subprocess.Popen(
@@ -210,9 +210,3 @@ def _connected(process: subprocess.Popen[bytes], port: int) -> ViewerClient:
 def _settled(client: ViewerClient) -> bool:
     state = client.get_state()
     return not state.loading and state.active_recording is not None
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

@@ -7,7 +7,6 @@ listen on this machine only.
 from __future__ import annotations
 
 import os
-import socket
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -16,6 +15,7 @@ from pathlib import Path
 from mission.document import Mission
 from mission.errors import InputError
 from mission.events import AnyEvent, PoseReport, StateReport
+from mission.ports import free_port
 from recordings.compact import VIEWER
 from recordings.field import FieldRecording
 
@@ -62,7 +62,7 @@ class Viewed:
     def __init__(self, record: FieldRecording, start: Callable[[str], None] = start_viewer) -> None:
         self._record = record
         self._start = start
-        self._port = _free_port()
+        self._port = free_port()
         self._shown = False
 
     def __enter__(self) -> Viewed:
@@ -88,9 +88,3 @@ class Viewed:
 
     def event(self, event: AnyEvent) -> None:
         self._record.event(event)
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.commands.spawn import end_robot, start_robot
 from bridge.station.station import Station, connect
 from mission.document import Scan
 from mission.errors import AnswerIsNo
@@ -20,6 +20,7 @@ from mission.events import PoseReport, Scanned, StateReport
 from tests.bridge.mavlink.driving.world import Operator, Rover, rover, site_mission, until
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.faults.sizes import size
+from tests.ports import free_port
 
 SEEDS = range(size(short=2, full=40))
 AWAY = 60

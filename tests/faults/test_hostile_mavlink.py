@@ -15,9 +15,9 @@ from bridge.mavlink.simulated.vehicle import Setting
 from bridge.mavlink.simulated.vehicle_process import vehicle_on
 from mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.hostile import Hostile
-from tests.bridge.mavlink.scripted import free_udp_port
 from tests.bridge.mavlink.simulated.bench import ACCEPTED, ORIGIN, Bench, delay, waypoint
 from tests.faults.sizes import size
+from tests.ports import free_port
 
 FRAMES = size(short=3000, full=20_000)
 BURST = 100
@@ -60,7 +60,7 @@ def drive(bench: Bench, hostile: Hostile) -> None:
 
 @pytest.mark.parametrize("profile", list(PROFILES))
 def test_a_vehicle_on_the_wire_answers_after_every_burst_of_hostile_datagrams(profile: str) -> None:
-    hostile, port = Hostile(7), free_udp_port()
+    hostile, port = Hostile(7), free_port()
     ask = dialect.MAVLink_command_long_message(
         1, 1, dialect.MAV_CMD_REQUEST_MESSAGE, 0, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0, 0, 0, 0, 0, 0
     )
@@ -77,7 +77,7 @@ def test_a_vehicle_on_the_wire_answers_after_every_burst_of_hostile_datagrams(pr
 
 
 def test_a_vehicle_on_a_stream_answers_whoever_else_talks_nonsense() -> None:
-    hostile, port = Hostile(11), free_udp_port()
+    hostile, port = Hostile(11), free_port()
     ask = dialect.MAVLink_command_long_message(
         1, 1, dialect.MAV_CMD_REQUEST_MESSAGE, 0, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0, 0, 0, 0, 0, 0
     )
@@ -103,7 +103,7 @@ def answered(station: Wire, message: Message) -> bool:
 
 
 def test_a_signing_vehicle_does_nothing_that_a_stranger_says() -> None:
-    hostile, port, key = Hostile(3), free_udp_port(), bytes(32)
+    hostile, port, key = Hostile(3), free_port(), bytes(32)
     with (
         vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES["strict"]), signing_key=key),
         wire(Url("udpout", "127.0.0.1", port), signing_key=key) as station,

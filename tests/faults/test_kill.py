@@ -21,7 +21,7 @@ from typing import TypeVar
 
 import pytest
 
-from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.commands.spawn import end_robot, start_robot
 from bridge.link.authority import init_site, issue
 from bridge.link.keys import now_utc
 from bridge.link.protocol import encode
@@ -33,6 +33,7 @@ from mission.events import Finished, Paused, RevisionTaken, RevisionWaits, Scann
 from mission.run.orders import Order
 from tests.bridge.world import corridor
 from tests.faults.sizes import size
+from tests.ports import free_port
 
 SPEED_UP = 50.0
 ENTRIES = 45

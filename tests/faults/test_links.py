@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.commands.spawn import end_robot, start_robot
 from bridge.link.protocol import KeyExpressions, encode
 from bridge.station.follow import Report
 from bridge.station.station import Station, connect
@@ -19,6 +19,7 @@ from mission.errors import AnswerIsNo, OutcomeUnknown
 from mission.events import Finished, PoseReport, Scanned, StateReport
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor
+from tests.ports import free_port
 
 
 @contextmanager

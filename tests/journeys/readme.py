@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from bridge.commands.spawn import free_port
+from tests.ports import free_port
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from bridge.commands.spawn import free_port
 from mission.files import mission_json
 from recordings.read import check
 from tests.journeys.readme import PRINTED, blocks, commands, robot, run, with_output, workplace
+from tests.ports import free_port
 
 
 @pytest.fixture(scope="module")

@@ -30,8 +30,9 @@ from mission.files.mission_json import write
 from mission.mavlink.translate import translate
 from mission.run.states import started
 from tests.bridge.mavlink.lists import held, stops
-from tests.bridge.mavlink.scripted import Scripted, free_udp_port
+from tests.bridge.mavlink.scripted import Scripted
 from tests.mission.mavlink.following.worlds import tour
+from tests.ports import free_port
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
@@ -65,7 +66,7 @@ def vehicle(
     origin: SiteOrigin | None = None,
     key: bytes | None = None,
 ) -> Iterator[Url]:
-    port = free_udp_port()
+    port = free_port()
     made = VehicleFaults(tuple(read_vehicle_fault(text) for text in faults))
     setting = Setting(PROFILES[profile], origin=origin, faults=made)
     with vehicle_on(Url("udpin", "127.0.0.1", port), setting, signing_key=key):

@@ -17,9 +17,9 @@ from mission.document import Scan
 from mission.events import Finished, Scanned, Unconfirmed
 from mission.files.mission_json import write
 from recordings.carried.reading import read_recording
-from tests.bridge.mavlink.scripted import free_udp_port
 from tests.called import stopgo
 from tests.mission.mavlink.following.worlds import tour
+from tests.ports import free_port
 
 STOPGO = (sys.executable, "-m", "mission")
 KEYS = "robot boot_id state run_id mission_id revision stop done skipped battery"
@@ -29,7 +29,7 @@ class Vehicle:
     """A simulated vehicle's process, and the folder of the station that talks to it."""
 
     def __init__(self, folder: Path) -> None:
-        port = free_udp_port()
+        port = free_port()
         self.url = str(Url("udpout", "127.0.0.1", port))
         self.state = folder / "station"
         self.mission = folder / "mission.json"

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.commands.spawn import end_robot, start_robot
 from bridge.link import authority
 from bridge.link.access import router_access_control
 from bridge.link.authority import init_site, issue, listed, revoke, rotate
@@ -24,6 +24,7 @@ from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreacha
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.station.test_fleet import router
 from tests.bridge.world import corridor
+from tests.ports import free_port
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.commands.spawn import end_robot, start_robot
 from bridge.link import keys as site_keys
 from bridge.link.authority import init_site, issue, listed
 from bridge.link.keys import Certificates, Untrusted, now_utc, read_keys
@@ -27,6 +27,7 @@ from mission.events import PoseReport, Scanned
 from tests.bridge.station.test_fleet import router
 from tests.bridge.world import corridor
 from tests.called import stopgo
+from tests.ports import free_port
 
 NOW = now_utc()
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.commands.spawn import end_robot, free_port, robot_process, start_robot
+from bridge.commands.spawn import end_robot, robot_process, start_robot
 from bridge.link.protocol import PosePage, decode
 from bridge.link.zenoh_link import Guard, check_endpoint
 from bridge.station.follow import Report
@@ -21,6 +21,7 @@ from mission.errors import InputError, RobotUnreachable
 from mission.events import Finished, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor
 from tests.called import stopgo
+from tests.ports import free_port
 
 
 def run_of(reports: list[Report]) -> str:

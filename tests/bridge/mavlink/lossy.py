@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from bridge.mavlink.line.transport import Transport, open_transport
 from bridge.mavlink.line.url import Url
-from tests.bridge.mavlink.scripted import free_udp_port
+from tests.ports import free_port
 
 WAIT_S = 0.05
 
@@ -32,7 +32,7 @@ class Lossy:
 
     def __init__(self, target: int, roughness: Roughness, *, seed: int) -> None:
         self.roughness = roughness
-        self.url = Url("udpout", "127.0.0.1", free_udp_port())
+        self.url = Url("udpout", "127.0.0.1", free_port())
         self._chance = random.Random(seed)
         self._near = open_transport(Url("udpin", "127.0.0.1", self.url.number))
         self._far = open_transport(Url("udpout", "127.0.0.1", target))

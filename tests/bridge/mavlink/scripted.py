@@ -5,7 +5,6 @@ It speaks through our own wire, so that a test is about the uploader; MAVSDK is 
 
 from __future__ import annotations
 
-import socket
 import threading
 import time
 from collections import Counter
@@ -16,15 +15,10 @@ from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import Who, Wire, sender, wire
 from mission.mavlink.telemetry import Message
+from tests.ports import free_port
 
 ASK_AGAIN_S = 0.25
 VEHICLE = Who(1, dialect.MAV_COMP_ID_AUTOPILOT1)
-
-
-def free_udp_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
-        made.bind(("127.0.0.1", 0))
-        return int(made.getsockname()[1])
 
 
 class Scripted:
@@ -50,7 +44,7 @@ class Scripted:
         self.silent = False
         """Neither hears nor says anything, as long as it is set."""
         self._key = signing_key
-        self._port = free_udp_port()
+        self._port = free_port()
         self.url = Url("udpout", "127.0.0.1", self._port)
         self.receiving: list[Message | None] | None = None
         self._source: Who | None = None

@@ -11,12 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from bridge.commands.spawn import end_robot, free_port, start_robot
+from bridge.commands.spawn import end_robot, start_robot
 from bridge.station.station import connect
 from mission.errors import RobotUnreachable
 from mission.events import Finished, PoseReport, Scanned
 from tests.bridge.world import corridor
 from tests.called import stopgo
+from tests.ports import free_port
 
 ROOT = Path(__file__).parents[3]
 

@@ -27,8 +27,8 @@ from mission.mavlink.items import ItemList
 from mission.mavlink.read_back import upload_of
 from mission.mavlink.translate import translate
 from mission.run.states import Run
-from tests.bridge.mavlink.scripted import free_udp_port
 from tests.mission.mavlink.following.worlds import told, tour
+from tests.ports import free_port
 
 SPEED_UP = 5.0
 PATIENCE_S = 60.0
@@ -52,7 +52,7 @@ class Site:
 
     def __post_init__(self) -> None:
         self.sent: ItemList = translate(self.mission, KINDS[self.profile], trigger=self.trigger)
-        self.url = Url("udpout", "127.0.0.1", free_udp_port())
+        self.url = Url("udpout", "127.0.0.1", free_port())
         self.origin = self.origin or self.mission.georeference
         self.load(self.sent)
         with self.book() as book:

@@ -29,7 +29,7 @@ from tests.bridge.mavlink.driving.world import (
     until,
 )
 from tests.bridge.mavlink.lossy import Lossy, Roughness
-from tests.bridge.mavlink.scripted import free_udp_port
+from tests.ports import free_port
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
@@ -338,7 +338,7 @@ def test_home_is_driven_back_along_the_legs(tmp_path: Path) -> None:
 
 
 def test_a_robot_does_not_get_ready_without_an_autopilot(tmp_path: Path) -> None:
-    nobody = Url("udpout", "127.0.0.1", free_udp_port())
+    nobody = Url("udpout", "127.0.0.1", free_port())
     with (
         pytest.raises(RobotUnreachable, match=r"no vehicle 1 within 0\.5 s"),
         gateway(tmp_path, nobody, patience_s=0.5),

@@ -12,21 +12,21 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.commands.spawn import end_robot, free_port, robot_process, start, start_robot
+from bridge.commands.spawn import end_robot, robot_process, start, start_robot
 from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.line.peer import reached
 from bridge.mavlink.line.url import Url
 from bridge.station.station import connect
 from mission.events import Scanned
 from tests.bridge.mavlink.driving.world import Operator, is_state, site_mission, until
-from tests.bridge.mavlink.scripted import free_udp_port
 from tests.called import stopgo
+from tests.ports import free_port
 
 
 @contextmanager
 def vehicle(tmp_path: Path, profile: str) -> Iterator[tuple[Url, Operator]]:
     """A vehicle in a process of its own, on hold at the mission's start."""
-    port = free_udp_port()
+    port = free_port()
     process = start(
         "simulate", "vehicle", "--mavlink", f"udpin:127.0.0.1:{port}", "--profile", profile, "--at", "0,0,0",
         "--origin", "47.4,8.5,400,30", "--speed-up", "10", "--state", str(tmp_path / "vehicle"),

@@ -26,8 +26,8 @@ from bridge.station.follow import Report
 from bridge.station.station import Station
 from mission.document import Mission, Scan, SiteOrigin, sealed
 from mission.events import AnyEvent, PoseReport, Scanned, StateReport
-from tests.bridge.mavlink.scripted import free_udp_port
 from tests.bridge.world import corridor, pose_of
+from tests.ports import free_port
 
 SITE = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=30.0)
 """+y bears 30°, so +x, along the corridor, bears 120°."""
@@ -59,7 +59,7 @@ class Rover:
         start = site_mission().start
         level = None if origin is None else msgspec.structs.replace(origin, heading_deg=0.0)
         self.profile = profile
-        self.url = Url("udpout", "127.0.0.1", free_udp_port())
+        self.url = Url("udpout", "127.0.0.1", free_port())
         self._first = Setting(
             autopilot=profile_named(profile), state=state, origin=level, faults=faults,
             at=to_east(pose_of(start), SITE.heading_deg),

@@ -13,7 +13,8 @@ from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreacha
 from mission.mavlink.autopilots.generic import GENERIC
 from mission.mavlink.local_frame import VehicleOrigin
 from mission.mavlink.telemetry import Message
-from tests.bridge.mavlink.scripted import Scripted, free_udp_port
+from tests.bridge.mavlink.scripted import Scripted
+from tests.ports import free_port
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
@@ -48,14 +49,14 @@ def test_a_vehicle_on_hold_does_not_follow_its_mission(custom_mode: int, follows
 
 
 def test_where_nobody_is_nothing_was_sent() -> None:
-    url = read_url(f"udpout:127.0.0.1:{free_udp_port()}")
+    url = read_url(f"udpout:127.0.0.1:{free_port()}")
     told = pytest.raises(RobotUnreachable, match=r"within 0.3 s \(nothing listens there\); nothing was sent")
     with told, reached(url, timeout_s=0.3):
         pass
 
 
 def test_of_several_vehicles_one_must_be_named() -> None:
-    port = free_udp_port()
+    port = free_port()
     out = read_url(f"udpout:127.0.0.1:{port}")
     with (
         wire(read_url(f"udpin:127.0.0.1:{port}")) as station,
@@ -81,7 +82,7 @@ def vehicle_beat() -> Message:
 
 
 def test_stations_and_cameras_are_no_vehicles() -> None:
-    port = free_udp_port()
+    port = free_port()
     out = read_url(f"udpout:127.0.0.1:{port}")
     with (
         wire(read_url(f"udpin:127.0.0.1:{port}")) as station,

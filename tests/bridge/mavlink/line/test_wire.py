@@ -25,7 +25,7 @@ from bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, read_si
 from mission.errors import InputError, RobotUnreachable
 from mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.hostile import Hostile
-from tests.bridge.mavlink.scripted import free_udp_port
+from tests.ports import free_port
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(32)
 VEHICLE = Who(1, 1)
@@ -67,13 +67,13 @@ def passes(one: Wire, other: Wire, *, start: int = 0) -> None:
 
 @pytest.mark.parametrize(("station", "vehicle"), [("udpin", "udpout"), ("udpout", "udpin")])
 def test_udp_goes_both_ways(station: str, vehicle: str) -> None:
-    port = free_udp_port()
+    port = free_port()
     with wire(udp(station, port)) as one, wire(udp(vehicle, port), me=VEHICLE) as other:
         passes(other, one) if station == "udpin" else passes(one, other)
 
 
 def test_tcp_goes_both_ways_and_is_connected_again() -> None:
-    port = free_udp_port()
+    port = free_port()
     with ExitStack() as stack:
         vehicle = stack.enter_context(wire(udp("tcpin", port), me=VEHICLE))
         with wire(udp("tcp", port)) as station:
@@ -91,14 +91,14 @@ def test_tcp_goes_both_ways_and_is_connected_again() -> None:
 def test_nobody_at_a_tcp_port_is_said_at_once() -> None:
     with (
         pytest.raises(RobotUnreachable, match=r"no connection .*nothing was sent"),
-        wire(udp("tcp", free_udp_port())),
+        wire(udp("tcp", free_port())),
     ):
         pass
 
 
 def test_a_writer_that_meets_an_error_does_not_hold_up_the_reader() -> None:
     """What `select` saw on the socket is gone by the time it is read."""
-    transport = open_transport(udp("udpout", free_udp_port()))
+    transport = open_transport(udp("udpout", free_port()))
     writer = threading.Thread(target=lambda: [transport.write(b"x") for _ in range(5000)])
     writer.start()
     while writer.is_alive():
@@ -166,7 +166,7 @@ def test_a_device_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["udpin", "tcpin"])
 def test_a_port_that_is_taken_is_named(kind: str) -> None:
-    url = udp(kind, free_udp_port())
+    url = udp(kind, free_port())
     with wire(url), pytest.raises(InputError, match=f"{url}: cannot listen there .*port free"), wire(url):
         pass
 
@@ -177,7 +177,7 @@ def test_a_port_that_is_taken_is_named(kind: str) -> None:
 @contextmanager
 def listening(signing_key: bytes | None = None) -> Iterator[tuple[Wire, MessageQueue, Any]]:
     """A station, what it hears of the time, and a way to throw bytes at it."""
-    port = free_udp_port()
+    port = free_port()
     with (
         wire(udp("udpin", port), signing_key=signing_key) as station,
         station.waiting("SYSTEM_TIME") as waiting,
@@ -241,7 +241,7 @@ def test_a_forged_far_future_does_not_lock_out_the_vehicle() -> None:
 
 
 def test_two_signed_wires_understand_each_other() -> None:
-    port = free_udp_port()
+    port = free_port()
     with (
         wire(udp("udpin", port), signing_key=KEY) as station,
         wire(udp("udpout", port), me=VEHICLE, signing_key=KEY) as vehicle,

@@ -17,8 +17,8 @@ from bridge.mavlink.simulated.vehicle import Setting
 from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from bridge.mavlink.simulated.vehicle_process import vehicle_on
 from mission.mavlink.items import Item
-from tests.bridge.mavlink.scripted import free_udp_port
 from tests.bridge.mavlink.simulated.bench import HOME, ORIGIN, camera, delay, script, waypoint
+from tests.ports import free_port
 
 mavsdk = pytest.importorskip("mavsdk")
 
@@ -43,7 +43,7 @@ def station(port: int, *, way: str = "udpin") -> Iterator[Any]:
 @contextmanager
 def vehicle(profile: str, *faults: str) -> Iterator[int]:
     """A vehicle that sends to the port it gives."""
-    port = free_udp_port()
+    port = free_port()
     made = VehicleFaults(tuple(read_vehicle_fault(text) for text in faults))
     setting = Setting(PROFILES[profile], origin=ORIGIN, faults=made)
     with vehicle_on(Url("udpout", "127.0.0.1", port), setting, speed_up=SPEED_UP):
@@ -153,7 +153,7 @@ def test_mavsdk_and_another_station_use_one_vehicle() -> None:
     """While the other one uploads, MAVSDK is denied; afterwards it reads what the other one sent."""
     from mavsdk.plugins.mission_raw.mission_raw import MissionRaw, MissionRawError
 
-    port = free_udp_port()
+    port = free_port()
     with (
         vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES["strict"])),
         wire(Url("udpout", "127.0.0.1", port)) as other,

@@ -33,8 +33,8 @@ from bridge.mavlink.simulated.vehicle_store import Store
 from mission.errors import InputError
 from mission.mavlink.items import Item
 from mission.mavlink.telemetry import Message
-from tests.bridge.mavlink.scripted import free_udp_port
 from tests.bridge.mavlink.simulated.bench import delay, item_message
+from tests.ports import free_port
 
 PATIENCE_S = 120.0
 KEY = bytes(range(32))
@@ -99,7 +99,7 @@ def process(*options: str) -> Iterator[subprocess.Popen[str]]:
 
 @pytest.mark.parametrize("profile", list(PROFILES))
 def test_a_vehicle_that_is_killed_and_started_again_keeps_its_items(tmp_path: Path, profile: str) -> None:
-    port = free_udp_port()
+    port = free_port()
     options = ("--mavlink", str(here(port)), "--profile", profile, "--state", str(tmp_path / "v"))
     ardupilot = profile == "ardupilot"
     with wire(there(port)) as station:
@@ -114,7 +114,7 @@ def test_a_vehicle_that_is_killed_and_started_again_keeps_its_items(tmp_path: Pa
 
 
 def test_a_vehicle_that_cannot_keep_its_state_ends_and_says_so(tmp_path: Path) -> None:
-    port, state = free_udp_port(), tmp_path / "v"
+    port, state = free_port(), tmp_path / "v"
     with (
         wire(there(port)) as station,
         process("--mavlink", str(here(port)), "--state", str(state)) as running,
@@ -166,7 +166,7 @@ def test_a_state_that_is_none_is_refused(tmp_path: Path) -> None:
 
 def test_a_vehicle_that_was_refused_leaves_its_port_free(tmp_path: Path) -> None:
     (tmp_path / "vehicle.msgpack").write_bytes(b"\xc1")
-    port = free_udp_port()
+    port = free_port()
     threads = threading.active_count()
     with pytest.raises(InputError), vehicle_on(here(port), Setting(PROFILES["strict"], state=tmp_path)):
         pass
@@ -176,7 +176,7 @@ def test_a_vehicle_that_was_refused_leaves_its_port_free(tmp_path: Path) -> None
 
 
 def test_two_stations_on_streams_are_told_the_same() -> None:
-    port = free_udp_port()  # free for TCP as well, as good as always
+    port = free_port()
     with (
         vehicle_on(Url("tcpin", "127.0.0.1", port), Setting(PROFILES["strict"])),
         wire(Url("tcp", "127.0.0.1", port)) as one,
@@ -192,7 +192,7 @@ def test_two_stations_on_streams_are_told_the_same() -> None:
 
 def test_a_vehicle_outlives_stations_that_hang_up() -> None:
     """They do so while it is writing to them, with everything unread, so that its writes fail."""
-    port = free_udp_port()
+    port = free_port()
     linger = struct.pack("ii", 1, 0)
     with (
         vehicle_on(Url("tcpin", "127.0.0.1", port), Setting(PROFILES["strict"])),
@@ -206,7 +206,7 @@ def test_a_vehicle_outlives_stations_that_hang_up() -> None:
 
 
 def test_a_signing_vehicle_hears_who_has_the_key_only() -> None:
-    port = free_udp_port()
+    port = free_port()
     setting = Setting(PROFILES["strict"])
     with vehicle_on(here(port), setting, signing_key=KEY):
         with wire(there(port), signing_key=KEY) as station:
@@ -219,7 +219,7 @@ def test_a_signing_vehicle_hears_who_has_the_key_only() -> None:
 
 
 def test_a_vehicle_that_should_sign_and_does_not() -> None:
-    port = free_udp_port()
+    port = free_port()
     setting = Setting(PROFILES["strict"], faults=VehicleFaults((VehicleFault("unsigned", 0),)))
     with vehicle_on(here(port), setting, signing_key=KEY):
         with wire(there(port), signing_key=KEY) as careful, careful.waiting() as waiting:
@@ -234,7 +234,7 @@ def test_a_vehicle_that_should_sign_and_does_not() -> None:
 @pytest.mark.parametrize("profile", list(PROFILES))
 def test_an_upload_over_a_line_that_loses_doubles_and_delays(profile: str) -> None:
     """The station sends COUNT again until it is heard, answers requests, and waits for an ACCEPTED."""
-    port = free_udp_port()
+    port = free_port()
     faults = tuple(read_vehicle_fault(text) for text in ("loss@5", "duplicates@20=3", "jitter@20"))
     setting = Setting(PROFILES[profile], faults=VehicleFaults(faults))
     items = [delay(float(number)) for number in range(10)]

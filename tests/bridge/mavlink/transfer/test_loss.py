@@ -12,7 +12,7 @@ from bridge.mavlink.simulated.vehicle_process import vehicle_on
 from bridge.mavlink.transfer.upload import Uploaded, upload
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
-from tests.bridge.mavlink.scripted import free_udp_port
+from tests.ports import free_port
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
@@ -34,7 +34,7 @@ ROUGH = Roughness(delay_s=0.005, loss=0.1, doubled=0.2, overtaken=0.2)
     ],
 )
 def test_a_mission_arrives_whole(profile: str, autopilot: str, rough: Roughness, count: int) -> None:
-    port, sent = free_udp_port(), stops(count, autopilot)
+    port, sent = free_port(), stops(count, autopilot)
     with (
         vehicle_on(Url("udpin", "127.0.0.1", port), Setting(PROFILES[profile])),
         Lossy(port, rough, seed=7) as line,

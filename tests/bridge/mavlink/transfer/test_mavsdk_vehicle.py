@@ -17,7 +17,7 @@ from mission.mavlink.items import Item
 from mission.mavlink.read_back import differences
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
-from tests.bridge.mavlink.scripted import free_udp_port
+from tests.ports import free_port
 
 mavsdk = pytest.importorskip("mavsdk")
 from mavsdk.plugins.mission_raw_server.mission_raw_server import MissionRawServer  # noqa: E402
@@ -29,7 +29,7 @@ WAIT_S = 20.0
 @contextmanager
 def vehicle() -> Iterator[tuple[Url, queue.Queue[Any]]]:
     """Where it listens, and the missions it says it was given."""
-    port, given = free_udp_port(), queue.Queue[Any]()
+    port, given = free_port(), queue.Queue[Any]()
     kind = mavsdk.ComponentType.AUTOPILOT
     sdk = mavsdk.Mavsdk(mavsdk.Configuration.create_with_component_type(kind))
     try:

@@ -17,14 +17,14 @@ from bridge.mavlink.transfer.download import download
 from bridge.mavlink.transfer.upload import clear, upload
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.lists import stops
-from tests.bridge.mavlink.scripted import free_udp_port
+from tests.ports import free_port
 
 KEY = bytes(range(32))
 
 
 @pytest.mark.parametrize("key", [None, KEY], ids=["unsigned", "signed"])
 def test_missions_arrive_among_ten_thousand_hostile_datagrams(key: bytes | None) -> None:
-    port = free_udp_port()
+    port = free_port()
     listening = Url("udpin", "127.0.0.1", port)
     vehicle = vehicle_on(Url("udpout", "127.0.0.1", port), Setting(PROFILES["ardupilot"]), signing_key=key)
     thrower = threading.Thread(target=throw, args=(port,))

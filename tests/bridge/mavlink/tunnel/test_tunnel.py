@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from bridge.commands.spawn import end_robot, free_port, robot_process, start
+from bridge.commands.spawn import end_robot, robot_process, start
 from bridge.commands.tunnel_commands import Refusals, RefusalsHeard
 from bridge.link.authority import init_site, issue
 from bridge.link.keys import now_utc, read_keys
@@ -27,8 +27,9 @@ from bridge.mavlink.tunnel.message_filter import MessageFilter
 from bridge.mavlink.tunnel.tunnel import QUEUE, Tunnel, open_tunnel
 from mission.errors import OutcomeUnknown, RobotUnreachable
 from tests.bridge.mavlink.driving.world import rover
-from tests.bridge.mavlink.scripted import Scripted, free_udp_port
+from tests.bridge.mavlink.scripted import Scripted
 from tests.bridge.mavlink.simulated.test_simulated_mavsdk import item_of, raw, station, tour
+from tests.ports import free_port
 
 KEYS = KeyExpressions("r1")
 COMMAND = dialect.MAVLink_command_long_message
@@ -189,7 +190,7 @@ def tunnelled(
     tmp_path: Path, *robots: str, program: str = "udpin", profile: str = "ardupilot"
 ) -> Iterator[tuple[int, Any]]:
     """A vehicle behind both ends, each a process: the port at which it is reached, and its operator."""
-    endpoint, port = f"tcp/127.0.0.1:{free_port()}", free_udp_port()
+    endpoint, port = f"tcp/127.0.0.1:{free_port()}", free_port()
     with (
         rover(tmp_path, profile) as (vehicle, operator),
         process("robot", "--name", "r1", "--mavlink", str(vehicle.url), "--listen", endpoint, *robots),
@@ -259,7 +260,7 @@ def test_a_tunnels_refusal_is_named_where_the_vehicle_would_seem_silent() -> Non
 
 
 def test_the_tunnel_joins_the_robots_own_end_and_comes_back_after_a_kill(tmp_path: Path) -> None:
-    port = free_udp_port()
+    port = free_port()
     with (
         rover(tmp_path, "px4") as (vehicle, _),
         robot_process("r1", tmp_path / "robot") as endpoint,
@@ -334,7 +335,7 @@ def test_a_tunnel_off_this_machine_wants_keys_or_insecure(tmp_path: Path) -> Non
 
 
 def test_a_transport_is_closed_with_its_tunnel() -> None:
-    port = free_udp_port()
+    port = free_port()
     for _ in range(2):
         with open_tunnel(
             MemoryLink(Switchboard()), open_transport(Url("udpin", "127.0.0.1", port)), tells="a", hears="b"
