@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import os
 import sys
-import tomllib
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 
 from mission.errors import InputError
+from mission.toml_file import read_toml
 
 NAMES = ("robot", "mavlink", "connect", "site", "keys", "as")
 """As in stopgo.toml; options have two hyphens before them, the environment STOPGO_."""
@@ -91,15 +91,9 @@ def _of_environment(environment: Mapping[str, str]) -> Iterator[tuple[str, str, 
 
 
 def _of_file(path: Path) -> Iterator[tuple[str, str, str]]:
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (FileNotFoundError, NotADirectoryError):
+    if not path.exists():
         return
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file ({error})") from None
-    for name, value in document.items():
+    for name, value in read_toml(path).items():
         if name not in NAMES:
             raise InputError(f"{path}: unknown key {name}; known: {', '.join(NAMES)}")
         if not isinstance(value, str) or not value:

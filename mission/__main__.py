@@ -178,11 +178,12 @@ def _missing(error: ModuleNotFoundError) -> tuple[str, int]:
 
 def _say(message: str) -> None:
     """The line on stderr, if there is one."""
-    from mission.table import printable
+    from mission.table import printable, shortened
 
     if message:
         with contextlib.suppress(OSError):  # nobody reads it
-            print(f"stopgo: {printable(' '.join(message.split()))}", file=sys.stderr)  # noqa: T201
+            line = " ".join(shortened(word) for word in message.split())
+            print(f"stopgo: {printable(line)}", file=sys.stderr)  # noqa: T201
 
 
 if __name__ == "__main__":

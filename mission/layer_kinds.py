@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from mission.errors import InputError
 from mission.kinds import KINDS
+from mission.toml_file import read_toml
 
 LAYER_ROLES = ("floor", "rooms", "names", "doors", "openings", "passages", *KINDS, "furniture", "ignore")
 """What a layer of a drawing can stand for; names are of rooms, openings are doors and windows alike."""
@@ -25,7 +24,7 @@ def entries_in(told: str) -> tuple[str, ...]:
     path = Path(told)
     if "=" in told and not path.exists():
         return tuple(entry.strip() for entry in told.split(","))
-    document = _read_toml(path)
+    document = read_toml(path, way_out=f"write one with: stopgo floors FLOOR.dxf --write-map {path.name}")
     for key in document:
         if key != "layers":
             raise InputError(f"{path}: unknown key {key}; known: [layers]")
@@ -36,18 +35,6 @@ def entries_in(told: str) -> tuple[str, ...]:
         if kind not in LAYER_ROLES:
             raise InputError(f"{path}: {name} = {kind}: unknown kind; known: {', '.join(LAYER_ROLES)}")
     return tuple(f"{name}={kind}" for name, kind in layers.items())
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError) as error:
-        if isinstance(error, tomllib.TOMLDecodeError | UnicodeDecodeError):
-            raise InputError(f"{path}: not a TOML file ({error})") from None
-        why = getattr(error, "strerror", None) or error
-        raise InputError(
-            f"{path}: cannot be read ({why}); write one with: stopgo floors FLOOR.dxf --write-map {path.name}"
-        ) from None
 
 
 def kinds_by_name(entries: Iterable[str]) -> dict[str, str]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import datetime
 import json
-import tomllib
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
@@ -20,6 +19,7 @@ from mission.errors import InputError
 from mission.kinds import KINDS
 from mission.layer_kinds import check_entries, entries_in, kinds_by_name
 from mission.parameter import Parameter, words
+from mission.toml_file import read_toml
 
 LEAST_SHARE = 0.7
 """Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""
@@ -264,7 +264,7 @@ def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
     """
     import msgspec
 
-    values = {} if path is None else _read_toml(path)
+    values = {} if path is None else _values_of(path)
     values.update({key: value for key, value in overrides.items() if value is not None})
     for key in values:
         if key not in PARAMETERS:
@@ -291,13 +291,8 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file ({error})") from None
+def _values_of(path: Path) -> dict[str, Any]:
+    document = read_toml(path)
     tables = _tables()
     known = ", ".join(f"[{table}]" for table in tables)
     values: dict[str, Any] = {}
@@ -411,6 +406,14 @@ def settings_toml(settings: Settings) -> str:
             lines.append(undecided if value is None else f"{parameter.name} = {_toml(value)}")
         lines.append("")
     return "\n".join(lines)
+
+
+def settings_json(settings: Settings) -> dict[str, dict[str, Any]]:
+    """The settings by their table in plan.toml; what is undecided is null."""
+    return {
+        table: {parameter.name: getattr(settings, parameter.name) for parameter in parameters}
+        for table, parameters in _tables().items()
+    }
 
 
 def _toml(value: object) -> str:

@@ -48,6 +48,11 @@ def printable_lines(content: str) -> str:
     return "\n".join(map(printable, content.split("\n")))
 
 
+def shortened(word: str, longest: int = 400) -> str:
+    """A word of an error's line; of one that is longer than any name, its beginning and its length."""
+    return word if len(word) <= longest else f"{word[:80]}… ({len(word)} characters)"
+
+
 def duration(seconds: float) -> str:
     """Seconds as a person reads them: `0:42`, `12:05`, `1:02:03`."""
     minutes, rest = divmod(round(seconds), 60)

@@ -68,12 +68,12 @@ def plan_command(
     Exit code 1: no plan can be made, or the robot would drive over lines that were not read; with --strict
     also where floor is left out or the plan is doubtful.
     """
-    from mission.settings import read_settings, settings_toml
+    from mission.settings import read_settings, settings_json, settings_toml
     from planner.options import values_of
 
     settings = read_settings(parameters, values_of(given))
     if print_config:
-        typer.echo(settings_toml(settings))
+        typer.echo(json.dumps(settings_json(settings)) if as_json else settings_toml(settings))
         return 0
     if floor is None:
         raise InputError("no floor given; name a file, such as: stopgo plan floor.dxf -o plan")

@@ -6,7 +6,6 @@ A robot that is not there is missed only by who knows of it.
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterable, Mapping
 from datetime import datetime
 from pathlib import Path
@@ -17,6 +16,7 @@ from bridge.link.protocol import KeyExpressions
 from mission.errors import InputError
 from mission.files.atomic import write_atomic
 from mission.files.file_name import file_name
+from mission.toml_file import read_toml
 
 
 class LastSeen(msgspec.Struct, frozen=True, kw_only=True):
@@ -81,17 +81,12 @@ def read_roster(path: Path) -> tuple[str, ...]:
     InputError
         Naming the file and what is wrong with it.
     """
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"--roster {path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"--roster {path}: not TOML ({error})") from None
+    document = read_toml(path)
     names = document.get("robots")
     if set(document) != {"robots"} or not isinstance(names, list) or not names:
-        raise InputError(f'--roster {path}: must be one list, as in: robots = ["r1", "r2"]')
+        raise InputError(f'{path}: must be one list, as in: robots = ["r1", "r2"]')
     for name in names:
         if not isinstance(name, str):
-            raise InputError(f"--roster {path}: {name!r} is no robot's name; write it in quotes")
+            raise InputError(f"{path}: {name!r} is no robot's name; write it in quotes")
         KeyExpressions(name)
     return tuple(dict.fromkeys(names))

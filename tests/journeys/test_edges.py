@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -124,6 +125,21 @@ def test_a_byte_order_mark_is_read_over(workplace: Path, capsys: pytest.CaptureF
     assert main(["check", "mission.json"]) == 0
     assert main(["plan", "-p", "plan.toml", "--print-config"]) == 0
     assert "d_sec = 0.8\n" in capsys.readouterr().out
+
+
+def test_print_config_answers_in_json_as_in_toml(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "--d-sec", "0.8", "--print-config"]) == 0
+    toml = tomllib.loads(capsys.readouterr().out)
+    assert main(["plan", "--d-sec", "0.8", "--print-config", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert {table: {k: v for k, v in of.items() if v is not None} for table, of in told.items()} == toml
+
+
+def test_a_name_longer_than_any_is_told_by_its_beginning(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "x" * 5000]) == 2
+    line = capsys.readouterr().err
+    assert line.startswith(f"stopgo: {'x' * 80}…")
+    assert len(line) < 300
 
 
 @pytest.mark.parametrize("radius", ["-2", "0"])
