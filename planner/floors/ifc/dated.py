@@ -26,6 +26,9 @@ START_NAMES = re.compile(r"(start|begin|anfang).*(date|datum|time)?$", re.IGNORE
 PHASE_NAMES = re.compile(
     r"^(phase|phase created|construction.?phase|bauphase|phase de construction)$", re.IGNORECASE
 )
+REMOVED_NAMES = re.compile(r"^(phase demolished|abbruchphase|phase de démolition)$", re.IGNORECASE)
+NEVER = ("", "none", "keine", "aucun", "<none>")
+"""What a product says of the phase that removes it when none does."""
 DAY = re.compile(r"^\d{4}-\d{2}-\d{2}")
 
 
@@ -121,13 +124,18 @@ def _days_in(properties: Any) -> tuple[str | None, str | None, str]:
     return start, finish, said_by
 
 
-def phase_of(entity: Any) -> str | None:
-    """The phase a product's properties name, such as Revit's `Phase Created`; it has no day."""
-    for name, said in ifcopenshell.util.element.get_psets(entity, psets_only=True).items():
+def phases_of(entity: Any) -> tuple[str, str]:
+    """The phases that make and remove a product, as Revit's `Phase Created`; empty where it names none."""
+    made = removed = ""
+    for said in ifcopenshell.util.element.get_psets(entity, psets_only=True).values():
         for key, value in said.items():
-            if PHASE_NAMES.match(key) and isinstance(value, str) and value:
-                return f"{name}.{key} = {value}"
-    return None
+            if not isinstance(value, str):
+                continue
+            if PHASE_NAMES.match(key):
+                made = made or value.strip()
+            elif REMOVED_NAMES.match(key) and value.strip().casefold() not in NEVER:
+                removed = removed or value.strip()
+    return made, removed
 
 
 def _day(value: Any) -> str | None:

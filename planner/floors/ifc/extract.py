@@ -20,7 +20,7 @@ import ifcopenshell.util.placement
 import ifcopenshell.util.unit
 import numpy as np
 
-from planner.floors.ifc.dated import phase_of, tasks_by_product
+from planner.floors.ifc.dated import phases_of, tasks_by_product
 from planner.floors.ifc.model import Described, Model, Placement, Product, Storey, packed
 from planner.floors.ifc.placed import place_of
 
@@ -238,7 +238,7 @@ def _product(
         overall_width=_metres(getattr(entity, "OverallWidth", None), unit) if role == "doors" else None,
         lining=_lining(entity, unit) if role == "doors" else None,
         tasks=tasks.get(entity.id(), ()),
-        phase=phase_of(entity),
+        phases=phases_of(entity),
     )
 
 

@@ -21,7 +21,7 @@ from mission.files.atomic import write_atomic
 from planner.floors.ifc.model import Model, unpacked
 from planner.floors.reader import FloorFile
 
-FORM = 4
+FORM = 5
 """Raised whenever what is kept of a model, or how it is read, changes."""
 MOST_KEPT = 2 * 1024**3
 """Bytes of models that are kept; the ones longest unused go first."""

@@ -64,7 +64,8 @@ class Product(msgspec.Struct, frozen=True, kw_only=True):
     lining: float | None = None
     """Of a door: thickness of the frame on one side, metres."""
     tasks: tuple[Task, ...] = ()
-    phase: str | None = None
+    phases: tuple[str, str] = ("", "")
+    """The phases that make and remove it; they have no days of their own."""
 
 
 class OnEarth(msgspec.Struct, frozen=True, kw_only=True):

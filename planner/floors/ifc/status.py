@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from mission.errors import InputError
 from mission.floor import Finding
+from planner.floors.drawing import legible
 from planner.floors.ifc.levels import Level
 from planner.floors.ifc.model import Model, Product, Task
 from planner.floors.ifc.solids import AT_SCANNER, KERB
@@ -33,15 +34,20 @@ class Statuses:
     """Built on `since` already: it hides what is behind it, and is not scanned again."""
     without_task: frozenset[str]
     unrelated: int = 0
-    """GlobalIds of a schedule that names no product of the model."""
+    """Names in a schedule that names no product and no phase of the model."""
 
 
 def statuses(model: Model, *, day: str, since: str | None, schedule: Tasks) -> Statuses:
-    """The status of every product on a day; a product of the schedule goes by that, else by the model.
+    """The status of every product on a day.
 
+    The schedule's tasks of a product count, else the model's, else the schedule's row of its phase.
     What has no task is built: most of what is modelled and not scheduled is there already.
     """
-    tasks = {item.global_id: schedule.get(item.global_id) or item.tasks for item in model.described.products}
+    of_phase = {name.casefold(): own for name, own in schedule.items()}
+    tasks = {
+        item.global_id: schedule.get(item.global_id) or item.tasks or _of_phases(item, of_phase)
+        for item in model.described.products
+    }
     if not any(tasks.values()) and not schedule:
         raise InputError(
             f"date {day}: no product of the model has a task or a day, and no schedule names one; "
@@ -50,8 +56,16 @@ def statuses(model: Model, *, day: str, since: str | None, schedule: Tasks) -> S
     on = {guid: status_on(day, own) for guid, own in tasks.items()}
     standing = {guid for guid, own in tasks.items() if since and status_on(since, own) == "built"}
     without = frozenset(guid for guid, own in tasks.items() if not own)
-    unrelated = 0 if any(guid in schedule for guid in tasks) else len(schedule)
+    known = {*tasks, *(name for item in model.described.products for name in item.phases)}
+    named = {name.casefold() for name in known}
+    unrelated = 0 if any(name in named for name in of_phase) else len(schedule)
     return Statuses(day, since, on, frozenset(standing), without, unrelated)
+
+
+def _of_phases(product: Product, schedule: Tasks) -> tuple[Task, ...]:
+    """The tasks that a schedule gives the phases that make and remove a product; names are casefolded."""
+    made, removed = (schedule.get(name.casefold(), ()) if name else () for name in product.phases)
+    return (*made, *(replace(task, removes=True) for task in removed))
 
 
 def status_on(day: str, tasks: tuple[Task, ...]) -> Status:
@@ -149,8 +163,11 @@ def _told(found: Statuses, counts: Counter[str], counted: list[Product]) -> list
         more = f" and {len(without) - MOST_NAMED} more" if len(without) > MOST_NAMED else ""
         named = f"{', '.join(without[:MOST_NAMED])}{more}"
         told.append(Finding("no_task", f"{len(without)} elements have no task and count as built: {named}"))
-    phased = sorted({item.phase for item in counted if item.phase and not item.tasks})
+    phased = sorted(
+        {name for item in counted if item.global_id in found.without_task for name in item.phases if name}
+    )
     if phased:
-        shown = "; ".join(phased[:MOST_NAMED])
-        told.append(Finding("phases_undated", f"phases without a day are not used: {shown}"))
+        shown = ", ".join(f"'{legible(name)}'" for name in phased[:MOST_NAMED])
+        text = f"phases without a day are not used: {shown}; give each a row of --schedule by its name"
+        told.append(Finding("phases_undated", text))
     return told

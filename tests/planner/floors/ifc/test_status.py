@@ -156,6 +156,29 @@ def test_a_schedule_beside_the_model_names_products_by_global_id(read: Read, tmp
     assert done.source.basis != half.source.basis
 
 
+def test_a_schedule_gives_days_to_phases_by_their_names(read: Read, tmp_path: Path) -> None:
+    """Revit's phases have none of their own."""
+    house, path = two_rooms(), tmp_path / "work.csv"
+    phases = {
+        "middle": {"Phase Created": "Fit-out", "Phase Demolished": "None"},
+        "column": {"Phase Created": "Shell", "Phase Demolished": "Fit-out"},
+        "beam": {"Phase Created": "Later"},
+    }
+    for name, said in phases.items():
+        made = ifcopenshell.api.pset.add_pset(house.model, product=house.things[name], name="Phasing")
+        ifcopenshell.api.pset.edit_pset(house.model, pset=made, properties=said)
+    path.write_text("GUID,Start,Finish\nshell,2024-01-01,2024-02-01\nFit-out,2024-03-01,2024-04-01\n")
+    shell, done = (read(house, date=day, schedule=path) for day in ("2024-02-20", "2024-04-02"))
+    assert there(shell, house) & {"middle", "column"} == {"column"}
+    assert there(done, house) & {"middle", "column"} == {"middle"}
+    assert done.status["removed"] == 1
+    (told,) = [item for item in done.findings if item.code == "phases_undated"]
+    assert (
+        told.message
+        == "phases without a day are not used: 'Later'; give each a row of --schedule by its name"
+    )
+
+
 def test_a_schedule_of_another_model_is_told_as_a_warning(read: Read, tmp_path: Path) -> None:
     path = tmp_path / "work.csv"
     path.write_text("guid,finish\nsomewhere-else,2024-01-01\n")
