@@ -143,6 +143,8 @@ class Info(Tagged, frozen=True):
     """Scan profiles the scanner knows; `None` if it takes any."""
     to_map: OwnMap | None
     """Site to map, if the robot was told; else each mission's `frame.to_map` counts."""
+    capabilities: tuple[str, ...] = ()
+    """What it can do beyond the version that it speaks, by name; a robot that tells of none can none."""
 
 
 class Watching(Tagged, frozen=True):

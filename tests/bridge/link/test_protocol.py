@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import get_args, get_type_hints
@@ -10,10 +11,11 @@ import pytest
 from msgspec import Struct
 
 from bridge.link import protocol
-from bridge.link.protocol import Info, KeyExpressions, Tagged
+from bridge.link.protocol import Info, KeyExpressions, Tagged, decode, encode
 from mission.errors import InputError
 from mission.events import AnyEvent, State, StopState, UnknownKind
 from mission.run.orders import Answer, Order, Reason
+from tests.bridge.world import Field
 
 TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "protocol.md").read_text(encoding="utf-8")
 
@@ -38,15 +40,24 @@ def test_every_event_is_listed(event: type) -> None:
 
 def test_what_a_newer_robot_adds_to_its_map_is_passed_over() -> None:
     """`Transform` is strict, as a part of mission.json; as a part of `Info` it must not stop a station."""
-    decoded = protocol.decode(
-        b'{"x": 1.0, "y": 2.0, "heading": 0.5, "z": 3.0}', get_type_hints(Info)["to_map"]
-    )
+    decoded = decode(b'{"x": 1.0, "y": 2.0, "heading": 0.5, "z": 3.0}', get_type_hints(Info)["to_map"])
     assert (decoded.x, decoded.y, decoded.heading) == (1.0, 2.0, 0.5)
 
 
 @pytest.mark.parametrize("state", [*get_args(State), *get_args(StopState)])
 def test_every_state_is_explained(state: str) -> None:
     assert f"`{state}`" in TEXT
+
+
+def test_a_robot_that_tells_of_no_capability_has_none() -> None:
+    """As every robot before there were any."""
+    told = json.loads(encode(Field().station().info()))
+    del told["capabilities"]
+    assert decode(encode(told), Info).capabilities == ()
+    assert decode(encode({**told, "capabilities": ["record", "levitation"]}), Info).capabilities == (
+        "record",
+        "levitation",
+    )
 
 
 def test_keys_are_those_of_the_document() -> None:
