@@ -206,6 +206,7 @@ class Controller:
                 self._journal.retire_missions(
                     *((run.mission_id, wanted) for wanted in (run.revision, run.next_revision))
                 )
+            self._unstored.clear()
             if not known and run.over:
                 self._hold(mission)
             if not known:

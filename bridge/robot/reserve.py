@@ -21,7 +21,7 @@ class Reserve:
 
     def make(self) -> None:
         """Take up the space, if there is more than enough of it; else the disk is as full as it is."""
-        if self._path.exists() or self._free() < RESERVE_BYTES + LEAST_FREE_BYTES:
+        if self._is_whole() or self._free() < RESERVE_BYTES + LEAST_FREE_BYTES:
             return
         with contextlib.suppress(OSError), self._path.open("wb") as file:
             if hasattr(os, "posix_fallocate"):
@@ -38,7 +38,7 @@ class Reserve:
     def shortage(self, size: int) -> str:
         """Why `size` more bytes are too many; empty if the reserve stays whole beside them."""
         self.make()
-        kept = 0 if self._path.exists() else RESERVE_BYTES
+        kept = 0 if self._is_whole() else RESERVE_BYTES
         free = self._free()
         if free >= size + kept + LEAST_FREE_BYTES:
             return ""
@@ -47,6 +47,13 @@ class Reserve:
             f"{size / megabyte:.1f} MB are needed beside what is kept free for stops,"
             f" and {free / megabyte:.1f} MB are free: make room on the robot's disk"
         )
+
+    def _is_whole(self) -> bool:
+        """Whether the file takes up its space; one that a killed program began does not."""
+        try:
+            return self._path.stat().st_size >= RESERVE_BYTES
+        except FileNotFoundError:
+            return False
 
     def _free(self) -> int:
         return shutil.disk_usage(self._path.parent).free

@@ -300,6 +300,19 @@ def test_a_full_disk_keeps_no_stop_from_arriving(verb: Verb, state: str, event: 
     assert (field.controller.run.state, field.told()[-1]) == (state, event)
 
 
+def test_a_push_of_the_mission_that_is_run_stores_once_what_a_full_disk_had_no_room_for() -> None:
+    field = started(corridor())
+    station = field.station(commander="test")
+    field.journal.edge = full_disk
+    field.order("pause")
+    field.journal.edge = lambda moment: None
+    station.push(corridor())
+    field.controller.hear_of_link(0.0)
+    assert field.told() == ["Started", "Paused"]
+    field.order("resume")
+    assert field.told() == ["Started", "Paused", "Resumed"]
+
+
 def test_a_full_disk_rejects_a_mission() -> None:
     field = Field()
     station = field.station()

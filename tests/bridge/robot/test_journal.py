@@ -20,7 +20,7 @@ from bridge.robot.journal import (
     open_journal,
     shared_journal,
 )
-from bridge.robot.reserve import Reserve
+from bridge.robot.reserve import LEAST_FREE_BYTES, RESERVE_BYTES, Reserve
 from bridge.robot.sealed_rows import FORMAT, SEALED
 from bridge.station.watch import event_line
 from mission.errors import AnswerIsNo, InputError
@@ -176,6 +176,20 @@ def test_a_push_that_would_take_the_space_kept_for_stops_is_rejected(
         monkeypatch.setattr(Reserve, "_free", lambda self: 1024)
         with pytest.raises(AnswerIsNo, match="make room"):
             field.station().push(corridor())
+
+
+@pytest.mark.parametrize("left", [0, 4096])
+def test_space_that_a_killed_robot_began_to_keep_is_kept_anew(tmp_path: Path, left: int) -> None:
+    reserve = tmp_path / "reserve"
+    reserve.write_bytes(bytes(left))
+    with open_journal(tmp_path, "r1"):
+        assert reserve.stat().st_size == RESERVE_BYTES
+
+
+def test_space_that_is_not_kept_yet_counts_as_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Reserve, "_free", lambda self: RESERVE_BYTES + LEAST_FREE_BYTES - 1)
+    (tmp_path / "reserve").touch()
+    assert "make room" in Reserve(tmp_path / "reserve").shortage(size=1)
 
 
 class NewerRun(msgspec.Struct):
