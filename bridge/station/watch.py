@@ -33,6 +33,8 @@ from mission.schedule import schedule
 from mission.table import printable
 
 REDRAW_S = 0.2
+LOST_S = 3.0
+"""After so long without a word a line says so: a state comes every second, and may be late."""
 LAST_EVENTS = 8
 
 
@@ -103,26 +105,37 @@ def hand_over(record: RunTaker, report: Followed) -> None:
 
 
 class Lines:
-    """One line for every event, for a log or a pipe."""
+    """One line for every event, for a log or a pipe; one when the link is lost, and one when it is back."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
         self._greeted = False
+        self._lost_s = 0.0
 
     def mission(self, mission: Mission) -> None:
         self._say(f"{mission.name}: {len(mission.stops)} stops")
 
     def show(self, report: Followed) -> None:
+        if isinstance(report, Silence):
+            self._silent(report.seconds)
+            return
+        if self._lost_s:
+            self._say(f"heard again after {self._lost_s:.0f} s")
+            self._lost_s = 0.0
         if isinstance(report, StateReport):
             if not self._greeted and report.run_id is None:
                 self._say(f"{report.robot} is {report.state}; waiting for a run")
             self._greeted = True
-        elif isinstance(report, Silence):
-            self._say(f"no word for {report.seconds:.0f} s")
         elif not isinstance(report, PoseReport):
             self._say(event_line(report))
             if isinstance(report, Held):
                 self._say(HINT)
+
+    def _silent(self, seconds: float) -> None:
+        if seconds >= LOST_S and not self._lost_s:
+            self._say(f"no word for {seconds:.0f} s; asking until it is heard again")
+        if seconds >= LOST_S:
+            self._lost_s = seconds
 
 
 class EventObjects:

@@ -110,10 +110,22 @@ def test_lines_tell_events_and_silence_but_not_every_pose() -> None:
     field.station().push(corridor())
     field.order("start")
     field.work()
-    for report in (field.report(), *field.journal.events(), Silence(seconds=3.0)):
+    for report in (field.report(), *field.journal.events()):
         lines.show(report)
-    assert len(said) == len(field.journal.events()) + 1
-    assert said[-1] == "no word for 3 s"
+    assert len(said) == len(field.journal.events())
+
+
+def test_lines_tell_a_lost_link_once_and_its_return_once() -> None:
+    said: list[str] = []
+    lines = Lines(said.append)
+    for seconds in (1.0, 2.0, 3.0, 4.0, 5.0, 29.0):
+        lines.show(Silence(seconds=seconds))
+    assert said == ["no word for 3 s; asking until it is heard again"]
+    lines.show(Field().report())
+    assert said[1:] == ["heard again after 29 s", "r1 is IDLE; waiting for a run"]
+    lines.show(Silence(seconds=1.0))
+    lines.show(Field().report())
+    assert len(said) == 3
 
 
 def held(reason: str) -> Held:
