@@ -38,6 +38,7 @@ from recordings.logs.field_log import (
 )
 from recordings.logs.files import digest_of
 
+FORMAT = "MAVLink tlog"
 STAMP = 8
 MAGIC_1, MAGIC_2 = 0xFE, 0xFD
 SIGNED = 1
@@ -90,7 +91,7 @@ def read_telemetry_log(path: Path, reading: Reading) -> FieldLog:
         raise InputError(f"{path}: no packet in it can be read; is it a MAVLink .tlog?")
     return FieldLog(
         path=str(path),
-        format="MAVLink tlog",
+        format=FORMAT,
         digest=digest_of([path]),
         messages=sum(sorter.counts.values()),
         clock="wall",

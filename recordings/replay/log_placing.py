@@ -27,6 +27,7 @@ FIRST_NS = 3 * 10**8
 """A robot that halts as soon after a log's beginning has its first pose where it halted, noise apart."""
 
 
+BY_EARTH = "georeference"
 NO_WAY = Track.of((), (), ())
 
 
@@ -55,6 +56,11 @@ class PlacedLog:
     """Whether headings were measured; else they are the direction of driving."""
     truth: Track | None = None
     """Where a simulator says the robot was."""
+
+    @property
+    def by_earth(self) -> bool:
+        """Whether latitudes and longitudes have placed it."""
+        return self.alignment.how.startswith(BY_EARTH)
 
     @property
     def way(self) -> Track:
@@ -199,7 +205,7 @@ def _by_georeference(log: FieldLog, source: Poses, mission: Mission) -> Alignmen
         )
     x, y = from_geodetic(mission.georeference, place, source.rule)
     heading = math.radians(mission.georeference.heading_deg)
-    return Alignment(how=f"georeference, by the rule of {source.rule}", x=x, y=y, heading=heading)
+    return Alignment(how=f"{BY_EARTH}, by the rule of {source.rule}", x=x, y=y, heading=heading)
 
 
 def _moved(track: Track, by: Alignment, offset_ns: int) -> Track:

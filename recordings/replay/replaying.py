@@ -18,6 +18,7 @@ from mission.run.way import legs_of
 from mission.run_log import LogSource, RunLog, Track
 from mission.sight import Sight
 from recordings.logs.field_log import FieldLog, Remark
+from recordings.replay.followed import followed_events
 from recordings.replay.inferring import events_of
 from recordings.replay.log_placing import PlacedLog, Placing, placed
 from recordings.replay.matching import Match, matched, reaches
@@ -43,7 +44,7 @@ def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight
     """
     laid = placed(log, mission, how)
     offset = laid.alignment.time_offset_ns
-    events = _own_events(log, mission, offset)
+    events = _own_events(log, mission, offset) or followed_events(log, mission, laid)
     halts = _halts(laid, mission)
     matches = told_visits(events, mission, halts) if events else matched(halts, mission, laid.track)
     _must_belong(log, laid.track, mission, matches, how)

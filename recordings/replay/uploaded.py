@@ -60,13 +60,14 @@ def differences_of(log: FieldLog, mission: Mission) -> tuple[str, ...]:
     lines: list[str] = []
     for number, upload in enumerate(log.uploads, 1):
         when = f"mission {number} in the log, {(upload.ns - log.begin_ns) / 1e9:.1f} s after it begins"
-        found = list(_differences(upload, mission))
+        found = list(differences(upload, mission))
         told = found or [f"the same {len(mission.stops)} stops"]
         lines += [f"{when}: {line}" for line in told]
     return tuple(lines)
 
 
-def _differences(upload: LoggedMission, mission: Mission) -> Iterator[str]:
+def differences(upload: LoggedMission, mission: Mission) -> Iterator[str]:
+    """How one of them differs from ours; nothing where it is ours."""
     if not upload.complete:
         yield f"only {len(upload.items)} items, the upload was broken off"
         return
