@@ -244,7 +244,8 @@ class SimulatedBase:
         battery = max(0.0, self._world.battery - used)
         self._world = World(pose=pose, battery=battery, placed=True)
         if self._keep is not None:
-            write_world(self._keep, self._world)
+            with contextlib.suppress(OSError):  # a full disk does not end the world
+                write_world(self._keep, self._world)
 
 
 class SimulatedScanner:
@@ -260,6 +261,12 @@ class SimulatedScanner:
         self._ended: dict[str, ScanResult] = _remembered(record)
 
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
+        try:
+            return self._scan(label, scan, interrupt)
+        except OSError as error:
+            return ScanFailed(reason=f"the scan cannot be written: {error.strerror}")
+
+    def _scan(self, label: str, scan: Scan, interrupt: Event) -> ScanResult | ScanFailed:
         self._scans += 1
         self._note(f"begin {label}")
         if self._clock.wait(min(scan.duration_s, scan.timeout_s), interrupt):

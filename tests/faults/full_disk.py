@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
+from bridge.commands.spawn import robot_process
 from bridge.robot.journal import open_journal
+from bridge.station.station import Station, connect
+from mission.errors import AnswerIsNo
 from tests.bridge.world import Field, corridor
 
+LAST_NET_S = 60.0
+ROOM_BYTES = 1024 * 1024
 
-def main(folder: Path) -> None:
+
+def main(folder: Path, *, process: bool) -> None:
     if subprocess.run(
         ["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", str(folder)], check=False
     ).returncode:
         sys.exit("cannot mount")
+    (with_a_process if process else in_simulated_time)(folder)
+
+
+def in_simulated_time(folder: Path) -> None:
     with open_journal(folder, "r1") as journal:
         field = Field(journal=journal)
         field.station().push(corridor())
@@ -35,6 +48,46 @@ def main(folder: Path) -> None:
         print(field.controller.run.state)
 
 
+def with_a_process(folder: Path) -> None:
+    """A robot that drives while its disk is filled is paused and aborted, and tells of it later."""
+    ballast = folder / "ballast"
+    with (
+        robot_process("r1", folder / "state") as endpoint,
+        connect(endpoint, robot="r1", timeout_s=30.0) as station,
+    ):
+        station.push(corridor())
+        station.command("start")
+        until(lambda: station.status().stop_state == "NAVIGATING")
+        paused = station.command("pause")
+        while "cannot be written" not in paused.message:
+            go_on(station, ballast)
+            fill(ballast)
+            paused = station.command("pause")
+        print(paused.outcome, station.status().state)
+        print(station.command("abort").outcome, station.status().state)
+        newest = station.status().last_event
+        ballast.unlink()
+        until(lambda: station.status().last_event > newest)
+        print(*[type(event).__name__ for event in station.log(since=newest)])
+
+
+def go_on(station: Station, ballast: Path) -> None:
+    """Let the paused robot drive; held for want of room, it is given a little."""
+    try:
+        station.command("resume")
+    except AnswerIsNo as no:
+        assert no.reason == "storage"
+        os.truncate(ballast, max(0, ballast.stat().st_size - ROOM_BYTES))
+        station.command("retry")
+
+
+def until(reached: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + LAST_NET_S
+    while not reached():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
 def fill(ballast: Path) -> None:
     with ballast.open("ab", buffering=0) as file:
         try:
@@ -45,4 +98,4 @@ def fill(ballast: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), process=sys.argv[2] == "process")

@@ -123,11 +123,19 @@ def test_a_station_whose_clock_is_wrong_is_obeyed_all_the_same() -> None:
 
 
 @pytest.mark.skipif(shutil.which("unshare") is None, reason="needs user namespaces to mount a small disk")
+@pytest.mark.parametrize(
+    ("robot", "told"),
+    [
+        ("simulated-time", "resume 0.0 FINISHED"),
+        ("process", "ok PAUSED ok ABORTED Paused Aborted"),
+    ],
+)
 def test_a_disk_that_is_really_full_stops_the_robot_until_there_is_room(
-    tmp_path: Path,
+    tmp_path: Path, robot: str, told: str
 ) -> None:
     script = Path(__file__).with_name("full_disk.py")
-    command = ["unshare", "--user", "--map-root-user", "--mount", sys.executable, str(script), str(tmp_path)]
+    small = ["unshare", "--user", "--map-root-user", "--mount"]
+    command = [*small, sys.executable, str(script), str(tmp_path), robot]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
     result = subprocess.run(
         command, capture_output=True, text=True, timeout=120, env=environment, check=False
@@ -135,4 +143,4 @@ def test_a_disk_that_is_really_full_stops_the_robot_until_there_is_room(
     if "cannot mount" in result.stderr or "unshare:" in result.stderr:
         pytest.skip(result.stderr.strip())
     assert result.returncode == 0, result.stderr
-    assert result.stdout.split() == ["resume", "0.0", "FINISHED"]
+    assert result.stdout.split() == told.split()

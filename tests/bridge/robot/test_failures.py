@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sqlite3
+from pathlib import Path
 from threading import Event
 
 import msgspec
@@ -15,7 +16,9 @@ from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError
 from mission.events import Pose, Scanned
 from mission.run.orders import Verb
+from mission.run.scans import ScanFailed
 from tests.bridge.world import Field, corridor
+from tests.disk import small_disk
 
 
 def started(mission: Mission, *faults: Fault) -> Field:
@@ -311,6 +314,15 @@ def test_a_push_of_the_mission_that_is_run_stores_once_what_a_full_disk_had_no_r
     assert field.told() == ["Started", "Paused"]
     field.order("resume")
     assert field.told() == ["Started", "Paused", "Resumed"]
+
+
+def test_a_full_disk_ends_no_simulated_robot(tmp_path: Path) -> None:
+    field = Field(keep=tmp_path / "world.json", record=tmp_path / "scans.log")
+    with small_disk(0):
+        field.base.stand_at(Pose(x=1.0, y=0.0, heading=0.0))
+        scanned = field.scanner.scan("s1", corridor().stops[0].scan, interrupt=Event())
+    assert field.base.pose().x == 1.0
+    assert scanned == ScanFailed(reason="the scan cannot be written: File too large")
 
 
 def test_a_full_disk_rejects_a_mission() -> None:
