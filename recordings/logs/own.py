@@ -10,10 +10,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import msgspec
+import numpy as np
 
 from mission.document import Mission
 from mission.errors import InputError
 from mission.events import AnyEvent
+from mission.geometry import frozen
 from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, poses_of
 from recordings.logs.files import digest_of
 
@@ -21,6 +23,7 @@ SITE = "site"
 """What the mission's own frame is called in a log."""
 AT_EVENTS = "events"
 """The source of poses that are told with events alone: where the robot stood, and not how it came there."""
+NOWHERE = Poses(AT_EVENTS, SITE, frozen((), np.int64), frozen(np.empty((0, 2))), frozen(()), rank=1)
 BESIDE = ("-wal", "-shm")
 
 
@@ -77,13 +80,14 @@ def _missions(rows: Iterable[tuple[bytes]]) -> Iterator[Mission]:
             continue
 
 
-def poses_of_events(events: Iterable[AnyEvent]) -> Poses | None:
-    """Where the robot was when it told so with an event."""
+def poses_of_events(events: Iterable[AnyEvent]) -> Poses:
+    """Where the robot was when it told so with an event; nowhere, if every stop was skipped."""
     told = [(event.robot_ns, pose) for event in events if (pose := getattr(event, "pose", None)) is not None]
     if not told:
-        return None
+        return NOWHERE
     xy = [(pose.x, pose.y) for _, pose in told]
-    return poses_of(AT_EVENTS, SITE, [ns for ns, _ in told], xy, [pose.heading for _, pose in told], rank=1)
+    found = poses_of(AT_EVENTS, SITE, [ns for ns, _ in told], xy, [pose.heading for _, pose in told], rank=1)
+    return found or NOWHERE
 
 
 def own_log(
@@ -95,7 +99,7 @@ def own_log(
         counts[type(event).__name__] = counts.get(type(event).__name__, 0) + 1
     poses = tuple(track for track in tracks if track is not None)
     times = [event.robot_ns for event in events] + [
-        int(edge) for track in poses for edge in track.ns[[0, -1]]
+        int(edge) for track in poses if len(track.ns) for edge in track.ns[[0, -1]]
     ]
     return FieldLog(
         path=str(path),

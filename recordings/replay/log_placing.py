@@ -124,6 +124,8 @@ def chosen(log: FieldLog, how: Placing) -> Poses:
 
 def _track(source: Poses) -> tuple[Track, bool]:
     """As a track; where no headings were measured they are made from the way."""
+    if not len(source.ns):
+        return NO_WAY, False
     measured = np.isfinite(source.heading)
     turns = bool(measured.mean() > 0.5)
     heading = source.heading if measured.all() else _filled(source, measured if turns else None)

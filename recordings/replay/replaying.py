@@ -117,7 +117,12 @@ def _source(log: FieldLog, laid: PlacedLog) -> LogSource:
 def _must_belong(
     log: FieldLog, track: Track, mission: Mission, matches: Sequence[Match], how: Placing
 ) -> None:
-    """Refuse a log whose robot was never near a stop, or hardly ever near the route."""
+    """Refuse a log whose robot was never near a stop, or hardly ever near the route.
+
+    One without a pose, as of a run whose every stop was skipped, is told by its events.
+    """
+    if not len(track):
+        return
     stops = np.array([(stop.x, stop.y) for stop in mission.stops])
     away, reach = nearest_to(stops, track.xy), reaches(mission)
     if how.align == "first":  # that puts the robot at the start, wherever it was

@@ -70,6 +70,23 @@ def test_our_own_logs_are_told_by_their_own_events(tmp_path: Path, written: Call
     assert len(found.scanned_from) == len(MISSION.stops) - 1
 
 
+@pytest.mark.parametrize("kind", ["journal", "recording"])
+def test_a_run_whose_every_stop_was_skipped_has_no_pose_and_is_told(tmp_path: Path, kind: str) -> None:
+    skips = [(Skipped, 9.0 * n, {"stop": s.id, "reason": "no"}) for n, s in enumerate(MISSION.stops, 1)]
+    events = told(MISSION, (Started, 0.0, {"commander": "me"}), *skips, (Finished, 999.0, {})).events
+    if kind == "journal":
+        with open_journal(tmp_path / "state", "r1") as journal:
+            for event in events:
+                journal.append(event)
+    else:
+        with FieldRecording(tmp_path / "state", MISSION) as recording:
+            for event in events:
+                recording.event(event)
+    found = replayed(tmp_path / "state")
+    assert {item.outcome for item in found.comparison.stops} == {"skipped"}
+    assert judged(found).answer == "no"
+
+
 def test_a_run_of_another_mission_is_refused_by_name(tmp_path: Path) -> None:
     from msgspec.structs import replace
 
