@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import linprog
-from scipy.sparse import csr_array, eye_array, hstack, vstack
+from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from mission.geometry import FloatArray, IntArray
 from planner.selection.cover import Cover
@@ -23,9 +23,10 @@ SMOOTHING = 0.7
 
 
 def counting_bound(cover: Cover) -> int:
-    """Fewest rows whose views could meet the hardest demand if none overlapped."""
+    """Fewest rows whose views could meet the hardest demand if none overlapped more than is asked for."""
     gains = (cover.sees @ cover.worth.T).tocsc()
-    return max((_fewest(gains[:, [k]].data, need) for k, need in enumerate(cover.needed)), default=0)
+    simple = max((_fewest(gains[:, [k]].data, need) for k, need in enumerate(cover.views_needed)), default=0)
+    return max(simple, int(cover.asks.min(initial=simple)) if cover.needed.any() else 0)
 
 
 def _fewest(gains: IntArray, needed: int) -> int:
@@ -45,10 +46,10 @@ def lower_bound(cover: Cover, *, found: int) -> int:
 
 
 def multiplier_bound(cover: Cover, *, found: int) -> int:
-    """Lagrangian bound: prices u_j on y_j <= Σ x_i, raised where a column is used and not seen.
+    """Lagrangian bound: prices u_j on v_j y_j <= Σ x_i, raised where a column is used and not seen.
 
     For any prices u >= 0 of columns and p >= 0 of all demands but the whole, Σ_i min(0, 1 - Σ_j in i u_j)
-    + Σ_k p_k needed_k + the cheapest way to meet the whole at u_j - Σ_k p_k worth_kj per column is a
+    + Σ_k p_k needed_k + the cheapest way to meet the whole at v_j u_j - Σ_k p_k worth_kj per column is a
     bound (Geoffrion, 1974); the prices follow Polyak's subgradient rule, smoothed.
     """
     scale = max(1.0, float((cover.sees @ cover.weight).max(initial=1)))
@@ -83,11 +84,12 @@ class _Priced:
         cover = self._cover
         column, demand = prices[: cover.columns], prices[cover.columns :]
         spare = 1.0 - cover.sees @ column
-        bought = self._cheapest(column - self._rest.T @ demand)
+        cost = cover.asks * column - self._rest.T @ demand
+        bought = self._cheapest(cost)
         whole = float(np.minimum(spare, 0.0).sum() + demand @ self._needed[1:])
-        value = whole + float((column - self._rest.T @ demand) @ bought)
+        value = whole + float(cost @ bought)
         seen = cover.seen_by @ (spare < 0).astype(float)
-        return value, np.concatenate([bought - seen, self._needed[1:] - self._rest @ bought])
+        return value, np.concatenate([cover.asks * bought - seen, self._needed[1:] - self._rest @ bought])
 
     def _cheapest(self, cost: FloatArray) -> FloatArray:
         """Shares of columns, at these costs, that meet the whole's demand; what costs nothing is taken."""
@@ -100,11 +102,12 @@ class _Priced:
 
 
 def relaxation_bound(cover: Cover) -> int:
-    """Rounded-up optimum of: min Σ x_i, y_j <= Σ x_i that see j, y_j <= 1, Σ w_kj y_j >= needed_k.
+    """Rounded-up optimum of: min Σ x_i, v_j y_j <= Σ x_i that see j, y_j <= 1, Σ w_kj y_j >= needed_k.
 
-    The number does not rest on the solver's tolerances: any prices u_j >= 0 with Σ u_j <= 1 over the
-    columns of each row and any p >= 0 give the bound Σ needed_k p_k - Σ_j max(0, Σ w_kj p_k - u_j) by weak
-    duality; the solver's prices are made feasible and the bound is computed from them.
+    Where columns ask for more than one view, x_i <= 1 too. The number does not rest on the solver's
+    tolerances: any prices u_j >= 0 of columns and p >= 0 of demands give the bound Σ needed_k p_k
+    - Σ_j max(0, Σ w_kj p_k - v_j u_j) - Σ_i max(0, Σ_j in i u_j - 1) by weak duality, and it is computed
+    from the solver's.
     """
     prices = _relaxation_prices(cover) if cover.needed.any() else None
     return 0 if prices is None else int(np.ceil(_dual_value(cover, *prices) - 1e-6))
@@ -113,14 +116,14 @@ def relaxation_bound(cover: Cover) -> int:
 def _relaxation_prices(cover: Cover) -> tuple[FloatArray, FloatArray] | None:
     """Dual prices of the columns (columns,) and of the demands, or None where the solver gives up."""
     rows, columns = cover.rows, cover.columns
-    seen = hstack([-cover.sees.T, eye_array(columns)], format="csr")
+    seen = hstack([-cover.sees.T, diags_array(cover.asks.astype(float))], format="csr")
     worth, needed, scale = scaled(cover)
     demand = hstack([csr_array((len(needed), rows)), -worth], format="csr")
     solution = linprog(
         np.concatenate([np.ones(rows), np.zeros(columns)]),
         A_ub=vstack([seen, demand], format="csr"),
         b_ub=np.concatenate([np.zeros(columns), -needed]),
-        bounds=[(0, None)] * rows + [(0, 1)] * columns,
+        bounds=[(0, None if cover.once else 1)] * rows + [(0, 1)] * columns,
         method="highs",
     )
     if solution.status != 0:
@@ -136,7 +139,11 @@ def scaled(cover: Cover) -> tuple[csr_array, FloatArray, float]:
 
 
 def _dual_value(cover: Cover, column_price: FloatArray, demand_price: FloatArray) -> float:
-    heaviest = float((cover.sees @ column_price).max(initial=0.0))
-    column_price = column_price / max(1.0, heaviest)
+    """The bound that these prices give; where one view is enough, they are first made small enough."""
+    paid_to = cover.sees @ column_price
+    if cover.once:
+        heaviest = max(1.0, float(paid_to.max(initial=0.0)))
+        column_price, paid_to = column_price / heaviest, np.zeros(0)
     paid = cover.worth.T @ demand_price
-    return float(cover.needed @ demand_price - np.maximum(0.0, paid - column_price).sum())
+    beyond = np.maximum(0.0, paid - cover.asks * column_price).sum() + np.maximum(0.0, paid_to - 1.0).sum()
+    return float(cover.needed @ demand_price - beyond)

@@ -18,7 +18,7 @@ class Cover:
     """Rows are candidates, columns groups of units seen by exactly the same candidates.
 
     Every demand is a share of something that must be seen: demand 0 of the whole, the others of a room
-    or of a kind of element.
+    or of a kind of element. A column counts once as many chosen rows see it as it asks for.
     """
 
     sees: csr_array
@@ -27,6 +27,8 @@ class Cover:
     """(demands, columns): what seeing a column adds to each demand."""
     needed: IntArray
     """What each demand asks for (demands,)."""
+    views: IntArray | int = 1
+    """How many chosen rows must see each column until it counts (columns,), or any column."""
 
     @classmethod
     def of_whole(cls, sees: csr_array, weight: IntArray, needed: int) -> Cover:
@@ -40,6 +42,16 @@ class Cover:
     @property
     def columns(self) -> int:
         return int(self.sees.shape[1])
+
+    @cached_property
+    def asks(self) -> IntArray:
+        """How many chosen rows must see each column until it counts (columns,)."""
+        return np.array(np.broadcast_to(self.views, self.columns), dtype=np.int64)
+
+    @cached_property
+    def once(self) -> bool:
+        """Whether every column counts with the first row that sees it."""
+        return bool((self.asks == 1).all())
 
     @cached_property
     def weight(self) -> IntArray:
@@ -70,12 +82,12 @@ class Cover:
         return np.asarray(self.sees[rows].sum(axis=0)).ravel().astype(np.int64)
 
     def seen_weight(self, covered: IntArray) -> int:
-        """Weight of the columns that are covered at least once."""
-        return int(self.weight[covered > 0].sum())
+        """Weight of the columns that are covered as often as they ask for."""
+        return int(self.weight[covered >= self.asks].sum())
 
     def reached(self, covered: IntArray) -> IntArray:
         """What each demand has got (demands,); `covered` counts the chosen rows that see each column."""
-        return np.asarray(self.worth @ (covered > 0).astype(np.int64)).ravel()
+        return np.asarray(self.worth @ (covered >= self.asks).astype(np.int64)).ravel()
 
     def missing(self, covered: IntArray) -> IntArray:
         """What each demand still asks for (demands,)."""
@@ -86,19 +98,29 @@ class Cover:
         if not len(rows):
             return self
         covered = self.covered_by(rows)
-        left = np.flatnonzero(covered == 0)
-        return Cover(_sorted(self.sees[:, left]), _sorted(self.worth[:, left]), self.missing(covered))
+        left = np.flatnonzero(covered < self.asks)
+        more = _without(self.sees, rows) if not self.once else self.sees
+        views = (self.asks - covered)[left]
+        return Cover(_sorted(more[:, left]), _sorted(self.worth[:, left]), self.missing(covered), views)
 
     def offering(self, rows: IntArray) -> Cover:
         """The same, where only `rows` can be chosen: the others see nothing, nor is it needed."""
         if len(rows) == self.rows:
             return self
-        offered = np.zeros(self.rows)
-        offered[rows] = 1
-        sees = _sorted((diags_array(offered) @ self.sees).tocsr().astype(np.int64))
-        sees.eliminate_zeros()
+        sees = _without(self.sees, np.setdiff1d(np.arange(self.rows), rows))
         coverable = self.reached(np.asarray(sees.sum(axis=0)).ravel())
-        return Cover(sees, self.worth, np.minimum(self.needed, coverable))
+        return Cover(sees, self.worth, np.minimum(self.needed, coverable), self.views)
+
+    @cached_property
+    def views_needed(self) -> IntArray:
+        """Fewest views, by weight, with which each demand could be met (demands,)."""
+        if self.once:
+            return self.needed
+        order = np.argsort(self.asks, kind="stable")
+        worth, asks = self.worth.toarray()[:, order].astype(np.int64), self.asks[order]
+        before = np.cumsum(worth, axis=1) - worth
+        taken = np.clip(self.needed[:, None] - before, 0, worth)
+        return np.asarray(taken @ asks, dtype=np.int64)
 
 
 def cover_of(visibility: Visibility, demands: Demands) -> Cover:
@@ -110,7 +132,8 @@ def cover_of(visibility: Visibility, demands: Demands) -> Cover:
     _, first = np.unique(group[seen], return_index=True)
     merged = _sorted(sees[:, np.flatnonzero(seen)[first]])
     worth = _worth(demands, np.repeat(group, np.diff(np.append(piece_first, len(demands.weight)))))
-    return Cover(merged, worth, demands.needed(np.asarray(worth.sum(axis=1)).ravel()))
+    needed = demands.needed(np.asarray(worth.sum(axis=1)).ravel())
+    return Cover(merged, worth, needed)
 
 
 def _alike(sees: csr_array, weight: IntArray, piece_first: IntArray) -> IntArray:
@@ -142,6 +165,15 @@ def ranges(first: IntArray, counts: IntArray) -> IntArray:
     """`first[k]`, `first[k] + 1`, …, `counts[k]` of each, one after the other."""
     offsets = np.repeat(first - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
     return np.arange(int(counts.sum())) + offsets
+
+
+def _without(sees: csr_array, rows: IntArray) -> csr_array:
+    """The matrix in which these rows see nothing."""
+    kept = np.ones(sees.shape[0])
+    kept[rows] = 0
+    left = _sorted((diags_array(kept) @ sees).tocsr().astype(np.int64))
+    left.eliminate_zeros()
+    return left
 
 
 def _sorted(matrix: csr_array) -> csr_array:

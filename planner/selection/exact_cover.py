@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array, eye_array, hstack, vstack
+from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from mission.geometry import IntArray
 from mission.settings import Settings
@@ -20,9 +20,10 @@ WHOLE = 1e-6
 def exact(cover: Cover, start: IntArray, *, settings: Settings) -> tuple[IntArray, int]:
     """Fewest rows that meet every demand, and a lower bound on their number.
 
-    min Σ x_i, y_j <= Σ x_i that see j, Σ w_kj y_j >= needed_k; x whole, y continuous in [0, 1]. The search
-    begins at the rows `start`, runs on one thread and ends at a node limit, so that it repeats; where
-    it does not close, the bound stays below the number of rows found.
+    min Σ x_i, v_j y_j <= Σ x_i that see j, Σ w_kj y_j >= needed_k; x whole, y in [0, 1], and whole too where
+    v_j > 1, since a column counts for nothing until it is seen as often as it asks for. The search begins
+    at the rows `start`, runs on one thread and ends at a node limit, so that it repeats; where it does not
+    close, the bound stays below the number of rows found.
     """
     import highspy
 
@@ -62,7 +63,8 @@ def _model(cover: Cover) -> Any:
     rows, columns = cover.rows, cover.columns
     worth, needed, _ = scaled(cover)
     demand = hstack([csr_array((len(needed), rows)), worth])
-    matrix = vstack([hstack([cover.sees.T, -eye_array(columns)]), demand], format="csc")
+    asks = diags_array(-cover.asks.astype(float))
+    matrix = vstack([hstack([cover.sees.T, asks]), demand], format="csc")
     model = highspy.HighsLp()
     model.num_col_, model.num_row_ = rows + columns, columns + len(needed)
     model.col_cost_ = np.concatenate([np.ones(rows), np.zeros(columns)])
@@ -72,11 +74,12 @@ def _model(cover: Cover) -> Any:
     model.a_matrix_.format_ = highspy.MatrixFormat.kColwise
     model.a_matrix_.start_, model.a_matrix_.index_ = matrix.indptr, matrix.indices
     model.a_matrix_.value_ = matrix.data.astype(float)
-    model.integrality_ = [highspy.HighsVarType.kInteger] * rows + [highspy.HighsVarType.kContinuous] * columns
+    kinds = (highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger)
+    model.integrality_ = [kinds[1]] * rows + [kinds[int(views > 1)] for views in cover.asks]
     return model
 
 
 def _as_solution(cover: Cover, chosen: IntArray) -> list[float]:
     x = np.zeros(cover.rows)
     x[chosen] = 1.0
-    return [*x.tolist(), *(cover.covered_by(chosen) > 0).astype(float).tolist()]
+    return [*x.tolist(), *(cover.covered_by(chosen) >= cover.asks).astype(float).tolist()]

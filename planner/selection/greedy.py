@@ -27,35 +27,41 @@ def _by_gain(cover: Cover, rows: Iterable[int], *, until_met: bool) -> IntArray:
     Both only fall as rows are chosen, so a row whose gain is known to be old is looked at again only
     when it comes up (Minoux, 1978).
     """
-    covered = np.zeros(cover.columns, dtype=bool)
-    short = cover.needed.copy()
-    queue = [(*_gain(cover, row, covered, short), row) for row in rows]
+    covered = np.zeros(cover.columns, dtype=np.int64)
+    short, missing = cover.views_needed.copy(), cover.needed
+    queue = [(*_gain(cover, row, covered, short, missing), row) for row in rows]
     heapq.heapify(queue)
     chosen: list[int] = []
-    while queue and (short.any() or not until_met):
+    while queue and (missing.any() or not until_met):
         *_, row = heapq.heappop(queue)
-        fresh = (*_gain(cover, row, covered, short), row)
+        fresh = (*_gain(cover, row, covered, short, missing), row)
         if queue and fresh > queue[0]:
             heapq.heappush(queue, fresh)
             continue
-        if until_met and fresh[0] == 0:
+        if until_met and fresh[0] == 0 and fresh[1] == 0:
             break  # the rows offered do not see enough
         chosen.append(row)
         short -= np.minimum(short, _adds(cover, row, covered))
-        covered[cover.columns_of(row)] = True
+        covered[cover.columns_of(row)] += 1
+        missing = short if cover.once else cover.missing(covered)
     return np.array(chosen, dtype=np.int64)
 
 
-def _gain(cover: Cover, row: int, covered: IntArray, short: IntArray) -> tuple[int, int]:
-    """What a row adds to demands not met, and to the whole, both negative: the least is the best."""
+def _gain(
+    cover: Cover, row: int, covered: IntArray, short: IntArray, missing: IntArray
+) -> tuple[int, int, int]:
+    """What a row adds, negative, so that the least is the best: views that are short; where it adds none,
+    views of demands not met, which may be others than were reckoned with; and views of the whole.
+    """
     adds = _adds(cover, row, covered)
-    return -int(np.minimum(adds, short).sum()), -int(adds[0])
+    gain = int(np.minimum(adds, short).sum())
+    return -gain, 0 if gain else -int(adds[missing > 0].sum()), -int(adds[0])
 
 
 def _adds(cover: Cover, row: int, covered: IntArray) -> IntArray:
-    """What a row adds to each demand (demands,)."""
+    """What a row adds to each demand, by weight of what still asks for views (demands,)."""
     columns = cover.columns_of(row)
-    new = columns[~covered[columns]]
+    new = columns[covered[columns] < cover.asks[columns]]
     pointer = cover.adds_to.indptr
     entries = ranges(pointer[new], pointer[new + 1] - pointer[new])
     demand, worth = cover.adds_to.indices[entries], cover.adds_to.data[entries]

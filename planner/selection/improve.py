@@ -30,9 +30,9 @@ def improved(cover: Cover, chosen: IntArray, *, at_least: int, swaps: int = SWAP
 
 
 def _without_least(cover: Cover, chosen: IntArray) -> list[int]:
-    """The selection without the row that covers least alone."""
+    """The selection without the row that least hangs on."""
     covered = cover.covered_by(chosen)
-    alone = [int(cover.weight[c][covered[c] == 1].sum()) for c in map(cover.columns_of, chosen)]
+    alone = [int(cover.weight[c][covered[c] == cover.asks[c]].sum()) for c in map(cover.columns_of, chosen)]
     return np.delete(chosen, int(np.argmin(alone))).tolist()
 
 
@@ -43,6 +43,10 @@ def _repaired(cover: Cover, rows: list[int], swaps: int) -> IntArray | None:
     for _ in range(swaps):
         if not board.missing.any():
             return np.array(sorted(rows), dtype=np.int64)
+        if len(rows) == cover.rows:
+            return None
+        if len(set(rows) | set(tabu)) == cover.rows:
+            tabu.clear()  # nobody else is left to come
         out, into = _best_swap(board, rows, tabu)
         board.insist()
         board.drop(out)
@@ -73,13 +77,15 @@ class _Board:
     def __init__(self, cover: Cover, rows: list[int]) -> None:
         self._cover = cover
         self._covered = cover.covered_by(np.array(rows, dtype=np.int64))
+        self._left = cover.asks - self._covered
+        """How many more views each column asks for; below 1 where it counts."""
         self._reached = cover.reached(self._covered)
         self._weight = np.ones(len(cover.needed), dtype=np.int64)
-        bare = cover.worth * (self._covered == 0)[None, :]
+        bare = cover.worth * (self._left == 1)[None, :]
         self._adds = np.ascontiguousarray((cover.sees @ bare.T).toarray().T)
-        """(demands, rows)."""
+        """What each row would add to each demand at once (demands, rows)."""
         self._losses: dict[int, tuple[bytes, IntArray]] = {}
-        """By the row that leaves: which columns only it sees, and their worth to each demand."""
+        """By the row that leaves: which columns hang on it, and their worth to each demand."""
         self._regains: dict[int, tuple[bytes, IntArray, IntArray]] = {}
         """By the row that leaves: of which columns and demands; cells of (demands, rows), and their sums."""
 
@@ -95,44 +101,53 @@ class _Board:
     def take(self, row: int) -> None:
         """Cover what a row sees."""
         columns = self._cover.columns_of(row)
-        self._move(columns[self._covered[columns] == 0], sign=-1)
-        self._covered[columns] += 1
+        self._reach(columns[self._left[columns] == 1], sign=1)
+        self._offer(columns[self._left[columns] == 2], sign=1)
+        self._left[columns] -= 1
 
     def drop(self, row: int) -> None:
-        """Uncover what a row sees alone."""
+        """Uncover what a row sees."""
         columns = self._cover.columns_of(row)
-        self._covered[columns] -= 1
-        self._move(columns[self._covered[columns] == 0], sign=1)
+        self._left[columns] += 1
+        self._reach(columns[self._left[columns] == 1], sign=-1)
+        self._offer(columns[self._left[columns] == 2], sign=-1)
 
     def after_swaps(self, out: int) -> tuple[IntArray, IntArray]:
         """What is missing in all, and how much of the whole is covered (rows,), by who comes for `out`."""
         columns = self._cover.columns_of(out)
-        alone = columns[self._covered[columns] == 1]
+        alone, almost = (columns[self._left[columns] == short] for short in (0, 1))
         left = self._reached - self._lost_with(out, alone)
         asked = self._cover.needed - left
         is_open = asked > 0
         is_open[0] = True
         open_demands = np.flatnonzero(is_open)
         adds = self._adds[open_demands]
-        cells, sums = self._regains_after(out, alone, open_demands)
+        cells, sums = self._regains_after(out, alone, almost, open_demands)
         adds.reshape(-1)[cells] += sums
         short = np.maximum(0, asked[open_demands][:, None] - adds)
         return self._weight[open_demands] @ short, left[0] + adds[0]
 
     def _lost_with(self, out: int, alone: IntArray) -> IntArray:
-        """What the columns that only a row sees are worth to each demand; anew when they change."""
+        """What the columns that hang on a row are worth to each demand; anew when they change."""
         known = alone.tobytes()
         if out not in self._losses or self._losses[out][0] != known:
             self._losses[out] = known, self._worth_of(alone)
         return self._losses[out][1]
 
-    def _regains_after(self, out: int, alone: IntArray, demands: IntArray) -> tuple[IntArray, IntArray]:
-        """What each row would see again: worked out anew where a swap has changed something nearby."""
-        known = alone.tobytes() + demands.tobytes()
+    def _regains_after(
+        self, out: int, alone: IntArray, almost: IntArray, demands: IntArray
+    ) -> tuple[IntArray, IntArray]:
+        """What each row would add again, less what it would add no longer: columns that are then two short.
+
+        Worked out anew where a swap has changed something nearby.
+        """
+        known = b"|".join(part.tobytes() for part in (alone, almost, demands))
         if out not in self._regains or self._regains[out][0] != known:
-            regained = self._regained(alone, demands).ravel()
+            regained = self._regained(alone, demands)
+            if len(almost):
+                regained -= self._regained(almost, demands)
             cells = np.flatnonzero(regained)
-            self._regains[out] = known, cells, regained[cells]
+            self._regains[out] = known, cells, regained.ravel()[cells]
         return self._regains[out][1:]
 
     def _worth_of(self, columns: IntArray) -> IntArray:
@@ -164,9 +179,12 @@ class _Board:
         counts = turned.indptr[columns + 1] - turned.indptr[columns]
         return np.repeat(columns, counts), turned.indices[ranges(turned.indptr[columns], counts)]
 
-    def _move(self, columns: IntArray, *, sign: int) -> None:
-        """Give back (1) or take away (-1) what these columns are worth."""
-        change = self._worth_of(columns)
-        self._reached -= sign * change
-        demands = np.flatnonzero(change)
+    def _reach(self, columns: IntArray, *, sign: int) -> None:
+        """Count what these columns are worth (1), which nobody can add any more, or give it back (-1)."""
+        self._reached += sign * self._worth_of(columns)
+        self._offer(columns, sign=-sign)
+
+    def _offer(self, columns: IntArray, *, sign: int) -> None:
+        """Let every row that sees these columns add their worth at once (1), or no longer (-1)."""
+        demands = np.flatnonzero(self._worth_of(columns))
         self._adds[demands] += sign * self._regained(columns, demands)

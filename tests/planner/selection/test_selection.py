@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -15,6 +17,7 @@ from planner.selection.bound import counting_bound, multiplier_bound, relaxation
 from planner.selection.cover import Cover, cover_of
 from planner.selection.demands import demands_of, needed_of
 from planner.selection.greedy import greedy
+from tests.faults.sizes import size
 from tests.planner.worlds import box, column, element, hall, planned, two_rooms
 
 
@@ -31,17 +34,30 @@ def small_cover(seed: int) -> Cover:
     return Cover(csr_array(sees.astype(np.int64)), csr_array(worth), needed_of(worth.sum(axis=1), share))
 
 
+def asking(cover: Cover, views: int) -> Cover:
+    """The same, where every column asks for so many views, or for as many as there are."""
+    most = np.asarray(cover.sees.sum(axis=0)).ravel()
+    return replace(cover, views=np.minimum(views, most))
+
+
+def small_covers(seeds: range) -> Iterator[tuple[int, Cover]]:
+    """Small covers, each asking for one view, two or three."""
+    for seed in seeds:
+        cover = small_cover(seed)
+        yield from ((seed, asking(cover, views)) for views in (1, 2, 3))
+
+
 def is_enough(cover: Cover, rows: np.ndarray) -> bool:
-    seen = (cover.sees.toarray()[rows] > 0).any(axis=0)
+    seen = (cover.sees.toarray()[rows] > 0).sum(axis=0) >= cover.views
     return bool(np.all(cover.worth.toarray()[:, seen].sum(axis=1) >= cover.needed))
 
 
 def fewest(cover: Cover) -> int:
     """Rows of the smallest selection that covers enough, by trying all."""
-    for size in range(cover.rows + 1):
-        for rows in combinations(range(cover.rows), size):
+    for count in range(cover.rows + 1):
+        for rows in combinations(range(cover.rows), count):
             if is_enough(cover, np.array(rows, dtype=np.int64)):
-                return size
+                return count
     raise AssertionError("not even all rows cover what is needed")
 
 
@@ -52,8 +68,7 @@ def check_rows(cover: Cover, rows: np.ndarray) -> None:
 
 @pytest.mark.parametrize("name", sorted(METHODS))
 def test_every_selector_lies_between_its_bound_and_greedy(name: str) -> None:
-    for seed in range(150):
-        cover = small_cover(seed)
+    for seed, cover in small_covers(range(size(short=25, full=300))):
         optimum = fewest(cover)
         rows, bound = METHODS[name](cover, Settings())
         check_rows(cover, rows)
@@ -65,7 +80,7 @@ def test_every_selector_lies_between_its_bound_and_greedy(name: str) -> None:
 
 
 def test_no_bound_is_above_the_optimum() -> None:
-    for cover in map(small_cover, range(150)):
+    for _, cover in small_covers(range(size(short=25, full=300))):
         optimum = fewest(cover)
         assert counting_bound(cover) <= optimum
         assert relaxation_bound(cover) <= optimum
@@ -78,6 +93,24 @@ def test_the_default_selector_finds_nearly_every_optimum() -> None:
         for cover in map(small_cover, range(1000, 1150))
     )
     assert missed <= 1
+
+
+def test_more_views_never_take_fewer_stops() -> None:
+    for cover in map(small_cover, range(size(short=40, full=300))):
+        once, twice, thrice = (fewest(asking(cover, views)) for views in (1, 2, 3))
+        assert once <= twice <= thrice
+        rows, _ = METHODS["default"](asking(cover, 2), Settings())
+        assert is_enough(cover, rows)
+
+
+def test_what_chosen_rows_saw_once_is_asked_for_once_more() -> None:
+    for seed in range(40):
+        cover = asking(small_cover(seed), 2)
+        first = np.arange(min(2, cover.rows))
+        rows = greedy(cover.after(first))
+        assert not set(rows.tolist()) & set(first.tolist())
+        assert is_enough(cover, np.concatenate([first, rows]))
+        assert len(rows) >= fewest(cover) - len(first)
 
 
 def test_greedy_takes_what_adds_most_and_ties_go_to_the_lower_row() -> None:
