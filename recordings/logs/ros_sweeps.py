@@ -24,18 +24,24 @@ KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
 
 def _of_point_cloud(message: Any) -> FloatArray:
+    """Nothing of a cloud whose own words about its bytes do not fit them."""
     order = ">" if message.is_bigendian else "<"
     places = {item.name: item for item in message.fields if item.name in ("x", "y", "z")}
     if {"x", "y"} - places.keys() or any(item.datatype not in KINDS for item in places.values()):
         return np.empty((0, 3))
+    forms = {name: np.dtype(order + KINDS[item.datatype]) for name, item in places.items()}
+    step, wide = int(message.point_step), int(message.width) * int(message.point_step)
+    if any(item.offset + forms[name].itemsize > step for name, item in places.items()):
+        return np.empty((0, 3))
     kind = np.dtype({
-        "names": list(places),
-        "formats": [order + KINDS[item.datatype] for item in places.values()],
-        "offsets": [item.offset for item in places.values()],
-        "itemsize": message.point_step,
+        "names": list(forms), "formats": list(forms.values()),
+        "offsets": [places[name].offset for name in forms], "itemsize": step,
     })  # fmt: skip
-    data = np.asarray(message.data, np.uint8).tobytes()
-    rows = np.frombuffer(data[: len(data) // kind.itemsize * kind.itemsize], kind)
+    data = np.asarray(message.data, np.uint8)
+    pitch = max(int(message.row_step), wide)
+    if message.height > 1 and pitch > wide and len(data) >= message.height * pitch:  # rows are padded
+        data = data[: message.height * pitch].reshape(message.height, pitch)[:, :wide].ravel()
+    rows = np.frombuffer(data[: len(data) // step * step].tobytes(), kind)
     z = rows["z"] if "z" in places else np.zeros(len(rows))
     xyz = np.stack([rows["x"], rows["y"], z], axis=-1).astype(float)
     return xyz[np.isfinite(xyz).all(axis=1)]

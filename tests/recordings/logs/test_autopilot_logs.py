@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from mission.errors import InputError
 from recordings.logs import read_log
-from tests.recordings.logs.writing import BEGIN_NS, write_dataflash, write_telemetry_log
+from tests.recordings.logs.writing import BEGIN_NS, write_dataflash, write_telemetry_log, write_ulog
 
 KINDS = {
     "POS": ("QLLf", "TimeUS,Lat,Lng,Alt"),
@@ -127,3 +127,51 @@ def test_a_log_of_neither_kind_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"ULog\x01\x12\x35" + b"\0" * 30)
     with pytest.raises(InputError, match=r"a\.ulg"):
         read_log(path)
+
+
+LOCAL = (
+    *("uint64_t timestamp", "double ref_lat", "double ref_lon", "float x", "float y", "float heading"),
+    *("bool xy_valid", "bool xy_global"),
+)
+
+
+def test_a_ulog_gives_its_valid_positions_east_and_north_of_its_origin(tmp_path: Path) -> None:
+    """PX4 counts x to the north, y to the east, and headings clockwise from north."""
+    rows = [(k * 100_000, 47.0, 8.0, 2.0 + 0.1 * k, 1.0, math.pi / 2, k >= 10, True) for k in range(60)]
+    states = [(0, 4), (3_000_000, 3)]
+    tables = {
+        "vehicle_local_position": (LOCAL, rows),
+        "vehicle_status": (("uint64_t timestamp", "uint8_t nav_state"), states),
+        "camera_capture": (("uint64_t timestamp", "uint32_t seq"), [(2_500_000, 1)]),
+    }
+    log = read_log(write_ulog(tmp_path / "a.ulg", tables))
+    (track,) = log.poses
+    assert np.allclose(track.xy, [(1.0, 2.0 + 0.1 * k) for k in range(10, 60)], atol=1e-5)
+    assert np.allclose(track.heading, 0.0, atol=1e-6)
+    assert (track.origin and (track.origin.lat, track.origin.lon)) == (47.0, 8.0)
+    assert [(remark.kind, remark.ns) for remark in log.remarks if remark.kind != "text"] == [
+        ("mode", 0), ("trigger", 2_500_000_000), ("mode", 3_000_000_000)
+    ]  # fmt: skip
+    assert track.oddities == ("10 of 60 poses are no numbers, left out",)
+
+
+def test_a_ulog_without_a_valid_position_says_so(tmp_path: Path) -> None:
+    rows = [(k * 100_000, 47.0, 8.0, 0.0, 0.0, 0.0, False, False) for k in range(5)]
+    log = read_log(write_ulog(tmp_path / "a.ulg", {"vehicle_local_position": (LOCAL, rows)}))
+    assert log.poses == ()
+    assert "none of its 5 positions is valid" in log.oddities[0]
+
+
+def test_missions_that_were_sent_one_after_another_have_their_times(tmp_path: Path) -> None:
+    m, rows = dialect, told()
+    for number, second in enumerate((LAT + 9, LAT + 18, LAT + 18)):
+        ns = BEGIN_NS + (10 + number) * 10**9
+        items = (
+            m.MAVLink_mission_item_int_message(1, 1, k, 6, 16, 0, 1, 1, 0, 0, 0, lat, LON, 0)
+            for k, lat in enumerate((LAT, second))
+        )
+        rows += [(ns, 255, m.MAVLink_mission_count_message(1, 1, 2)), *((ns, 255, item) for item in items)]
+    log = read_log(write_telemetry_log(tmp_path / "a.tlog", rows))
+    assert [(upload.ns - BEGIN_NS, upload.items[0].x) for upload in log.uploads] == [
+        (0, LAT + 9), (10**10, LAT + 9), (11 * 10**9, LAT + 18), (12 * 10**9, LAT + 18)
+    ]  # fmt: skip

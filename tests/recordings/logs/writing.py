@@ -146,3 +146,23 @@ def write_telemetry_log(path: Path, told: Sequence[tuple[int, int, Any]]) -> Pat
         )
     path.write_bytes(data)
     return path
+
+
+def write_ulog(path: Path, tables: dict[str, tuple[Sequence[str], Sequence[tuple[Any, ...]]]]) -> Path:
+    """A PX4 .ulg; each table has its fields, such as `float x` (first `uint64_t timestamp`), and its rows."""
+    letters = {"uint64_t": "Q", "float": "f", "double": "d", "bool": "?", "uint8_t": "B", "uint32_t": "I"}
+
+    def message(kind: bytes, body: bytes) -> bytes:
+        return struct.pack("<HB", len(body), kind[0]) + body
+
+    data = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0))
+    for name, (fields, _) in tables.items():
+        data += message(b"F", f"{name}:{''.join(f'{field};' for field in fields)}".encode())
+    for number, name in enumerate(tables):
+        data += message(b"A", struct.pack("<BH", 0, number) + name.encode())
+    for number, (fields, rows) in enumerate(tables.values()):
+        form = "<" + "".join(letters[field.split()[0]] for field in fields)
+        for row in rows:
+            data += message(b"D", struct.pack("<H", number) + struct.pack(form, *row))
+    path.write_bytes(data)
+    return path
