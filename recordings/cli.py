@@ -117,11 +117,20 @@ def _of_one_mission(found: Review, folder: Path) -> tuple[RecordingReview, ...]:
 def runs(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder; those below it count too.")],
     json_: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+    web: Annotated[
+        bool, typer.Option("--web", help="Show them in a browser on this machine, until Ctrl-C.")
+    ] = False,
+    port: Annotated[int | None, typer.Option(help="With --web: where to listen; else on a free one.")] = None,
 ) -> None:
     """List plans and runs in a folder, the newest run first, with what each acquired.
 
     Keeps an index in the folder, and reads only recordings that have come or changed since.
     """
+    if web:
+        _serve_runs(folder, port)
+        return
+    if port is not None:
+        raise InputError("--port is where --web listens; add --web, or leave it out")
     from mission.table import printable, printable_lines
     from recordings.run_index import index_json, index_of, index_text
 
@@ -130,6 +139,19 @@ def runs(
     typer.echo(told)
     for fault in index.faults():
         typer.echo(f"stopgo: {printable(fault)}", err=True)
+
+
+def _serve_runs(folder: Path, port: int | None) -> None:
+    import threading
+
+    from mission.table import printable
+    from recordings.run_site import serving
+
+    with serving(folder, port=port) as address:
+        typer.echo(
+            printable(f"{folder}: {address} shows its runs, with reports and Rerun's viewer; Ctrl-C ends")
+        )
+        threading.Event().wait()
 
 
 def rerun_importer(

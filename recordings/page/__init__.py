@@ -25,7 +25,12 @@ HEAD = """<!doctype html>
 
 def report_html(subject: ReportSubject) -> bytes:
     """The page; the same subject gives the same bytes."""
-    return HEAD.format(title=shown(subject.title), style=STYLE, body=body(subject)).encode()
+    return whole_page(subject.title, body(subject))
 
 
-__all__ = ["ReportSubject", "report_html"]
+def whole_page(title: str, content: str) -> bytes:
+    """A page around HTML, in the report's style, that may load nothing from anywhere."""
+    return HEAD.format(title=shown(title), style=STYLE, body=content).encode()
+
+
+__all__ = ["ReportSubject", "report_html", "whole_page"]

@@ -1,0 +1,90 @@
+"""`stopgo runs --web`: the runs of a folder as pages of this machine."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import Iterator
+from http.client import HTTPConnection
+from pathlib import Path
+
+import pytest
+
+from mission.__main__ import main
+from recordings.read import check
+from recordings.run_site import RunSite, listening
+from tests.ports import free_port
+from tests.recordings import run, world
+
+
+@pytest.fixture(scope="module")
+def site(sighted: Path, skipping: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunSite]:
+    """The pages of a plan, a run and a broken file; served without Rerun's viewer."""
+    place = tmp_path_factory.mktemp("runs")
+    shutil.copy(sighted, place / "plan.rrd")
+    shutil.copy(skipping, place / "run.rrd")
+    (place / "<b>.rrd").write_bytes(b"RRF2junk")
+    made = RunSite(place, "http://127.0.0.1:1", tmp_path_factory.mktemp("merged"))
+    server = listening(made, free_port())
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
+    thread.start()
+    yield made
+    server.shutdown()
+    server.server_close()
+    thread.join()
+
+
+def asked(site: RunSite, path: str, *, host: str | None = None) -> tuple[int, dict[str, str], bytes]:
+    address = site.address.removeprefix("http://")
+    connection = HTTPConnection(address, timeout=60)
+    connection.request("GET", path, headers={"Host": host or address})
+    answer = connection.getresponse()
+    told = answer.status, dict(answer.getheaders()), answer.read()
+    connection.close()
+    return told
+
+
+def test_the_list_leads_to_each_missions_report_and_recording(site: RunSite) -> None:
+    status, _, body = asked(site, "/")
+    assert status == 200
+    page = body.decode()
+    assert run.RUN in page
+    assert f'href="/{world.MISSION_ID}.html"' in page
+    recording = f"http%3A%2F%2F127.0.0.1%3A{site.address.rpartition(':')[2]}%2F{world.MISSION_ID}.rrd"
+    assert f'href="{site.viewer}/?url={recording}"' in page
+    assert "&lt;b&gt;.rrd" in page
+    assert "<b>.rrd" not in page
+
+
+def test_plan_and_run_are_one_recording_that_the_viewer_may_load(site: RunSite, tmp_path: Path) -> None:
+    status, headers, body = asked(site, f"/{world.MISSION_ID}.rrd")
+    assert (status, headers["Access-Control-Allow-Origin"]) == (200, site.viewer)
+    (tmp_path / "merged.rrd").write_bytes(body)
+    assert check(tmp_path / "merged.rrd").properties.keys() >= {"plan", "run"}
+
+
+def test_the_report_is_that_of_review(site: RunSite) -> None:
+    status, _, body = asked(site, f"/{world.MISSION_ID}.html")
+    assert status == 200
+    assert b"57.1" in body
+
+
+@pytest.mark.parametrize("path", ["/other.rrd", "/../plan.rrd", "/plan.rrd", "/%2e%2e/plan.rrd", "/.html"])
+def test_nothing_else_of_the_machine_is_there(site: RunSite, path: str) -> None:
+    assert asked(site, path)[0] == 404
+
+
+def test_who_calls_it_by_another_name_gets_nothing(site: RunSite) -> None:
+    """A page of somebody else's may call this machine by a name of its own."""
+    assert asked(site, "/", host="example.com")[0] == 403
+    assert (
+        asked(site, "/", host=site.address.removeprefix("http://").replace("127.0.0.1", "localhost"))[0]
+        == 200
+    )
+
+
+def test_a_port_needs_web_and_must_be_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["runs", str(tmp_path), "--port", "8000"]) == 2
+    assert main(["runs", str(tmp_path), "--web", "--port", "99999"]) == 2
+    assert main(["runs", str(tmp_path / "nowhere"), "--web"]) == 2
+    assert capsys.readouterr().err.count("stopgo: ") == 3
