@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from bridge.commands.conform_commands import conform_commands
 from bridge.commands.doctor import doctor
 from bridge.commands.key_commands import key_commands
 from bridge.commands.mission_commands import clear, fetch_mission, push
@@ -36,6 +37,7 @@ def add_commands(app: typer.Typer) -> None:
     app.command()(watch_by(recording))
     app.add_typer(simulate_commands(), name="simulate")
     app.add_typer(key_commands(), name="keys")
+    app.add_typer(conform_commands(), name="conform")
     app.add_typer(tunnel_commands(), name="tunnel")
 
 

@@ -1,0 +1,123 @@
+"""`stopgo conform`: puts somebody else's robot or station through its paces by the protocol."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bridge.commands.connection import (
+    DEFAULT_ENDPOINT,
+    As,
+    Connect,
+    Insecure,
+    KeyFolder,
+    RobotName,
+    SiteName,
+    Timeout,
+)
+from bridge.commands.order_commands import Json, TakeOver
+from bridge.console import Bar, print_json, say, tell, tell_lines
+
+if TYPE_CHECKING:
+    from bridge.conform.requirements import ConformVerdict
+    from bridge.conform.robot_bench import RobotBench
+
+TRIED = ("requirements", 1)
+
+
+def conform_commands() -> typer.Typer:
+    """`stopgo conform` with its two kinds of peers."""
+    commands = typer.Typer(
+        help="Put a robot or a station of another make through its paces, and tell which requirement of"
+        " docs/reference/protocol.md it does not meet."
+        f"\n\nExample: stopgo conform robot --robot r1 --connect {DEFAULT_ENDPOINT} --drive",
+    )
+    commands.command("robot")(conform_robot)
+    return commands
+
+
+def conform_robot(
+    *,
+    robot: RobotName,
+    connect: Connect = DEFAULT_ENDPOINT,
+    site: SiteName = None,
+    keys: KeyFolder = None,
+    other_keys: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="A second station's keys, to see who may order what.")
+    ] = None,
+    who: As = None,
+    drive: Annotated[
+        bool, typer.Option("--drive", help="Let it drive, half a metre ahead of where it stands and back.")
+    ] = False,
+    restart: Annotated[
+        str | None, typer.Option(metavar="COMMAND", help="Starts the robot's program anew, and returns.")
+    ] = None,
+    take_over: TakeOver = False,
+    timeout: Timeout = 5.0,
+    insecure: Insecure = False,
+    json_: Json = False,
+) -> None:
+    """Be a station that tries every requirement on a robot, and print what it meets and what it does not.
+
+    The robot is given small missions of its own around the place where it stands; the one that lay there
+    lies ready again at the end. It does not move without --drive. A robot on a run is not touched.
+
+    Ends with 0 if nothing failed, 1 if something did, 2 if nothing was tried, and 3 if the robot stopped
+    answering.
+
+    Example: stopgo conform robot --robot r1 --connect tcp/127.0.0.1:7447
+
+    Example: stopgo conform robot --robot r1 --keys ~/keys/alice --other-keys ~/keys/bob --drive
+    """
+    from bridge.conform.conform_robot import REQUIREMENTS, ConformOptions, robot_bench, robot_verdicts
+
+    options = ConformOptions(
+        connect, robot, site, who, timeout, insecure, keys, other_keys, take_over, restart
+    )
+    with robot_bench(options) as bench, Bar("conform", TRIED) as bar:
+        _say_what_it_will_do(bench, drive=drive)
+        found: list[ConformVerdict] = []
+        for verdict in robot_verdicts(bench, drive=drive):
+            found.append(verdict)
+            bar.show(len(found), len(REQUIREMENTS) + 1)
+    report(robot, "robot", found, as_json=json_)
+
+
+def _say_what_it_will_do(bench: RobotBench, *, drive: bool) -> None:
+    robot = bench.keys.robot
+    if not drive:
+        say(f"{robot} will not drive; what needs that is left out (--drive)")
+        return
+    pose = bench.pose()
+    say(
+        f"{robot} WILL DRIVE, up to half a metre ahead of {pose.x:.2f}, {pose.y:.2f} m heading"
+        f" {math.degrees(pose.heading):.0f} degrees and back, several times; keep clear. Ctrl-C aborts"
+    )
+
+
+def report(peer: str, kind: str, found: Iterable[ConformVerdict], *, as_json: bool) -> None:
+    """Tell every verdict, and end with the exit code that they come to."""
+    from bridge.conform.requirements import counted
+    from mission.table import table
+
+    found = list(found)
+    counts = counted(found)
+    if as_json:
+        told = [
+            {"section": one.section, "requirement": one.text, "outcome": one.outcome, "reason": one.reason}
+            for one in found
+        ]
+        print_json({kind: peer, "counts": counts, "requirements": told})
+    else:
+        rows = [(one.section, one.text, one.outcome, one.reason) for one in found]
+        tell_lines(table(("protocol.md", "requirement", "outcome", "why"), rows))
+        told_counts = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
+        tell(f"{peer}: {told_counts}")
+    if any(one.gone for one in found):
+        raise typer.Exit(3)
+    if counts["failed"]:
+        raise typer.Exit(1)

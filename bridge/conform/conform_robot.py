@@ -1,0 +1,177 @@
+"""`stopgo conform robot`: a fake station tries every requirement on somebody's robot."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bridge.conform.falsified_seals import FalsifiedSeals
+from bridge.conform.requirements import ConformVerdict, Requirement, tried
+from bridge.conform.robot_bench import OVER, Forger, OtherStation, RobotBench
+from bridge.conform.robot_orders import IDLE, ORDERS
+from bridge.conform.robot_pushes import PUSHES
+from bridge.conform.robot_questions import QUESTIONS
+from bridge.conform.robot_restarts import RESTARTS
+from bridge.conform.robot_runs import RUNS
+from bridge.conform.robot_seals import SEALS
+from bridge.link.link import Link
+from bridge.link.protocol import Info, KeyExpressions
+from bridge.link.seals import Seals
+from bridge.link.zenoh_link import Guard, connecting
+from bridge.station.station import Station, connect
+from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
+from mission.run.lease import remaining_s
+
+REQUIREMENTS: tuple[Requirement[RobotBench], ...] = (
+    *QUESTIONS, *SEALS, *IDLE, *PUSHES, *ORDERS, *RUNS, *RESTARTS,
+)  # fmt: skip
+RESTART_S = 120.0
+"""How long the command that starts a robot anew may take."""
+
+
+@dataclass(frozen=True)
+class ConformOptions:
+    """How a robot under test is reached, and what may be done to it."""
+
+    endpoint: str
+    robot: str
+    site: str | None = None
+    commander: str | None = None
+    timeout_s: float = 5.0
+    insecure: bool = False
+    keys: Path | None = None
+    other_keys: Path | None = None
+    take_over: bool = False
+    restart: str | None = None
+
+
+@dataclass(frozen=True)
+class FalsifiedGuard(Guard):
+    """A link's guard whose seals are wrong on purpose."""
+
+    falsified: Any = None
+
+    @property
+    def seals(self) -> Seals:
+        return self.falsified
+
+
+@contextmanager
+def robot_bench(options: ConformOptions) -> Iterator[RobotBench]:
+    """A robot that stands still and that nobody else commands, ready to be tried.
+
+    Raises
+    ------
+    InputError
+        If it is on a run, or another commands it; nothing was done.
+    RobotUnreachable
+        If it did not show itself.
+    """
+    with ExitStack() as stack:
+        reach = _reach(options)
+        station = stack.enter_context(connect(**reach, keys=options.keys, commander=options.commander))
+        info = _first_info(station)
+        check_at_rest(info, station.commander, take_over=options.take_over)
+        other: OtherStation | None = None
+        if options.other_keys is not None:
+            second = stack.enter_context(connect(**reach, keys=options.other_keys))
+            other = OtherStation(second.commander, second.link)
+        elif station.held is None:
+            other = OtherStation(f"{station.commander}-other", station.link)
+        bench = RobotBench(
+            station.link, station.keys, commander=station.commander, timeout_s=options.timeout_s,
+            take_over=options.take_over, other=other, forger=_forger(station, options, stack),
+            restart=None if options.restart is None else restarting(options.restart),
+        )  # fmt: skip
+        try:
+            yield bench
+        finally:  # also where somebody stops this: no run goes on that nobody wants
+            bench.leave()
+
+
+def _reach(options: ConformOptions) -> dict[str, Any]:
+    return {
+        "endpoint": options.endpoint, "robot": options.robot, "site": options.site,
+        "timeout_s": options.timeout_s, "insecure": options.insecure,
+    }  # fmt: skip
+
+
+def _first_info(station: Station) -> Info:
+    try:
+        return station.info()
+    except AnswerIsNo as no:
+        raise InputError(f"{no}; no case was tried") from None
+
+
+def check_at_rest(info: Info, commander: str, *, take_over: bool) -> None:
+    """Refuse a robot that is at work, or in another's hands.
+
+    Raises
+    ------
+    InputError
+        Saying what to do.
+    """
+    if info.state.state not in OVER:
+        raise InputError(
+            f"{info.robot} is {info.state.state}: a robot on a run is not tried; end the run first"
+            f" (stopgo abort --robot {info.robot})"
+        )
+    lease = info.lease
+    left_s = 0.0 if lease is None else remaining_s(lease, info.clock_ns)
+    if lease is not None and lease.commander != commander and left_s > 0 and not take_over:
+        raise InputError(
+            f"{lease.commander} commands {info.robot} for {left_s:.0f} s more: wait, or add --take-over"
+        )
+
+
+def _forger(station: Station, options: ConformOptions, stack: ExitStack) -> Forger | None:
+    if station.held is None:
+        return None
+    seals = FalsifiedSeals(Guard(station.held).seals)
+    guard = FalsifiedGuard(station.held, falsified=seals)
+    link = stack.enter_context(connecting(options.endpoint, guard, open_s=options.timeout_s))
+    await_robot(link, station.keys, options.timeout_s)
+    return Forger(link, seals)
+
+
+def await_robot(link: Link, keys: KeyExpressions, timeout_s: float) -> None:
+    """Wait until a link reaches the robot."""
+    seen = threading.Event()
+    link.watch_presence(keys.alive, lambda key, alive: seen.set() if alive else None)
+    if not seen.wait(timeout_s):
+        raise OutcomeUnknown(f"{keys.robot} did not show itself on a second link within {timeout_s:g} s")
+
+
+def restarting(command: str) -> Any:
+    """What runs the command that starts the robot's program anew, and waits for its end."""
+    words = shlex.split(command)
+
+    def restart() -> None:
+        try:
+            subprocess.run(
+                words, check=True, timeout=RESTART_S, stdin=subprocess.DEVNULL, capture_output=True
+            )
+        except (OSError, subprocess.SubprocessError) as error:
+            raise InputError(f"--restart {command}: {error}") from None
+
+    return restart
+
+
+def robot_verdicts(bench: RobotBench, *, drive: bool) -> Iterator[ConformVerdict]:
+    """Every requirement's verdict; what the robot held before lies ready again at the end."""
+    held = bench.held_mission()
+    gone = False
+    for verdict in tried(REQUIREMENTS, bench, drive=drive, undrivable="the robot would drive: --drive"):
+        gone |= verdict.gone
+        yield verdict
+    if not gone and held is not None:
+        last = Requirement[RobotBench](
+            "Pushing a mission", "what lay there before lies ready again", lambda bench: bench.put_back(held)
+        )
+        yield from tried((last,), bench)

@@ -1,0 +1,71 @@
+"""Seals that are wrong on purpose, to see whether the other end notices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import msgspec
+
+from bridge.link.link import Answering, Hearing
+from bridge.link.seals import Question, Seal, SealedAnswering, SealedHearing, Seals
+
+Spoiling = Callable[[Question, Seals], Question]
+"""Makes a question whose seal does not hold of one whose seal does."""
+
+
+class FalsifiedSeals:
+    """A holder's seals; the questions' are spoilt as was said before, and every answer is let through."""
+
+    def __init__(self, seals: Seals) -> None:
+        self._seals = seals
+        self.spoil: Spoiling = lambda question, seals: question
+        self.distrusted = ""
+
+    def question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+        return self.spoil(self._seals.question(key, payload, parameters), self._seals)
+
+    def opened(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+        self._seals.opened(question, payload, seal)
+        self.distrusted = self._seals.distrusted
+        return payload
+
+    def answering(self, answer: Answering) -> SealedAnswering:
+        return self._seals.answering(answer)
+
+    def telling(self, key: str, payload: bytes) -> bytes:
+        return self._seals.telling(key, payload)
+
+    def hearing(self, heard: Hearing) -> SealedHearing:
+        return self._seals.hearing(heard)
+
+
+def unsigned(question: Question, seals: Seals) -> Question:
+    return replace(question, seal=b"")
+
+
+def flipped(question: Question, seals: Seals) -> Question:
+    """One bit of the signature."""
+    seal = msgspec.json.decode(question.seal, type=Seal)
+    signature = bytes([seal.signature[0] ^ 1]) + seal.signature[1:]
+    return replace(question, seal=msgspec.json.encode(msgspec.structs.replace(seal, signature=signature)))
+
+
+def of_another_key(question: Question, seals: Seals) -> Question:
+    other = seals.question(f"{question.key}x", question.payload, question.parameters)
+    return replace(question, seal=other.seal)
+
+
+def of_another_payload(question: Question, seals: Seals) -> Question:
+    other = seals.question(question.key, question.payload + b" ", question.parameters)
+    return replace(question, seal=other.seal)
+
+
+def of_other_parameters(question: Question, seals: Seals) -> Question:
+    other = seals.question(question.key, question.payload, {**question.parameters, "since": "7"})
+    return replace(question, seal=other.seal)
+
+
+def without_certificate(question: Question, seals: Seals) -> Question:
+    seal = msgspec.json.decode(question.seal, type=Seal)
+    return replace(question, seal=msgspec.json.encode(msgspec.structs.replace(seal, certificate=None)))

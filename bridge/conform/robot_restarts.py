@@ -1,0 +1,65 @@
+"""What a robot must still know after its program was ended and started anew."""
+
+from __future__ import annotations
+
+from bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
+from bridge.conform.robot_bench import RobotBench
+from bridge.conform.robot_orders import ready
+from bridge.link.protocol import Info, encode
+
+BOOT_S = 60.0
+"""How long a robot may take to answer again."""
+
+
+def _restarted(bench: RobotBench) -> Info:
+    """What the robot tells once it has been started anew."""
+    if bench.restart is None:
+        raise NotTried("needs a command that starts the robot's program anew: --restart COMMAND")
+    before = bench.info().boot_id
+    bench.restart()
+
+    def back() -> Info | None:
+        try:
+            info = bench.info()
+        except Nonconforming:
+            return None
+        return info if info.boot_id != before else None
+
+    return bench.wait(back, BOOT_S, "the robot did not come back with a new boot_id")
+
+
+def a_boot_has_an_id_of_its_own(bench: RobotBench) -> None:
+    ready(bench)
+    before = bench.info()
+    after = _restarted(bench)
+    told = after.state.state, after.state.mission_id, after.state.revision
+    must(told == ("READY", before.state.mission_id, before.state.revision), f"after a restart it is {told}")
+    must(after.state.last_event >= before.state.last_event, "after a restart events are missing")
+    must(after.lease == before.lease, "after a restart the lease is another")
+
+
+def answers_outlive_a_restart(bench: RobotBench) -> None:
+    ready(bench)
+    order, key = bench.order("skip"), bench.keys.command("skip")
+    first = bench.ask_raw(key, encode(order))
+    late = bench.order("skip")
+    _restarted(bench)
+    must(bench.ask_raw(key, encode(order)) == first, "the same order after a restart got another answer")
+    bench.refused(late, "expired")
+
+
+def a_run_waits_after_a_restart(bench: RobotBench) -> None:
+    ready(bench)
+    answer = bench.obeyed("start")
+    after = _restarted(bench)
+    must(after.state.state == "PAUSED", f"started anew during a run it is {after.state.state}")
+    must(after.state.run_id == answer.run_id, "started anew during a run it tells another run")
+
+
+RESTARTS: tuple[Requirement[RobotBench], ...] = (
+    Requirement("Events", "a boot has an id; mission, lease, events outlive it", a_boot_has_an_id_of_its_own),
+    Requirement("Orders", "answers outlive a restart; orders of the boot before do not",
+                answers_outlive_a_restart),
+    Requirement("States of a run", "nothing moves by itself after a restart: PAUSED",
+                a_run_waits_after_a_restart, drives=True),
+)  # fmt: skip

@@ -1,0 +1,262 @@
+"""How a robot must drive: it moves for all of these, half a metre ahead of where it stands and back."""
+
+from __future__ import annotations
+
+import msgspec
+
+from bridge.conform.requirements import NotTried, Requirement, must
+from bridge.conform.robot_bench import OVER, RobotBench, read, rejects, told_of
+from bridge.conform.robot_orders import as_another, ready, refuses_what_means_nothing
+from bridge.conform.robot_questions import states_are_bounded
+from bridge.link.protocol import POSE_PAGE, Accepted, PosePage
+from mission.document import Mission, sealed
+from mission.events import (
+    AnyEvent,
+    Arrived,
+    Finished,
+    Scanned,
+    Settled,
+    Skipped,
+    Started,
+    StateReport,
+    event_of,
+)
+from mission.run.orders import LONGEST_VALID_S, Answer
+
+RUN_S = 180.0
+"""How long a run of the trial mission may take."""
+MANY_STOPS, MANY_SKIPPED = 110, 105
+"""More than a state lists, and more events than a page has."""
+NEAR_M = 0.1
+
+
+def _started(bench: RobotBench) -> tuple[Mission, Answer]:
+    mission = ready(bench)
+    return mission, bench.obeyed("start")
+
+
+def _arrived(bench: RobotBench, since: int) -> None:
+    """Wait until the robot has driven a leg."""
+
+    def there() -> bool | None:
+        return any(isinstance(event, Arrived) for event in bench.log(since)) or None
+
+    bench.wait(there, RUN_S, "the robot did not arrive at the first stop")
+
+
+def a_run_goes_to_its_end(bench: RobotBench) -> None:
+    newest = bench.info().state.last_event
+    bench.heard.events.clear()
+    mission, answer = _started(bench)
+    state = bench.wait_for_state(*OVER, within_s=RUN_S)
+    must(state.state == "FINISHED", f"the run ended {state.state}")
+    must(state.run_id == answer.run_id, "the answer to start and the state tell different runs")
+    stops = tuple(stop.id for stop in mission.stops)
+    must(state.done == stops, f"`done` is {state.done}, not {stops}")
+    events = [event for event in bench.log(newest) if event.run_id == answer.run_id]
+    _tells_every_step(events, stops)
+    _told_once_in_order(bench, events)
+
+
+def _tells_every_step(events: list[AnyEvent], stops: tuple[str, ...]) -> None:
+    must(events and isinstance(events[0], Started), "a run's first event is not Started")
+    must(isinstance(events[-1], Finished), "a finished run's last event is not Finished")
+    for stop in stops:
+        kinds = [type(event) for event in events if getattr(event, "stop", None) == stop]
+        must(kinds == [Arrived, Settled, Scanned], f"stop {stop} tells {[kind.__name__ for kind in kinds]}")
+    files = {event.file for event in events if isinstance(event, Scanned)}
+    must(len(files) == len(stops), "two stops' scans have one file")
+
+
+def _told_once_in_order(bench: RobotBench, events: list[AnyEvent]) -> None:
+    wanted = [event.number for event in events]
+
+    def all_heard() -> list[int] | None:
+        numbers = [event_of(raw).number for raw in bench.heard.events]
+        mine = [number for number in numbers if number >= wanted[0]]
+        return mine if mine and mine[-1] >= wanted[-1] else None
+
+    heard = bench.wait(all_heard, 5.0, "tel/event did not tell the run's last event")
+    must(heard == wanted, f"tel/event told {heard}, and the log has {wanted}")
+
+
+def the_way_has_no_gaps(bench: RobotBench) -> None:
+    """The poses of the run before, or of a new one."""
+    state = bench.info().state
+    if state.state != "FINISHED":
+        _started(bench)
+        state = bench.wait_for_state(*OVER, within_s=RUN_S)
+    seqs, since = [], 0
+    while True:
+        page = bench.ask_for(PosePage, bench.keys.poses, since=str(since), run=str(state.run_id))
+        seqs += [pose.seq for pose in page.poses]
+        if len(page.poses) < POSE_PAGE:
+            break
+        since = seqs[-1]
+    must(seqs, "no poses of the run are kept")
+    missing = set(range(seqs[0], seqs[-1] + 1)) - set(seqs)
+    must(not missing, f"{len(missing)} poses of the run are missing in what is kept")
+
+
+def a_start_is_carried_out_once(bench: RobotBench) -> None:
+    newest = bench.info().state.last_event
+    ready(bench)
+    order = bench.order("start")
+    first, again = bench.give(order), bench.give(order)
+    must(first.outcome == "ok", f"start was refused: {first.reason}")
+    must(first == again, "the same start again got another answer")
+    bench.refused(bench.order("start"), "wrong_state")
+    started = [event for event in bench.log(newest) if isinstance(event, Started)]
+    must(len(started) == 1, f"one start was told as {len(started)} Started")
+    bench.end_run()
+    after = bench.give(order)
+    must(after == first, "the same start after the run's end got another answer")
+    must(bench.info().state.state in OVER, "the same start after the run's end drove again")
+
+
+def orders_mean_what_the_table_says(bench: RobotBench) -> None:
+    newest = bench.info().state.last_event
+    _started(bench)
+    refuses_what_means_nothing(bench, "RUNNING")
+    bench.obeyed("pause")
+    bench.wait_for_state("PAUSED")
+    refuses_what_means_nothing(bench, "PAUSED")
+    bench.obeyed("resume")
+    bench.wait_for_state("RUNNING")
+    _arrived(bench, newest)
+    bench.obeyed("pause")
+    bench.wait_for_state("PAUSED")
+    bench.obeyed("home")
+    answer = bench.give(bench.order("pause"))
+    if answer.outcome == "refused" and bench.info().state.state in OVER:
+        raise NotTried("the way home was over before it could be paused; all before it passed")
+    must(answer.outcome == "ok", f"pause on the way home was refused: {answer.reason}")
+    refuses_what_means_nothing(bench, "PAUSED homing")
+    bench.obeyed("resume")
+    bench.wait_for_state("HOMING", *OVER)
+    bench.wait_for_state("ABORTED", within_s=RUN_S)
+    refuses_what_means_nothing(bench, "ABORTED")
+    bench.refused(bench.order("start"), "finished_before")
+
+
+def an_abort_ends_a_run(bench: RobotBench) -> None:
+    _started(bench)
+    answer = bench.obeyed("abort", issued_ns=0, boot_id=None, valid_for_s=LONGEST_VALID_S)
+    must(answer.state == "ABORTED", f"an abort was answered with state {answer.state}")
+    bench.wait_for_state("ABORTED")
+
+
+def anybody_may_pause(bench: RobotBench) -> None:
+    _started(bench)
+    with as_another(bench):
+        bench.obeyed("pause")
+        bench.wait_for_state("PAUSED")
+        bench.refused(bench.order("resume"), "not_the_commander")
+    must(bench.info().state.state == "PAUSED", "another's resume was carried out though it was refused")
+
+
+def a_late_start_does_not_drive(bench: RobotBench) -> None:
+    ready(bench)
+    info = bench.info()
+    assert info.lease is not None
+    for reason, details in (
+        ("expired", {"issued_ns": info.clock_ns - 10 * 10**9, "valid_for_s": 5.0}),
+        ("expired", {"boot_id": "another-boot"}),
+        ("fenced", {"fence": info.lease.fence - 1}),
+        ("wrong_state", {"expect_state": ("PAUSED",)}),
+        ("wrong_mission", {"revision": 10**6}),
+    ):
+        bench.refused(bench.order("start", **details), reason)
+        must(bench.info().state.state == "READY", f"a start that was refused as {reason} drove")
+
+
+def a_start_from_elsewhere_is_refused(bench: RobotBench) -> None:
+    mission = bench.mission()
+    far = msgspec.structs.replace(mission.start, x=mission.start.x + 5.0)
+    first = mission.stops[0]
+    way = msgspec.structs.replace(first, approach=((far.x, far.y), (first.x, first.y)))
+    bench.has(
+        sealed(msgspec.structs.replace(mission, start=far, stops=(way, *mission.stops[1:]), return_=None))
+    )
+    bench.refused(bench.order("start"), "not_at_start")
+
+
+def a_long_run_is_told_in_little(bench: RobotBench) -> None:
+    newest = bench.info().state.last_event
+    bench.has(bench.mission(stops=MANY_STOPS, reach_m=NEAR_M))
+    bench.wait_for_state("READY")
+    bench.obeyed("start")
+    bench.obeyed("pause")
+    bench.wait_for_state("PAUSED")
+    for _ in range(MANY_SKIPPED):
+        bench.obeyed("skip")
+    state = bench.info().state
+    must(state.skipped_count == MANY_SKIPPED, f"skipped_count is {state.skipped_count}, not {MANY_SKIPPED}")
+    states_are_bounded(bench)
+    events = bench.log(newest)
+    numbers = [event.number for event in events]
+    must(numbers == list(range(newest + 1, newest + 1 + len(numbers))), "the log of the run has gaps")
+    told = sum(isinstance(event, Skipped) for event in events)
+    must(told == MANY_SKIPPED, f"{MANY_SKIPPED} skips were told as {told} Skipped")
+
+
+def a_revision_waits_for_the_next_stop(bench: RobotBench) -> None:
+    mission, _ = _started(bench)
+    bench.obeyed("pause")
+    bench.wait_for_state("PAUSED")
+    later = _next(bench, mission, stops=mission.stops[:-1], return_=None)
+    reply = bench.push(later)
+    if not isinstance(reply, Accepted) and getattr(reply, "reason", "") == "running":
+        raise NotTried("the robot takes no revision during a run")
+    must(isinstance(reply, Accepted) and reply.waits, f"a revision during a run: {told_of(reply)}")
+    state: StateReport = bench.info().state
+    must(state.next_revision == later.revision, f"next_revision is {state.next_revision}")
+
+
+def a_way_that_differs_is_refused(bench: RobotBench) -> None:
+    mission, _ = _started(bench)
+    bench.obeyed("pause")
+    bench.wait_for_state("PAUSED")
+    first = mission.stops[0]
+    renamed = msgspec.structs.replace(first, id=f"{first.id}-other")
+    reply = bench.push(_next(bench, mission, stops=(renamed, *mission.stops[1:])))
+    rejects(reply, "way_differs", "running")
+
+
+def another_mission_is_refused_during_a_run(bench: RobotBench) -> None:
+    mission, _ = _started(bench)
+    other = sealed(msgspec.structs.replace(mission, id=f"{mission.id}-other"))
+    rejects(bench.push(other), "running")
+
+
+def _next(bench: RobotBench, mission: Mission, **changes: object) -> Mission:
+    revision = bench.mission().revision
+    return sealed(msgspec.structs.replace(mission, revision=revision, **changes))
+
+
+def poses_tell_run_and_boot(bench: RobotBench) -> None:
+    _, answer = _started(bench)
+    bench.pose()
+    told = read(bench.heard.poses[-1], dict, "a pose")
+    must(told.get("boot_id") == bench.info().boot_id, "a pose tells another boot than info")
+    must(told.get("run_id") == answer.run_id, "a pose tells another run than the answer to start")
+
+
+RUNS: tuple[Requirement[RobotBench], ...] = tuple(
+    Requirement(section, text, find_out, drives=True)
+    for section, text, find_out in (
+        ("Orders", "a start late, fenced or meant otherwise does not drive", a_late_start_does_not_drive),
+        ("Orders", "a start away from the mission's: `not_at_start`", a_start_from_elsewhere_is_refused),
+        ("States of a run", "a run goes stop by stop to FINISHED", a_run_goes_to_its_end),
+        ("Events", "the way of a run is kept without gaps", the_way_has_no_gaps),
+        ("Events", "a pose tells run and boot", poses_tell_run_and_boot),
+        ("Orders", "a start that comes again is carried out once", a_start_is_carried_out_once),
+        ("Orders", "RUNNING to ABORTED: orders as in the table", orders_mean_what_the_table_says),
+        ("Orders", "an abort that knows nothing ends a run", an_abort_ends_a_run),
+        ("Orders", "anybody may pause; only the commander resumes", anybody_may_pause),
+        ("Messages", "110 stops are told in a small state, without gaps", a_long_run_is_told_in_little),
+        ("Pushing a mission", "a new revision during a run waits", a_revision_waits_for_the_next_stop),
+        ("Pushing a mission", "a revision of the way so far: `way_differs`", a_way_that_differs_is_refused),
+        ("Pushing a mission", "another mission in a run: `running`", another_mission_is_refused_during_a_run),
+    )
+)  # fmt: skip

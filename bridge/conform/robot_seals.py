@@ -1,0 +1,87 @@
+"""Whom a robot with keys must believe: nobody whose seal does not hold."""
+
+from __future__ import annotations
+
+from bridge.conform import falsified_seals as falsified
+from bridge.conform.falsified_seals import Spoiling
+from bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
+from bridge.conform.robot_bench import RobotBench, read_reply, rejects, told_of
+from bridge.link.protocol import Info, LogPage, encode
+
+NO_KEYS = "the link has no keys: --keys DIR"
+
+
+def _asked_wrongly(bench: RobotBench, spoil: Spoiling, what: str) -> None:
+    """Ask with seals that are spoilt; neither questions nor orders may be heeded."""
+    if bench.forger is None:
+        raise NotTried(NO_KEYS)
+    bench.forger.seals.spoil = spoil
+    for key, payload, parameters in (
+        (bench.keys.info, b"", {}),
+        (bench.keys.log, b"", {"since": "0"}),
+        (bench.keys.command("pause"), encode(bench.order("pause", issued_ns=0)), {}),
+    ):
+        raw = bench.forger.link.ask(key, payload, timeout_s=bench.timeout_s, parameters=parameters)
+        must(raw is not None, f"a question {what} was not answered; it is to be refused as untrusted")
+        reply = read_reply(raw or b"")
+        must(not isinstance(reply, Info | LogPage), f"a question {what} was answered with {told_of(reply)}")
+        rejects(reply, "untrusted")
+
+
+def unsigned_is_untrusted(bench: RobotBench) -> None:
+    _asked_wrongly(bench, falsified.unsigned, "without a seal")
+
+
+def wrong_signatures_are_untrusted(bench: RobotBench) -> None:
+    _asked_wrongly(bench, falsified.flipped, "with a wrong signature")
+
+
+def seals_are_for_one_key(bench: RobotBench) -> None:
+    _asked_wrongly(bench, falsified.of_another_key, "with the seal of another key")
+
+
+def seals_are_for_one_payload(bench: RobotBench) -> None:
+    _asked_wrongly(bench, falsified.of_another_payload, "with the seal of other bytes")
+
+
+def seals_are_for_their_parameters(bench: RobotBench) -> None:
+    _asked_wrongly(bench, falsified.of_other_parameters, "with the seal of other parameters")
+
+
+def certificates_are_needed(bench: RobotBench) -> None:
+    _asked_wrongly(bench, falsified.without_certificate, "without a certificate")
+
+
+def orders_are_given_in_ones_own_name(bench: RobotBench) -> None:
+    if bench.forger is None:
+        raise NotTried(NO_KEYS)
+    order = bench.order("pause", issued_ns=0, commander="somebody-else")
+    rejects(bench.ask(bench.keys.command("pause"), encode(order)), "untrusted")
+
+
+def what_is_published_is_sealed(bench: RobotBench) -> None:
+    """What is heard has been verified by the link before it is."""
+    if bench.forger is None:
+        raise NotTried(NO_KEYS)
+    bench.info()
+    before = len(bench.heard.states)
+    try:
+        bench.wait(lambda: len(bench.heard.states) > before or None, bench.timeout_s, "")
+    except Nonconforming:
+        why = bench.link.distrusted or "none came"
+        raise Nonconforming(f"no state was heard whose seal holds ({why})") from None
+
+
+SEALS: tuple[Requirement[RobotBench], ...] = tuple(
+    Requirement("Seals", text, find_out)
+    for text, find_out in (
+        ("a question without a seal: `untrusted`", unsigned_is_untrusted),
+        ("a wrong signature: `untrusted`", wrong_signatures_are_untrusted),
+        ("a seal counts on its own key only", seals_are_for_one_key),
+        ("a seal counts for its own bytes only", seals_are_for_one_payload),
+        ("a seal counts for its own parameters only", seals_are_for_their_parameters),
+        ("a question without a certificate: `untrusted`", certificates_are_needed),
+        ("an order in another's name: `untrusted`", orders_are_given_in_ones_own_name),
+        ("states are sealed, numbered and fresh", what_is_published_is_sealed),
+    )
+)

@@ -1,0 +1,51 @@
+"""`stopgo conform` against whole processes: what it prints, and what its exit code means."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from bridge.commands.spawn import robot_process
+from mission.__main__ import main
+from mission.files.mission_json import write
+from tests.bridge.guarded import keys_of_site
+from tests.bridge.world import corridor
+from tests.called import stopgo
+from tests.ports import free_port
+
+
+def test_a_robot_with_keys_meets_what_can_be_tried_at_rest(tmp_path: Path) -> None:
+    site = keys_of_site(tmp_path / "site")
+    listen = f"tls/127.0.0.1:{free_port()}"
+    with robot_process("r1", tmp_path / "s", listen=listen, extra=["--keys", str(site / "r1")]) as endpoint:
+        reach = ("--robot", "r1", "--connect", endpoint, "--keys", str(site / "alice"))
+        done = stopgo("conform", "robot", *reach, "--other-keys", str(site / "bob"), "--json")
+        told = json.loads(done.stdout)
+        assert done.returncode == 0, [one for one in told["requirements"] if one["outcome"] == "failed"]
+        assert told["counts"]["failed"] == 0
+        assert done.stderr == "r1 will not drive; what needs that is left out (--drive)\n"
+        untried = {one["reason"] for one in told["requirements"] if one["outcome"] == "not tried"}
+        assert untried == {
+            "the robot would drive: --drive",
+            "the robot takes any scan profile (Info.profiles is null)",
+            "needs a command that starts the robot's program anew: --restart COMMAND",
+        }
+
+
+def test_a_robot_on_a_run_is_not_tried(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(corridor(), tmp_path / "mission.json")
+    with robot_process("r1", tmp_path / "s") as endpoint:
+        reach = ("--robot", "r1", "--connect", endpoint)
+        assert main(["push", str(tmp_path / "mission.json"), *reach]) == 0
+        assert main(["start", *reach]) == 0
+        capsys.readouterr()
+        assert main(["conform", "robot", *reach, "--drive"]) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err == (
+            "stopgo: r1 is RUNNING: a robot on a run is not tried; end the run first"
+            " (stopgo abort --robot r1)\n"
+        )
+        assert main(["pause", *reach]) == 0

@@ -1,0 +1,101 @@
+"""A robot at work in the test's own time, for the kit to put through its paces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from bridge.conform.conform_robot import robot_verdicts
+from bridge.conform.falsified_seals import FalsifiedSeals
+from bridge.conform.requirements import ConformVerdict
+from bridge.conform.robot_bench import Forger, OtherStation, RobotBench
+from bridge.link.clock import WallClock
+from bridge.link.keys import now_utc, read_keys
+from bridge.link.memory_link import Switchboard
+from bridge.link.protocol import KeyExpressions
+from bridge.link.seals import NO_SEALS, KeySeals, Seals
+from bridge.robot.agent import Agent, on_link
+from bridge.robot.bodies import pose_of
+from bridge.robot.controller import Controller, new_boot_id
+from bridge.robot.inbox import Inbox
+from bridge.robot.journal import Journal, memory_journal
+from bridge.robot.simulator import SimulatedBase, SimulatedScanner
+from tests.bridge.world import EXACT
+
+
+class RobotUnderTest:
+    """A whole robot on a memory link, which can be started anew; subclasses are broken on purpose."""
+
+    controller: type[Controller] = Controller
+    agent: type[Agent] = Agent
+    inbox: type[Inbox] = Inbox
+
+    def __init__(self, site: Path | None = None) -> None:
+        self.site = site
+        self.board = Switchboard()
+        self.keys = KeyExpressions("r1")
+        self.journal: Journal = memory_journal()
+        self.clock = WallClock()
+        self.base = SimulatedBase(clock=self.clock, wear=EXACT)
+        self.scanner = SimulatedScanner(clock=self.clock)
+        self.controllers: list[Controller] = []
+        self._running = ExitStack()
+
+    def seals(self, name: str, boot_id: str = "") -> Seals:
+        if self.site is None:
+            return NO_SEALS
+        return KeySeals(read_keys(self.site / name, now=now_utc()), boot_id=boot_id)
+
+    def boot(self) -> None:
+        boot_id = new_boot_id()
+        link = self.board.link(self.seals("r1", boot_id))
+        controller = self.controller(
+            robot="r1", journal=self.journal, base=self.base, scanner=self.scanner, clock=self.clock,
+            mission_taken=lambda mission: self.base.stand_at_start(pose_of(mission.start)), boot_id=boot_id,
+        )  # fmt: skip
+        self.controllers.append(controller)
+        agent = self.agent(
+            keys=self.keys, link=link, journal=self.journal, runner=controller,
+            inbox=self.inbox(self.journal, controller, ("default",)), clock=self.clock,
+            command_clock=self.clock,
+        )  # fmt: skip
+        self._running.callback(link.close)
+        self._running.enter_context(on_link(agent))
+
+    def restart(self) -> None:
+        self.shut_down()
+        self.boot()
+
+    def shut_down(self) -> None:
+        self._running.close()
+
+    def bench(self) -> RobotBench:
+        forger = None
+        if self.site is not None:
+            seals = FalsifiedSeals(self.seals("alice"))
+            forger = Forger(self.board.link(seals), seals)
+        other = OtherStation("bob", self.board.link(self.seals("bob")))
+        return RobotBench(
+            self.board.link(self.seals("alice")), self.keys, commander="alice", timeout_s=2.0, other=other,
+            forger=forger, restart=self.restart,
+        )  # fmt: skip
+
+
+@contextmanager
+def booted(robot: RobotUnderTest) -> Iterator[RobotUnderTest]:
+    robot.boot()
+    try:
+        yield robot
+    finally:
+        robot.shut_down()
+
+
+def verdicts(robot: RobotUnderTest, *, drive: bool = True) -> list[ConformVerdict]:
+    """What the kit finds of a robot."""
+    with booted(robot):
+        return list(robot_verdicts(robot.bench(), drive=drive))
+
+
+def failed(found: list[ConformVerdict]) -> dict[str, str]:
+    return {verdict.text: verdict.reason for verdict in found if verdict.outcome == "failed"}

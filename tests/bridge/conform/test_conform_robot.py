@@ -1,0 +1,300 @@
+"""The kit passes our own robot, and finds each way in which a broken one breaks the protocol."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from bridge.conform.conform_robot import REQUIREMENTS, check_at_rest, robot_verdicts
+from bridge.conform.requirements import ConformVerdict, tried
+from bridge.conform.robot_bench import OVER
+from bridge.link.link import Answering, Request
+from bridge.link.protocol import LogPage, Manifest, Rejected, decode, encode
+from bridge.link.seals import KeySeals, SealedAnswering, Seals
+from bridge.robot.agent import Agent
+from bridge.robot.controller import Controller
+from bridge.robot.inbox import Inbox
+from mission.document import Mission
+from mission.errors import InputError
+from mission.events import StateReport, TakenOver
+from mission.run.lease import Lease
+from mission.run.orders import FREE_VERBS, Answer, Order
+from tests.bridge.conform.robot_under_test import RobotUnderTest, booted, failed, verdicts
+from tests.bridge.guarded import keys_of_site
+
+pytestmark = pytest.mark.usefixtures("own_time")
+
+changed = msgspec.structs.replace
+
+
+def test_our_own_robot_meets_every_requirement() -> None:
+    found = verdicts(RobotUnderTest())
+    assert failed(found) == {}
+    assert {verdict.section for verdict in found if verdict.outcome == "not tried"} == {"Seals"}
+
+
+def test_our_own_robot_with_keys_meets_what_is_said_of_seals(tmp_path: Path) -> None:
+    robot = RobotUnderTest(keys_of_site(tmp_path / "site"))
+    with booted(robot):
+        seals = [one for one in REQUIREMENTS if one.section == "Seals"]
+        found = list(tried(seals, robot.bench()))
+    assert {verdict.outcome for verdict in found} == {"passed"}, failed(found)
+
+
+def test_without_drive_nothing_moves() -> None:
+    robot = RobotUnderTest()
+    stood = robot.base.pose()
+    found = verdicts(robot, drive=False)
+    assert robot.base.pose() == stood
+    assert {type(event) for event in robot.journal.events()} == {TakenOver}
+    driven = {one.text for one in REQUIREMENTS if one.drives}
+    assert driven <= {verdict.text for verdict in found if verdict.outcome == "not tried"}
+
+
+def test_what_lay_on_the_robot_lies_ready_again() -> None:
+    robot = RobotUnderTest()
+    with booted(robot):
+        held = robot.bench().has(robot.bench().mission())
+        found = list(robot_verdicts(robot.bench(), drive=False))
+        state = robot.bench().info().state
+    assert found[-1].text == "what lay there before lies ready again"
+    assert (state.state, state.mission_id, state.revision) == ("READY", held.id, held.revision)
+
+
+def test_a_robot_on_a_run_or_in_others_hands_is_left_alone() -> None:
+    robot = RobotUnderTest()
+    with booted(robot):
+        bench = robot.bench()
+        bench.has(bench.mission())
+        with pytest.raises(InputError, match="alice commands r1 for"):
+            check_at_rest(bench.info(), "carol", take_over=False)
+        check_at_rest(bench.info(), "carol", take_over=True)
+        bench.obeyed("start")
+        with pytest.raises(InputError, match="r1 is RUNNING: a robot on a run is not tried"):
+            check_at_rest(bench.info(), "alice", take_over=True)
+
+
+# Robots that are broken
+
+
+class ForgetsAnswers(Controller):
+    def obey(self, order: Order) -> Answer:
+        fresh = f"{order.cmd_id}-{self._clock.now_ns()}"
+        return changed(super().obey(changed(order, cmd_id=fresh)), cmd_id=order.cmd_id)
+
+
+class IgnoresFences(Controller):
+    def obey(self, order: Order) -> Answer:
+        return super().obey(changed(order, fence=None))
+
+
+class NeverTooLate(Controller):
+    def obey(self, order: Order) -> Answer:
+        now_ns = self._clock.now_ns()
+        return super().obey(changed(order, issued_ns=now_ns, valid_for_s=5.0, boot_id=None))
+
+
+class StopsForTheCommanderOnly(Controller):
+    def obey(self, order: Order) -> Answer:
+        lease = self.lease
+        if order.verb in FREE_VERBS and lease and lease.commander != order.commander:
+            return Answer(
+                cmd_id=order.cmd_id, verb=order.verb, outcome="refused", reason="not_the_commander",
+                message="", run_id=None, state=self.run.state,
+            )  # fmt: skip
+        return super().obey(order)
+
+
+class HeedsNobodysLease(Controller):
+    def obey(self, order: Order) -> Answer:
+        return super().obey(changed(order, commander=self.lease.commander if self.lease else "a"))
+
+
+class DrivesOnEveryStart(Controller):
+    def obey(self, order: Order) -> Answer:
+        plain = {"issued_ns": self._clock.now_ns(), "expect_state": None, "revision": None, "fence": None}
+        return super().obey(changed(order, **plain) if order.verb == "start" else order)
+
+
+class DrivesWhatItIsSent(Controller):
+    def take(self, commit: Any, mission: Mission) -> Rejected | None:
+        rejected = super().take(commit, mission)
+        now_ns = self._clock.now_ns()
+        self.obey(Order(cmd_id=commit.nonce, verb="start", commander=commit.commander, issued_ns=now_ns,
+                        valid_for_s=5.0))  # fmt: skip
+        return rejected
+
+
+class GoesOnByItself(Controller):
+    def _recover(self) -> None:
+        super()._recover()
+        if self.run.state == "PAUSED":
+            self._run = changed(self.run, state="RUNNING")
+
+
+class ReadsStrictly(Agent):
+    def _command(self, request: Request) -> bytes:
+        if b'"later":{' in request.payload:
+            return encode({"is": "Malformed", "message": "unknown field `later`"})
+        return super()._command(request)
+
+
+class ReadsNothing(Agent):
+    def _keep(self, request: Request) -> bytes:
+        return self._info(request)
+
+
+class LosesEvents(Agent):
+    def _log(self, request: Request) -> bytes:
+        page = decode(super()._log(request), LogPage)
+        kept = tuple(body for body in page.bodies if b'"Settled"' not in bytes(body))
+        return encode(changed(page, bodies=kept))
+
+
+class TellsAllStops(Agent):
+    def _state(self) -> StateReport:
+        return changed(super()._state(), skipped=self._runner.snapshot()[0].skipped)
+
+
+class SaysNothingOfItself(Agent):
+    def _tell_news(self) -> None:
+        self._closing.wait()
+
+
+class TakesDamage(Inbox):
+    def _received(self, manifest: Manifest) -> Mission | Rejected:
+        document = self._journal.chunks(manifest.sha256)
+        try:
+            return self._read(document, manifest)
+        except ValueError:
+            return Rejected(reason="malformed", messages=())
+
+
+class TakesOldRevisions(Inbox):
+    def _outdated(self, mission_id: str, manifest: Manifest) -> Rejected | None:
+        return None
+
+
+class WantsPiecesInOrder(Inbox):
+    def _chunk(self, mission_id: str, number: int, request: Request) -> Any:
+        manifest = self._journal.transfer(mission_id)
+        held = () if manifest is None else self._journal.chunks_held(manifest.sha256)
+        if number > len(held):
+            return Rejected(reason="incomplete", messages=("in order, please",))
+        return super()._chunk(mission_id, number, request)
+
+
+@pytest.mark.parametrize(
+    ("part", "broken", "requirement", "why"),
+    [
+        ("controller", ForgetsAnswers, "the same order again gets the stored answer", "another answer"),
+        ("controller", ForgetsAnswers, "a start that comes again is carried out once", "another answer"),
+        ("controller", IgnoresFences, "an older fence: `fenced`", "wrong_state, not as fenced"),
+        ("controller", NeverTooLate, "orders too late, too long, of another boot: `expired`", "not as exp"),
+        ("controller", StopsForTheCommanderOnly, "`pause` and `abort` need no lease", "not_the_commander"),
+        ("controller", StopsForTheCommanderOnly, "anybody may pause; only the commander resumes", "refused"),
+        ("controller", HeedsNobodysLease, "without the lease: `not_the_commander`", "wrong_state, not as"),
+        (
+            "controller",
+            DrivesOnEveryStart,
+            "a start late, fenced or meant otherwise does not drive",
+            "had to",
+        ),
+        ("controller", DrivesWhatItIsSent, "chunks may come in any order", "did not become READY"),
+        ("controller", GoesOnByItself, "nothing moves by itself after a restart: PAUSED", "it is RUNNING"),
+        ("agent", ReadsStrictly, "fields that are not known are passed over", "to be passed over"),
+        ("agent", ReadsNothing, "messages that are cut off are Malformed", "answered with Info"),
+        ("agent", LosesEvents, "a run goes stop by stop to FINISHED", "tells ['Arrived', 'Scanned']"),
+        ("agent", TellsAllStops, "110 stops are told in a small state, without gaps", "a state "),
+        ("agent", SaysNothingOfItself, "the state is told at least every second", "0 states came"),
+        ("inbox", TakesDamage, "a damaged chunk is found at the commit: `digest`", "Rejected malformed"),
+        ("inbox", TakesOldRevisions, "a revision before the stored one: `older_revision`", "with Ready"),
+        ("inbox", WantsPiecesInOrder, "chunks may come in any order", "Rejected incomplete"),
+    ],
+)
+def test_a_broken_robot_is_found_by_the_requirement_that_names_it(
+    part: str, broken: type, requirement: str, why: str
+) -> None:
+    robot = RobotUnderTest()
+    setattr(robot, part, broken)
+    (found,) = verdicts_on(robot, requirement)
+    assert found.outcome == "failed"
+    assert why in found.reason
+    assert robot.controllers[-1].run.state in OVER, "it goes on driving"
+
+
+def verdicts_on(robot: RobotUnderTest, requirement: str) -> list[ConformVerdict]:
+    with booted(robot):
+        (one,) = [one for one in REQUIREMENTS if one.text == requirement]
+        return list(tried([one], robot.bench(), drive=True))
+
+
+class BelievesEverybody(KeySeals):
+    def answering(self, answer: Answering) -> SealedAnswering:
+        sealed = super().answering(answer)
+        own = self
+
+        def answered(request: Request) -> tuple[bytes, bytes]:
+            reply, seal = sealed(request)
+            if b"untrusted" not in reply:
+                return reply, seal
+            return answer(request), own.telling(request.key, b"")
+
+        return answered
+
+
+class SealsNoStates(KeySeals):
+    def telling(self, key: str, payload: bytes) -> bytes:
+        return b""
+
+
+@pytest.mark.parametrize(
+    ("broken", "requirement", "why"),
+    [
+        (BelievesEverybody, "a wrong signature: `untrusted`", "was answered with Info"),
+        (BelievesEverybody, "a question without a seal: `untrusted`", "was answered with Info"),
+        (SealsNoStates, "states are sealed, numbered and fresh", "it is not signed"),
+    ],
+)
+def test_a_robot_that_seals_or_judges_wrongly_is_found(
+    broken: type[KeySeals], requirement: str, why: str, tmp_path: Path
+) -> None:
+    class Robot(RobotUnderTest):
+        def seals(self, name: str, boot_id: str = "") -> Seals:
+            good = super().seals(name, boot_id)
+            assert isinstance(good, KeySeals)
+            return broken(good._held, boot_id=boot_id) if boot_id else good
+
+    (found,) = verdicts_on(Robot(keys_of_site(tmp_path / "site")), requirement)
+    assert found.outcome == "failed"
+    assert why in found.reason
+
+
+def test_a_robot_that_stops_answering_is_told_as_gone_and_left_alone() -> None:
+    robot = RobotUnderTest()
+    with booted(robot):
+        bench = robot.bench()
+        robot.board.cut = True
+        found = list(tried(REQUIREMENTS[:3], bench))
+    assert [verdict.gone for verdict in found] == [True, False, False]
+    assert [verdict.outcome for verdict in found] == ["failed", "not tried", "not tried"]
+    assert "answers no more" in found[-1].reason
+
+
+def test_every_requirement_stands_in_the_document() -> None:
+    text = (Path(__file__).parents[3] / "docs/reference/protocol.md").read_text(encoding="utf-8")
+    headings = {line.lstrip("# ") for line in text.splitlines() if line.startswith("##")}
+    assert {one.section for one in REQUIREMENTS} <= headings
+    texts = [one.text for one in REQUIREMENTS]
+    assert len(texts) == len(set(texts))
+
+
+def test_the_lease_of_the_one_who_tries_is_no_hindrance() -> None:
+    robot = RobotUnderTest()
+    with booted(robot):
+        info = robot.bench().info()
+    held = Lease(commander="alice", fence=1, until_ns=info.clock_ns + 10**9)
+    check_at_rest(changed(info, lease=held), "alice", take_over=False)
