@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property, lru_cache
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import msgspec
 
 from mission.errors import InputError
+from mission.files.atomic import write_atomic
 
 if TYPE_CHECKING:
     from cryptography import x509
@@ -109,20 +111,29 @@ def read_revoked(path: Path, authority: x509.Certificate) -> Revoked:
     InputError
         If it is missing, or not signed by the authority.
     """
+    return _revoked_in(_list_bytes(path), path, authority)
+
+
+def _list_bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}); copy it from the site's folder of keys, or have the"
+            " keys issued anew if they are older than it (stopgo keys rotate)"
+        ) from None
+
+
+def _revoked_in(data: bytes, path: Path, authority: x509.Certificate) -> Revoked:
     from cryptography.exceptions import InvalidSignature
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
     public = authority.public_key()
     assert isinstance(public, Ed25519PublicKey)
     try:
-        signed = msgspec.json.decode(path.read_bytes(), type=SignedList)
+        signed = msgspec.json.decode(data, type=SignedList)
         public.verify(signed.signature, REVOKED + bytes(signed.revoked))
         return msgspec.json.decode(signed.revoked, type=Revoked)
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read ({error.strerror}); copy it from the site's folder of keys, or have the"
-            " keys issued anew if they are older than it (stopgo keys rotate)"
-        ) from None
     except (msgspec.DecodeError, UnicodeDecodeError):
         raise InputError(f"{path}: not a list of revoked keys; copy it from the site's folder") from None
     except InvalidSignature:
@@ -133,15 +144,19 @@ class Certificates:
     """Tells who holds a certificate, if the authority of one's own keys has issued it and it counts now.
 
     The list of those revoked is looked at each time, and read again when its file has changed. One that
-    cannot be read, or is older, does not replace what is known.
+    cannot be read, or is older, does not replace what is known; with `state`, a folder where the newest is
+    kept, not after a restart either.
     """
 
-    def __init__(self, held: HeldKeys, now: Callable[[], datetime]) -> None:
+    def __init__(self, held: HeldKeys, now: Callable[[], datetime], state: Path | None = None) -> None:
         self._held = held
         self._now = now
+        self._kept = None if state is None else kept_list(state, held.authority)
         self._issued_to = lru_cache(maxsize=64)(self._issued)
         self._lock = threading.Lock()
         self._revoked = Revoked(number=0, serials=())
+        if self._kept is not None and self._kept.exists():
+            self._revoked = read_revoked(self._kept, held.authority)
         self._stamp: tuple[int, ...] = ()
 
     def holder(self, der: bytes) -> tuple[Holder, Ed25519PublicKey]:
@@ -169,12 +184,19 @@ class Certificates:
         with self._lock:
             if stamp != self._stamp:
                 self._stamp = stamp
-                try:
-                    read = read_revoked(path, self._held.authority)
-                except InputError:
-                    return self._revoked
-                self._revoked = max(self._revoked, read, key=lambda revoked: revoked.number)
+                with suppress(InputError):
+                    data = _list_bytes(path)
+                    self._learn(data, _revoked_in(data, path, self._held.authority))
             return self._revoked
+
+    def _learn(self, data: bytes, read: Revoked) -> None:
+        if read.number <= self._revoked.number:
+            return
+        self._revoked = read
+        if self._kept is not None:
+            with suppress(OSError):  # a full disk: until the next start it counts all the same
+                self._kept.parent.mkdir(parents=True, exist_ok=True)
+                write_atomic(self._kept, data)
 
     def _issued(self, der: bytes) -> tuple[Holder, Ed25519PublicKey]:
         from cryptography import x509
@@ -197,8 +219,15 @@ class Certificates:
         return holder, public
 
 
-def read_keys(folder: Path, *, now: datetime) -> HeldKeys:
-    """The keys in one holder's folder.
+def kept_list(state: Path, authority: x509.Certificate) -> Path:
+    """Where the newest list of one authority is kept, beside what else outlives a restart."""
+    from cryptography.hazmat.primitives.hashes import SHA256
+
+    return state / f"revoked-{authority.fingerprint(SHA256()).hex()[:16]}.json"
+
+
+def read_keys(folder: Path, *, now: datetime, state: Path | None = None) -> HeldKeys:
+    """The keys in one holder's folder; a newer list of those revoked that is kept in `state` counts as well.
 
     Raises
     ------
@@ -226,7 +255,11 @@ def read_keys(folder: Path, *, now: datetime) -> HeldKeys:
             f"{files.certificate}: valid from {holder.not_before:%Y-%m-%d %H:%M} to"
             f" {holder.not_after:%Y-%m-%d %H:%M} UTC; issue new keys for {holder.name}"
         )
-    if holder.serial in read_revoked(files.revoked, authority).serials:
+    lists = [files.revoked]
+    if state is not None and kept_list(state, authority).exists():
+        lists.append(kept_list(state, authority))
+    revoked = max((read_revoked(path, authority) for path in lists), key=lambda revoked: revoked.number)
+    if holder.serial in revoked.serials:
         raise InputError(f"{files.certificate}: is revoked; issue new keys for {holder.name}")
     return HeldKeys(files, holder, authority, certificate, key)
 

@@ -25,6 +25,7 @@ from bridge.link.protocol import VERSION, encode, place_of, untrusted
 
 if TYPE_CHECKING:
     from datetime import datetime
+    from pathlib import Path
 
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
@@ -136,15 +137,19 @@ class KeySeals:
         now: Callable[[], datetime] = now_utc,
         clock_ns: Callable[[], int] = time.monotonic_ns,
         refused: Callable[[str, str], None] = lambda key, why: None,
+        state: Path | None = None,
     ) -> None:
-        """`refused` is told of questions that are not believed: their key, and why not."""
+        """`refused` is told of questions that are not believed: their key, and why not.
+
+        In the folder `state` the newest list of revoked certificates is kept.
+        """
         self.distrusted = ""
         self._held = held
         self._boot_id = boot_id
         """Of a robot that answers here; a station has none."""
         self._clock_ns = clock_ns
         self._refused = refused
-        self._certificates = Certificates(held, now)
+        self._certificates = Certificates(held, now, state)
         self._session = secrets.token_hex(8)
         self._lock = threading.Lock()
         self._anchors: dict[str, Anchor] = {}

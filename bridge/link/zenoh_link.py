@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
+from pathlib import Path
 from typing import Any
 
 import zenoh
@@ -68,13 +69,15 @@ class Guard:
     """Of a robot, for its seals."""
     refused: Callable[[str, str], None] = lambda key, why: None
     """Told of questions that are not believed."""
+    state: Path | None = None
+    """Folder of a robot's that keeps the newest list of revoked certificates."""
 
     @property
     def seals(self) -> Seals:
         """What goes beside messages on a link that is so guarded."""
         if self.keys is None:
             return NO_SEALS
-        return KeySeals(self.keys, boot_id=self.boot_id, refused=self.refused)
+        return KeySeals(self.keys, boot_id=self.boot_id, refused=self.refused, state=self.state)
 
 
 UNGUARDED = Guard()

@@ -67,12 +67,12 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
 
     signal.signal(signal.SIGTERM, _leave)
     keys = KeyExpressions(options.name, options.site)
-    held = None if options.keys is None else robots_keys(options.keys, options.name)
+    held = None if options.keys is None else robots_keys(options.keys, options.name, options.state)
     boot_id = new_boot_id()
     refusals = RefusalLog(options.say, key_files.now_utc)
     guard = Guard(
         held, options.insecure, None if held is None else access_control(keys), boot_id,
-        refused=lambda key, why: refusals.note(place_of(key)[2], "somebody", why),
+        refused=lambda key, why: refusals.note(place_of(key)[2], "somebody", why), state=options.state,
     )  # fmt: skip
     opened = joining(options.connect, guard) if options.connect else listening(options.listen, guard)
     with opened as link:
@@ -149,9 +149,9 @@ def clocks(journal: Journal, *, speed_up: float, now_ns: int | None = None) -> t
     return WallClock(speed_up=speed_up, origin_ns=origin_ns), wall
 
 
-def robots_keys(folder: Path, name: str) -> key_files.HeldKeys:
+def robots_keys(folder: Path, name: str, state: Path | None = None) -> key_files.HeldKeys:
     """The robot's own keys; anybody else's are refused."""
-    held = key_files.read_keys(folder, now=key_files.now_utc())
+    held = key_files.read_keys(folder, now=key_files.now_utc(), state=state)
     if (held.holder.role, held.holder.name) != ("robot", name):
         raise InputError(
             f"--keys {folder}: are those of {held.holder.role} {held.holder.name}, not of robot {name}"

@@ -93,6 +93,42 @@ def test_what_is_revoked_stays_so_with_an_older_a_forged_or_a_missing_list(site:
         read_keys(site / "r1", now=now_utc())
 
 
+def test_what_is_revoked_stays_so_after_a_restart_with_an_older_list(site: Path, tmp_path: Path) -> None:
+    keys, alice, state = read_keys(site / "r1", now=now_utc()), site / "alice", tmp_path / "state"
+    der = read_keys(alice, now=now_utc()).der
+    older = keys.files.revoked.read_bytes()
+    revoke(site, "alice")
+    with pytest.raises(Untrusted, match="revoked"):
+        Certificates(keys, now_utc, state).holder(der)
+    keys.files.revoked.write_bytes(older)
+    assert Certificates(keys, now_utc).holder(der)[0].name == "alice", "what else would the state be for?"
+    with pytest.raises(Untrusted, match="revoked"):
+        Certificates(keys, now_utc, state).holder(der)
+    revoke(site, "r1")
+    with pytest.raises(Untrusted, match="revoked"):
+        Certificates(keys, now_utc, state).holder(keys.der)
+    keys.files.revoked.write_bytes(older)
+    with pytest.raises(InputError, match="is revoked; issue new keys for r1"):
+        read_keys(site / "r1", now=now_utc(), state=state)
+
+
+def test_a_kept_list_that_is_damaged_is_told_and_another_authoritys_is_not_looked_at(
+    site: Path, tmp_path: Path
+) -> None:
+    keys, state = read_keys(site / "r1", now=now_utc()), tmp_path / "state"
+    revoke(site, "alice")
+    Certificates(keys, now_utc, state).holder(keys.der)
+    (kept,) = state.iterdir()
+    kept.write_bytes(kept.read_bytes().replace(b'"number":1', b'"number":0'))
+    with pytest.raises(InputError, match=r"revoked-\w+\.json: not signed by the authority"):
+        read_keys(site / "r1", now=now_utc(), state=state)
+    with pytest.raises(InputError, match=r"revoked-\w+\.json: not signed by the authority"):
+        Certificates(keys, now_utc, state)
+    another = keys_of_site(tmp_path / "another")
+    held = read_keys(another / "r1", now=now_utc(), state=state)
+    assert Certificates(held, now_utc, state).holder(held.der)[0].name == "r1"
+
+
 def test_a_revoked_station_reads_no_keys_and_is_not_obeyed(site: Path) -> None:
     field = GuardedField(site)
     station = field.guarded_station()
