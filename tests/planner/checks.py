@@ -19,6 +19,7 @@ from mission.settings import Settings
 from planner.routing.roadmap import ways_between
 from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
 from planner.space.targets import face_segments
+from tests.faults.sizes import FULL
 from tests.planner.oracle import visible_pairs
 
 TOLERANCE = 1e-5
@@ -155,8 +156,8 @@ def check_bounds(mission: Mission, nouns: dict[type, Any], settings: Settings) -
 
 
 def check_coverage(mission: Mission, selection: Selection, settings: Settings) -> None:
-    """Recompute by brute force what all candidates and the chosen ones see."""
-    seen = matrix_by_force(selection.visibility)
+    """Recompute by brute force what candidates see, the chosen ones among them."""
+    seen = matrix_by_force(selection.visibility, selection.chosen)
     pattern = np.setdiff1d(np.arange(len(seen)), selection.visibility.candidates.extra_rows)
     visible = seen[pattern].any(axis=0)
     assert np.array_equal(visible, selection.visibility.visible), "another set of units is visible"
@@ -184,12 +185,27 @@ def check_shares(selection: Selection, visible: np.ndarray, covered: np.ndarray,
         assert weight[covered & member].sum() >= share * weight[visible & member].sum() - 1e-4
 
 
-def matrix_by_force(visibility: Visibility) -> np.ndarray:
-    found: Candidates = visibility.candidates
+ALL_UP_TO = 100
+"""Candidates of which all are looked at again; of more, every so many."""
+
+
+def matrix_by_force(visibility: Visibility, always: np.ndarray) -> np.ndarray:
+    """What each candidate sees (rows, units): in the short form told again for some, `always` among them."""
+    every = 1 if FULL else 1 + visibility.rows // ALL_UP_TO
+    again = np.union1d(np.arange(0, visibility.rows, every), always)
+    seen = np.zeros((visibility.rows, visibility.targets.total), dtype=bool)
+    for row in range(visibility.rows):
+        seen[row, visibility.seen_by(row)] = True
+    told = by_force(visibility.candidates, again)
+    assert np.array_equal(seen[again], told), "candidates see other units"
+    return seen
+
+
+def by_force(found: Candidates, rows: np.ndarray) -> np.ndarray:
     space, targets = found.space, found.space.targets
     origin = local_origin(space.floor)
     return visible_pairs(
-        to_grid(found.xy[found.kept] - origin),
+        to_grid(found.xy[found.kept] - origin)[rows],
         face_segments(whole_steps_of(space.occluders, origin)).astype(np.int64),
         to_grid(targets.a - origin),
         to_grid(targets.b - origin),

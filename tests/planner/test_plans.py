@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,23 +24,16 @@ from planner.space.navigable import navigable
 from tests.faults.sizes import FULL, some
 from tests.planner.checking.test_claims import counted
 from tests.planner.checks import check_plan, check_rooms_are_joined
-from tests.planner.worlds import FLOORS, SHARED, changed, moved, planned, shifted, turned
+from tests.planner.worlds import FLOORS, changed, moved, planned, shared, shifted, turned
 
 LARGEST = "layered/office-l1.dxf"
 AGAIN = FLOORS if FULL else [name for name in FLOORS if name != LARGEST and "case1" not in name]
 """Floors that are planned more than once; the others take as long as all of these together."""
 
 
-@lru_cache
-def floor(name: str) -> FloorPlan:
-    if not (SHARED / name).exists():
-        pytest.skip(f"{SHARED / name} is not there")
-    return read_floor(Path(SHARED / name))
-
-
-@lru_cache
+@cache
 def the_plan(name: str) -> tuple[Mission, dict[type, Any]]:
-    return planned(floor(name))
+    return planned(shared(name))
 
 
 @pytest.mark.parametrize("name", FLOORS)
@@ -65,13 +58,13 @@ def test_rooms_joined_by_a_passable_opening_are_connected(name: str) -> None:
 
 @pytest.mark.parametrize("name", AGAIN)
 def test_two_plans_of_a_floor_are_the_same_bytes(name: str) -> None:
-    assert encode(planned(floor(name))[0]) == encode(the_plan(name)[0])
+    assert encode(planned(shared(name))[0]) == encode(the_plan(name)[0])
 
 
 @pytest.mark.parametrize("name", [name for name in AGAIN if name != LARGEST])
 def test_the_order_of_entities_does_not_change_a_plan(name: str) -> None:
     random = np.random.default_rng(1)
-    original = floor(name)
+    original = shared(name)
 
     def shuffled(items: tuple[Any, ...]) -> tuple[Any, ...]:
         return tuple(items[k] for k in random.permutation(len(items)))
@@ -88,7 +81,7 @@ def test_the_order_of_entities_does_not_change_a_plan(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in FLOORS if "rooms" in name or "duplex" in name])
 def test_elements_drawn_twice_do_not_change_a_plan(name: str) -> None:
-    original = floor(name)
+    original = shared(name)
     other = replace(original, elements=original.elements + original.elements[::3])
     assert encode(planned(other)[0]) == encode(the_plan(name)[0])
 
@@ -117,14 +110,14 @@ OTHERS = (
     ids=lambda case: case if isinstance(case, str) else ", ".join(changed(case)),
 )
 def test_other_settings_are_planned_well(name: str, settings: Settings) -> None:
-    mission, nouns = planned(floor(name), settings)
+    mission, nouns = planned(shared(name), settings)
     check_plan(mission, nouns, settings, brute=settings.fov == 360)
 
 
 @pytest.mark.parametrize("degrees", [17.0, 45.0])
 @pytest.mark.parametrize("name", ["layered/fzk-haus-eg.dxf", "paper/synthetic_case1_rooms.dxf"])
 def test_a_turned_floor_is_planned_well_and_alike(name: str, degrees: float) -> None:
-    there, nouns = planned(moved(floor(name), turned(degrees)))
+    there, nouns = planned(moved(shared(name), turned(degrees)))
     check_plan(there, nouns, Settings(), brute=False)
     here, straight = the_plan(name)
     visible = [found[Selection].visibility.visible.sum() for found in (nouns, straight)]
@@ -135,7 +128,7 @@ def test_a_turned_floor_is_planned_well_and_alike(name: str, degrees: float) -> 
 def test_a_shifted_floor_has_the_shifted_plan() -> None:
     by = np.array([4096.0, -512.25])
     here = the_plan("layered/fzk-haus-eg.dxf")[0]
-    there = planned(moved(floor("layered/fzk-haus-eg.dxf"), shifted(*by)))[0]
+    there = planned(moved(shared("layered/fzk-haus-eg.dxf"), shifted(*by)))[0]
     assert len(there.stops) == len(here.stops)
     for one, other in zip(there.stops, here.stops, strict=True):
         assert np.allclose(np.subtract((one.x, one.y), by), (other.x, other.y), atol=1e-5)
@@ -161,7 +154,7 @@ def test_a_floor_with_one_room_not_drawn_is_planned_all_the_same() -> None:
 
 @pytest.mark.parametrize("name", ["140 OPEN OFFICE", "151 BOC"])
 def test_the_office_with_one_room_not_drawn_is_reached_all_the_same(name: str) -> None:
-    office = floor(LARGEST)
+    office = shared(LARGEST)
     less = replace(office, rooms=tuple(room for room in office.rooms if room.name != name))
     assert len(less.rooms) == len(office.rooms) - 1
     here, there = the_plan(LARGEST)[1][Candidates], candidates(navigable(less, Settings()))

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from mission.document import Mission
 from mission.floor import Element, FloorPlan, Opening, Room
@@ -17,6 +19,7 @@ from mission.geometry import FloatArray, Polygon, frozen
 from mission.kinds import KINDS
 from mission.settings import PARAMETERS, Settings
 from planner import plan
+from planner.floors import read_floor
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 """Real floors that are not part of the project; tests that use them skip where they are absent."""
@@ -25,6 +28,15 @@ PAPER = tuple(
 )
 LAYERED = ("layered/duplex-l1.dxf", "layered/fzk-haus-eg.dxf", "layered/office-l1.dxf")
 FLOORS = (*LAYERED, *PAPER)
+
+
+@cache
+def shared(name: str) -> FloorPlan:
+    """A real floor, read once for all tests of a process."""
+    if not (SHARED / name).exists():
+        pytest.skip(f"{SHARED / name} is not there")
+    return read_floor(SHARED / name)
+
 
 Points = Iterable[tuple[float, float]]
 Move = Callable[[FloatArray], FloatArray]

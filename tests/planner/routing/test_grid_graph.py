@@ -16,7 +16,7 @@ from planner.routing.grid_graph import RESOLUTIONS, grid_ways, ways_on_grids
 from planner.routing.roadmap import ways_between
 from planner.space.navigable import navigable
 from tests.planner.checks import obstacles_of
-from tests.planner.routing.test_routing import floor_with_things, free_points, selection_at
+from tests.planner.routing.test_routing import floor_with_things, free_points, selection_at, space_with_things
 from tests.planner.worlds import box, column, door, floor_of, hall, room, shell, two_rooms, wall
 
 GRID = Settings(graph="grid")
@@ -129,7 +129,7 @@ def test_an_opening_just_as_wide_as_the_robot_joins_grids() -> None:
 @pytest.mark.parametrize("settings", [GRID, Settings(graph="grid", start=(0.6, 0.6, 0.0), router="aco")])
 def test_a_route_over_grids_ends_its_legs_at_the_stops(settings: Settings) -> None:
     xy = free_points(6, 3)
-    found = route(selection_at(floor_with_things(), xy, settings))
+    found = route(selection_at(space_with_things(settings), xy))
     check_legs(found)
     for leg, stop in zip(found.approaches, found.xy, strict=True):
         assert np.allclose(leg[-1], stop, atol=1e-9)

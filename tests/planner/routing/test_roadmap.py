@@ -13,13 +13,12 @@ from mission.floor import FloorPlan
 from mission.geometry import Polygon
 from mission.planning import NavigableSpace
 from mission.settings import Settings
-from planner.floors import read_floor
 from planner.routing import roadmap
 from planner.routing.roadmap import outward_corners, ways_between
 from planner.routing.ways import Ways
 from planner.shapes import local_origin, snapped, to_shape
 from planner.space.navigable import navigable
-from tests.planner.worlds import PAPER, SHARED, box, column, element, hall, two_rooms, wall
+from tests.planner.worlds import PAPER, box, column, element, hall, shared, two_rooms, wall
 
 SETTINGS = Settings(robot_radius=0.3, edge=0.3)
 
@@ -155,9 +154,7 @@ def test_pairs_are_looked_at_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("name", ["layered/fzk-haus-eg.dxf", "layered/duplex-l1.dxf", *PAPER])
 def test_the_reduction_keeps_every_length_on_a_real_floor(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    if not (SHARED / name).exists():
-        pytest.skip(f"{SHARED / name} is not there")
-    space = navigable(read_floor(SHARED / name), Settings())
+    space = navigable(shared(name), Settings())
     area = to_shape(space.drive_area, np.zeros(2))
     points = np.array([part.representative_point().coords[0] for part in shapely.get_parts(area)])
     reduced = ways_between(space, points)

@@ -18,8 +18,8 @@ from planner.sight.sight import scene_of
 from planner.space.targets import occluders_of, without_cracks
 from planner.visibility.exact_sight import open_space
 from tests.faults.sizes import some
-from tests.planner.visibility.test_visibility import at, by_force, rows_of, shared
-from tests.planner.worlds import LAYERED, PAPER, box, floor_of, moved, turned, wall
+from tests.planner.visibility.test_visibility import at, by_force, rows_of
+from tests.planner.worlds import LAYERED, PAPER, box, floor_of, moved, shared, turned, wall
 
 NOBODY = np.empty((0, 2, 2))
 

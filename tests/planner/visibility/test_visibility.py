@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,19 +13,18 @@ import pytest
 from mission.errors import StopgoError
 from mission.floor import FloorPlan
 from mission.geometry import Polygon, frozen
-from mission.planning import KEPT, Candidates, Visibility
+from mission.planning import KEPT, Candidates, Targets, Visibility
 from mission.settings import Settings
 from planner.candidates import candidates
-from planner.floors import read_floor
 from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
 from planner.space.navigable import navigable
 from planner.space.targets import face_segments
 from planner.visibility import visibility
 from planner.visibility.exact_sight import exact
+from tests.faults.sizes import some
 from tests.planner.oracle import visible_pairs
 from tests.planner.worlds import (
     PAPER,
-    SHARED,
     Move,
     box,
     column,
@@ -36,6 +35,7 @@ from tests.planner.worlds import (
     mirrored,
     moved,
     room,
+    shared,
     shell,
     shifted,
     turned,
@@ -43,11 +43,8 @@ from tests.planner.worlds import (
     wall,
 )
 
-
-def shared(name: str) -> FloorPlan:
-    if not (SHARED / name).exists():
-        pytest.skip(f"{SHARED / name} is not there")
-    return read_floor(Path(SHARED / name))
+REAL = (*PAPER, "layered/fzk-haus-eg.dxf")
+TURNED = [(name, degrees) for name in REAL for degrees in (0.0, 17.0, 45.0)]
 
 
 def rows_of(seen: Visibility, rows: Iterable[int]) -> np.ndarray:
@@ -74,8 +71,7 @@ def by_force(found: Candidates, rows: Iterable[int], reach: float) -> np.ndarray
     )
 
 
-@pytest.mark.parametrize("degrees", [0.0, 17.0, 45.0])
-@pytest.mark.parametrize("name", [*PAPER, "layered/fzk-haus-eg.dxf"])
+@pytest.mark.parametrize(("name", "degrees"), some(TURNED, every=2))
 def test_a_real_floor_agrees_with_brute_force(name: str, degrees: float) -> None:
     found = candidates(navigable(moved(shared(name), turned(degrees)), Settings()))
     seen = exact(found)
@@ -150,10 +146,15 @@ def test_a_beam_flush_with_a_wall_is_seen_at_any_angle() -> None:
         assert np.count_nonzero(~targets.occluding[targets.unit_segment] & seen.visible) == 60  # 3 m
 
 
+@cache
+def targets_of(name: str) -> Targets:
+    return navigable(shared(name), Settings()).targets
+
+
 @pytest.mark.parametrize("degrees", [17.0, 45.0])
-@pytest.mark.parametrize("name", [*PAPER, "layered/fzk-haus-eg.dxf"])
+@pytest.mark.parametrize("name", REAL)
 def test_a_turned_floor_has_the_same_units(name: str, degrees: float) -> None:
-    here = navigable(shared(name), Settings()).targets
+    here = targets_of(name)
     there = navigable(moved(shared(name), turned(degrees)), Settings()).targets
     assert (there.total, len(there.units)) == (here.total, len(here.units))
 
