@@ -28,7 +28,7 @@ EXTRAS = {
     "shapely": "plan", "scipy": "plan", "networkx": "plan", "ezdxf": "plan", "highspy": "plan",
     "numba": "plan", "pyproj": "plan", "ifcopenshell": "bim",
     "rerun": "record", "rosbags": "record", "pyulog": "record",
-    "laspy": "clouds", "pye57": "clouds",
+    "laspy": "clouds", "pye57": "clouds", "reportlab": "plan",
 }  # fmt: skip
 """The extra that installs each optional library."""
 

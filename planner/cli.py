@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -59,6 +60,14 @@ def plan_command(
     strict: Annotated[
         bool, typer.Option(help="Exit 1 if floor is left out or the plan is doubtful.")
     ] = False,
+    sheets: Annotated[
+        bool | None,
+        typer.Option(
+            "--sheets/--no-sheets",
+            help="plan.pdf: sheets and lists to print; by default where 1:100 needs several sheets.",
+        ),
+    ] = None,
+    rings: Annotated[bool, typer.Option(help="Draw the scanner's range round each stop.")] = False,
     print_config: Annotated[bool, typer.Option(help="Print plan.toml with these options and leave.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
     **given: Any,
@@ -80,19 +89,28 @@ def plan_command(
     if all_storeys:
         from planner.storeys import plan_storeys
 
-        one = partial(_plan_storey, all_parts=all_parts, strict=strict)
+        one = partial(_plan_storey, all_parts=all_parts, strict=strict, printed=Printed(sheets, rings))
         return plan_storeys(floor, _folder(out), settings, one, as_json=as_json)
-    reports = plan_files(floor, out, settings, all_parts=all_parts)
+    reports = plan_files(floor, out, settings, all_parts=all_parts, printed=Printed(sheets, rings))
     _print(reports, as_json=as_json)
     return max(report.strict_answer if strict else report.answer for report in reports)
 
 
+@dataclass(frozen=True)
+class Printed:
+    """What is drawn for the printer."""
+
+    sheets: bool | None = None
+    """A set of sheets; None: where one sheet cannot show the floor at a readable scale."""
+    rings: bool = False
+
+
 def _plan_storey(
-    floor: Path, folder: Path, settings: Settings, *, all_parts: bool, strict: bool
+    floor: Path, folder: Path, settings: Settings, *, all_parts: bool, strict: bool, printed: Printed
 ) -> tuple[int, str, list[dict[str, Any]]]:
     """Plan one storey, in whatever process: its exit code, what a person reads, and what `--json` tells."""
     try:
-        reports = plan_files(floor, folder, settings, all_parts=all_parts)
+        reports = plan_files(floor, folder, settings, all_parts=all_parts, printed=printed)
     except StopgoError as error:
         return error.exit_code, str(error), []
     code = max(report.strict_answer if strict else report.answer for report in reports)
@@ -111,7 +129,9 @@ def _print(reports: list[PlanReport], *, as_json: bool) -> None:
     typer.echo(json.dumps(told, ensure_ascii=False))
 
 
-def plan_files(floor: Path, out: Path, settings: Settings, *, all_parts: bool = False) -> list[PlanReport]:
+def plan_files(
+    floor: Path, out: Path, settings: Settings, *, all_parts: bool = False, printed: Printed | None = None
+) -> list[PlanReport]:
     """Plan a floor's file into a folder; one report per part, the main part first."""
     from mission.files.atomic import must_be_writable
     from planner import plan
@@ -125,7 +145,8 @@ def plan_files(floor: Path, out: Path, settings: Settings, *, all_parts: bool = 
         must_be_writable(path)
     with _telling_findings(read):
         made = plan(read, settings, observe=watch.observe, all_parts=all_parts)
-    reports = [_write_part(part, folder, number, watch) for number, part in enumerate(made.parts)]
+    parts = enumerate(made.parts)
+    reports = [_write_part(part, folder, number, watch, printed or Printed()) for number, part in parts]
     _set_aside(folder, len(reports), read, settings)
     return reports
 
@@ -164,7 +185,7 @@ def _folder(out: Path) -> Path:
     return out
 
 
-def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch) -> PlanReport:
+def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch, printed: Printed) -> PlanReport:
     """Write the plan of one part; its files appear together, mission.json last."""
     from dataclasses import replace
 
@@ -174,7 +195,7 @@ def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch) -> 
     from mission.files.plan_svg import plan_svg
     from mission.schedule import schedule
     from mission.sight import sight_of
-    from planner.outputs import names
+    from planner.outputs import names, set_aside_sheets
     from planner.report import PlanReport
 
     files = names(folder, number)
@@ -182,8 +203,11 @@ def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch) -> 
     recording = _recording(mission.id)
     if recording is None:
         del files["recording"]
+    today = datetime.date.today().isoformat()
+    sheets = _sheets(part, mission, printed, today, files["sheets"])
+    unwanted = files.pop("sheets") if sheets is None else None
     with replacing(*(files[key] for key in WRITTEN if key in files)) as (
-        *recorded,
+        *others,
         coverage,
         picture,
         document,
@@ -192,12 +216,16 @@ def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch) -> 
             sight = sight_of(part.route, mission, part.figures)
             for noun in (*part.nouns(), mission, schedule(mission), sight):
                 recording.observe(noun)
-            recording.write(recorded[0])
+            recording.write(others[0])
         watch.lap("recording")
+        if sheets is not None:
+            others[-1].write_bytes(sheets)
         coverage.write_bytes(coverage_json(part.route, mission, part.figures))
-        today = datetime.date.today().isoformat()
-        picture.write_bytes(plan_svg(part.route, mission, part.figures, date=today))
+        drawn = plan_svg(part.route, mission, part.figures, date=today, with_range=printed.rings)
+        picture.write_bytes(drawn)
         document.write_bytes(encode(mission))
+    if unwanted is not None:
+        set_aside_sheets(unwanted)
     watch.lap("files")
     return PlanReport(part=replace(part, mission=mission), files=files, times_s=watch.times())
 
@@ -214,7 +242,24 @@ def _recording(recording_id: str) -> PlanRecording | None:
     return PlanRecording(recording_id)
 
 
-WRITTEN = ("recording", "coverage", "picture", "mission")
+def _sheets(part: PartPlan, mission: Mission, printed: Printed, date: str, path: Path) -> bytes | None:
+    """The set of sheets, if it is wanted; None, with a line that says so, where PDFs are not installed."""
+    from mission.files.plan_sheets import needs_sheets, plan_pdf
+
+    if printed.sheets is False or not (printed.sheets or needs_sheets(part.route, mission)):
+        return None
+    try:
+        return plan_pdf(part.route, mission, part.figures, date=date, with_range=printed.rings)
+    except ModuleNotFoundError as error:
+        if printed.sheets or (error.name or "").partition(".")[0] != "reportlab":
+            raise
+        typer.echo(
+            f'no {path.name}: reportlab is not installed; pip install "stopgo[plan]" brings it', err=True
+        )
+        return None
+
+
+WRITTEN = ("recording", "sheets", "coverage", "picture", "mission")
 """A plan's files in the order in which they appear: the mission when all else is there."""
 
 

@@ -19,6 +19,7 @@ NAMES = {
     "recording": "plan.rrd",
     "picture": "plan.svg",
     "coverage": "coverage.json",
+    "sheets": "plan.pdf",
 }
 
 
@@ -42,6 +43,11 @@ def set_aside(folder: Path, parts: int, source: FloorSource, settings: Settings)
         if _is_other(files["mission"], mission_id(source, settings, __version__, number)):
             moved += [_renamed(path) for path in files.values() if path.exists()]
     return moved
+
+
+def set_aside_sheets(path: Path) -> Path | None:
+    """Rename the sheets of an earlier plan, where the plan that was made has none; their new name."""
+    return _renamed(path) if path.exists() else None
 
 
 def _further(folder: Path, parts: int) -> list[int]:

@@ -47,6 +47,12 @@ def building(space: NavigableSpace, sheet: PaperSheet) -> Iterator[str]:
     yield from _openings(space.openings, sheet)
 
 
+def outline(floor: FloorPlan, sheet: PaperSheet) -> str:
+    """The floor alone."""
+    data = (_region(part, sheet) for part in floor.outline)
+    return path(data, fill="#e4e4e0", stroke="#888888", stroke_width=0.15, **_EVEN_ODD)
+
+
 def targets(selection: Selection, sheet: PaperSheet) -> Iterator[str]:
     """Faces out of every candidate's sight, in sight but not seen, and seen."""
     visibility = selection.visibility

@@ -18,8 +18,8 @@ from mission.planning import Route
 from mission.schedule import schedule
 from mission.table import duration
 
-BODY = 2.3
-LINE = 4.0
+BODY = 2.5
+LINE = 4.2
 """Height of a line of the title block and of the legend."""
 TITLE_HEAD = 15.0
 SCALE_AND_AXES = 25.0
@@ -129,7 +129,7 @@ def _symbol(name: str, x: float, y: float) -> str:
         mark = path([floor_look.cross(place, size=1.1)], fill="none", **floor_look.BLOCKED)
         return line(x, y, x + 7, y, **floor_look.BLOCKED) + mark
     if name == "start":
-        return circle(x + 3.5, y, 1.6, fill="#111111") + _centred("S", x + 3.5, y, fill="#ffffff")
+        return circle(x + 3.5, y, 1.9, fill="#111111") + _centred("S", x + 3.5, y, fill="#ffffff")
     if name in ("stop", "doorway"):
         outer = circle(x + 3.5, y, 1.9, fill="#fff", stroke=route_look.INK, stroke_width=0.2)
         inner = circle(x + 3.5, y, 1.5, fill="#fff", stroke=route_look.INK, stroke_width=0.3)
@@ -140,7 +140,7 @@ def _symbol(name: str, x: float, y: float) -> str:
 
 
 def _centred(word: str, x: float, y: float, **style: object) -> str:
-    return text(x, y + 0.65, word, size=1.8, text_anchor="middle", font_weight="bold", **style)
+    return text(x, y + 0.9, word, size=2.5, text_anchor="middle", font_weight="bold", **style)
 
 
 _STROKES: dict[str, dict[str, object]] = {
@@ -202,8 +202,8 @@ class Row:
     """Whether the first cell begins at the left."""
 
 
-STOP_EDGES = (7.0, 21.0, 35.0, 48.0, 58.0, 68.0, 82.0)
-SHARE_EDGES = (2.0, 48.0, 59.0, 70.0, 82.0)
+STOP_EDGES = (8.0, 25.0, 42.0, 58.0, 70.0, 81.0, 98.0)
+SHARE_EDGES = (2.0, 58.0, 71.0, 84.0, 98.0)
 STOP_HEAD = Row(("no", "x m", "y m", "heading °", "units", "new", "time"), STOP_EDGES, bold=True)
 
 SHARE_HEAD = Row(("coverage", "all", "visible", "seen", "seen %"), SHARE_EDGES, bold=True, to_left=True)
@@ -244,11 +244,11 @@ def figure_rows(figures: Figures) -> list[Row]:
 
 def _share_row(share: Share) -> Row:
     numbers = (f"{share.total:.1f}", f"{share.visible:.1f}", f"{share.seen:.1f}", percent(share.coverage))
-    return Row((shortened(share.name, size=2.1, width=34), *numbers), SHARE_EDGES, to_left=True)
+    return Row((shortened(share.name, size=BODY, width=42), *numbers), SHARE_EDGES, to_left=True)
 
 
 def _words(content: str, *, bold: bool = False) -> Row:
-    return Row((shortened(content, size=2.1, width=COLUMN - 5),), (2.0,), bold, to_left=True)
+    return Row((shortened(content, size=BODY, width=COLUMN - 5),), (2.0,), bold, to_left=True)
 
 
 def table(rows: list[Row], chunks: tuple[Chunk, ...]) -> str:
@@ -274,7 +274,7 @@ def _chunk(rows: list[Row], chunk: Chunk) -> str:
 def _row(row: Row, x: float, y: float) -> str:
     cells = enumerate(zip(row.edges, row.cells, strict=True))
     spans = "".join(
-        text(x + edge, y, cell, size=2.1, **({"text_anchor": "start"} if row.to_left and k == 0 else {}))
+        text(x + edge, y, cell, size=BODY, **({"text_anchor": "start"} if row.to_left and k == 0 else {}))
         for k, (edge, cell) in cells
         if cell
     )
@@ -289,7 +289,12 @@ def coordinate_ticks(sheet: PaperSheet) -> str:
     """Coordinates of the site along the drawing's lower and left edge, in round metres."""
     step = next(s * 10.0**p for p in range(-1, 9) for s in (1, 2, 5) if sheet.length(s * 10.0**p) >= 25)
     items = [*_ticks(sheet, step, axis=0), *_ticks(sheet, step, axis=1)]
-    return group("coordinates", items, fill="#666666", stroke_width=0.15, text_anchor="middle")
+    return group("coordinates", items, fill="#666666", text_anchor="middle")
+
+
+_TICK: dict[str, object] = {"stroke": "#666666", "stroke_width": 0.15}
+_HALO: dict[str, object] = {"paint_order": "stroke", "stroke": "#ffffff", "stroke_width": 0.8}
+"""What is drawn up to the edge would cross the numbers."""
 
 
 def _ticks(sheet: PaperSheet, step: float, *, axis: int) -> Iterator[str]:
@@ -304,9 +309,9 @@ def _ticks(sheet: PaperSheet, step: float, *, axis: int) -> Iterator[str]:
         label = f"{index * step:.10g}"
         if axis == 0:
             bottom = box.y + box.height
-            yield line(x, bottom, x, bottom - 1.5, stroke="#666666")
-            yield text(x, bottom - 2.2, label, size=1.8)
+            yield line(x, bottom, x, bottom - 1.5, **_TICK)
+            yield text(x, bottom - 2.2, label, size=BODY, **_HALO)
         else:
-            yield line(box.x, y, box.x + 1.5, y, stroke="#666666")
-            turned = f"rotate(-90 {number(box.x + 3.8)} {number(y)})"
-            yield text(box.x + 3.8, y, label, size=1.8, transform=turned)
+            yield line(box.x, y, box.x + 1.5, y, **_TICK)
+            turned = f"rotate(-90 {number(box.x + 4.2)} {number(y)})"
+            yield text(box.x + 4.2, y, label, size=BODY, transform=turned, **_HALO)

@@ -13,7 +13,7 @@ from mission.files.floor_drawing import building, targets
 from mission.files.room_labels import Busy, points_along, room_labels
 from mission.files.route_drawing import STOP, rings, route, stops
 from mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit
-from mission.files.svg import FONT, attributes, clean, number, rect
+from mission.files.svg import FONT, attributes, clean, group, number, rect
 from mission.floor import FloorPlan
 from mission.geometry import FloatArray, bounds
 from mission.planning import Route
@@ -31,21 +31,44 @@ def plan_svg(
 
     `with_range` adds a faint ring of the scanner's range about each stop.
     """
-    entries = panel.legend_entries(made, mission)
-    rows = [*panel.stop_rows(mission), *(panel.figure_rows(figures) if figures else [])]
+    content, sheet = overview(made, mission, figures, date=date, with_range=with_range)
+    return _document(sheet, mission, content)
+
+
+def overview(
+    made: Route,
+    mission: Mission,
+    figures: Figures | None = None,
+    *,
+    date: str,
+    with_range: bool = False,
+    with_table: bool = True,
+) -> tuple[str, PaperSheet]:
+    """What stands on the one sheet that shows everything, and the sheet."""
+    rows = [*panel.stop_rows(mission), *(panel.figure_rows(figures) if figures else [])] if with_table else []
     facts = panel.facts_of(made, mission, date=date)
-    blocks = (panel.legend_height(entries), panel.title_height([*facts, ("Scale", "")]), len(rows))
-    sheet = fit(SheetContents(_bounds(made, mission), PADDING, *blocks))
+    sheet = whole_sheet(made, mission, rows=len(rows))
+    inside = "\n".join(drawing_of(made, mission, sheet, with_range=with_range))
     drawn = (
-        *_drawing(made, mission, sheet, with_range=with_range),
+        group("drawing", [inside], clip_path="url(#frame)"),
+        _outline(sheet.drawing),
+        panel.coordinate_ticks(sheet),
         panel.title_block(mission, [*facts, ("Scale", _scale(sheet))], sheet.title),
-        panel.legend(entries, mission, sheet),
+        panel.legend(panel.legend_entries(made, mission), mission, sheet),
         panel.table(rows, sheet.table),
     )
-    return _document(sheet, mission, "\n".join(item for item in drawn if item))
+    return "\n".join(item for item in drawn if item), sheet
 
 
-def _drawing(made: Route, mission: Mission, sheet: PaperSheet, *, with_range: bool) -> tuple[str, ...]:
+def whole_sheet(made: Route, mission: Mission, *, rows: int = 0) -> PaperSheet:
+    """The sheet that shows everything, with so many rows of tables beside it."""
+    entries = panel.legend_entries(made, mission)
+    facts = [*panel.facts_of(made, mission, date=""), ("Scale", "")]
+    blocks = (panel.legend_height(entries), panel.title_height(facts), rows)
+    return fit(SheetContents(extent_of(made, mission), PADDING, *blocks))
+
+
+def drawing_of(made: Route, mission: Mission, sheet: PaperSheet, *, with_range: bool) -> tuple[str, ...]:
     """Everything to scale, from the floor up to the numbers."""
     space = made.selection.visibility.candidates.space
     parts = chain(
@@ -56,9 +79,7 @@ def _drawing(made: Route, mission: Mission, sheet: PaperSheet, *, with_range: bo
         [room_labels(space.floor.rooms, sheet, avoid=_busy(mission, space.floor, sheet))],
         stops(mission, sheet),
     )
-    inside = "\n".join(part for part in parts if part)
-    clipped = f'<g id="drawing" clip-path="url(#frame)">\n{inside}\n</g>'
-    return (clipped, _outline(sheet.drawing), panel.coordinate_ticks(sheet))
+    return tuple(part for part in parts if part)
 
 
 def _busy(mission: Mission, floor: FloorPlan, sheet: PaperSheet) -> Busy:
@@ -82,7 +103,7 @@ def _legs(mission: Mission) -> list[FloatArray]:
     return [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs]
 
 
-def _bounds(made: Route, mission: Mission) -> tuple[float, float, float, float]:
+def extent_of(made: Route, mission: Mission) -> tuple[float, float, float, float]:
     """Bounds in metres of everything that is drawn to scale."""
     floor = made.selection.visibility.candidates.space.floor
     solids = [solid.exterior for item in floor.elements for solid in item.solids]

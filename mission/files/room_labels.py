@@ -13,7 +13,7 @@ from mission.files.svg import group, shortened, text, text_width
 from mission.floor import Room
 from mission.geometry import BoolArray, FloatArray
 
-NAME, AREA = 2.2, 1.8
+NAME, AREA = 2.6, 2.5
 """Text sizes in millimetres."""
 LEAST = 9.0
 """Millimetres that a name may take even in a narrower room."""

@@ -15,7 +15,7 @@ from mission.geometry import FloatArray
 WAY: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.35}
 """The way to each stop."""
 BACK: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.3, "stroke_dasharray": "2 1"}
-STOP = 2.1
+STOP = 2.6
 """Radius in millimetres of a stop's disc."""
 INK = "#2a0f5c"
 _ARROW_EVERY = 45.0
@@ -56,7 +56,7 @@ def stops(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
 def start_mark(at: FloatArray) -> str:
     """A black disc, larger than a stop's: it shows as a thick ring where the route starts at a stop."""
     x, y = at.tolist()
-    letter = text(x, y + 0.85, "S", size=2.4, fill="#ffffff", text_anchor="middle", font_weight="bold")
+    letter = text(x, y + 0.95, "S", size=2.6, fill="#ffffff", text_anchor="middle", font_weight="bold")
     return group("start", [circle(x, y, STOP + 0.8, fill="#111111"), letter])
 
 
@@ -70,7 +70,7 @@ def stop_mark(at: FloatArray, number: str, *, heading: float, doorway: bool) -> 
         line(x1, y1, x2, y2, stroke=INK, stroke_width=0.6),
         circle(x, y, STOP + 0.55, fill="#ffffff", stroke=INK, stroke_width=0.2) if doorway else "",
         circle(x, y, STOP, **look),
-        text(x, y + 0.76, number, size=2.2 if len(number) < 3 else 1.8),
+        text(x, y + 0.9, number, size=2.5),
     ))  # fmt: skip
 
 

@@ -14,10 +14,10 @@ PAPERS = {"A4": (297, 210), "A3": (420, 297), "A2": (594, 420), "A1": (841, 594)
 """Long and short side in millimetres."""
 MARGIN = 10.0
 """Most printers leave a few millimetres; 10 also leaves room for a hole punch."""
-COLUMN = 84.0
+COLUMN = 100.0
 """Width of a column of table, legend or title block."""
 GAP = 3.0
-ROW = 3.6
+ROW = 4.0
 """Height of a table row."""
 HEADER = 5.0
 

@@ -11,7 +11,7 @@ import numpy as np
 from mission.geometry import FloatArray
 
 FONT = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
-SMALLEST_TEXT = 1.8
+SMALLEST_TEXT = 2.5
 """Millimetres; smaller print is not read on a building site."""
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

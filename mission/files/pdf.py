@@ -1,0 +1,235 @@
+"""Sheets drawn in the words of `mission.files.svg` -> one PDF, in lines and true to scale.
+
+Only those words are understood, not SVG at large. What several sheets show is put into the file once.
+"""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from mission.files.sheet import PaperBox
+
+MM = 72 / 25.4
+"""Points in a millimetre."""
+FONTS = {False: "Helvetica", True: "Helvetica-Bold"}
+"""By whether it is bold; every reader has them."""
+WIDER = (
+    "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
+    "/usr/share/fonts/TTF/DejaVuSans.ttf",
+    "/System/Library/Fonts/Supplemental/Arial Unicode.ttf",
+    "C:/Windows/Fonts/arial.ttf",
+)
+"""Fonts with more letters than Helvetica's, for names that need them; the first that is there is embedded."""
+_STEPS = re.compile(r"([MLlZ])|(-?\d+(?:\.\d+)?)")
+_TURN = re.compile(r"rotate\((\S+) (\S+) (\S+)\)")
+
+Style = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class PdfPage:
+    """A sheet in millimetres, y down."""
+
+    width: float
+    height: float
+    content: str
+    """Elements; `<use href="#NAME" x="…" y="…"/>` stands for a shared drawing moved there."""
+    name: str = ""
+    """In the reader's table of contents."""
+    frame: PaperBox | None = None
+    """What `clip-path` cuts drawings off at."""
+
+
+def pdf_of(pages: Sequence[PdfPage], *, title: str, shared: Mapping[str, str] | None = None) -> bytes:
+    """The PDF; the same pages give the same bytes.
+
+    Parameters
+    ----------
+    shared
+        Drawings by name, elements in millimetres, y down.
+    """
+    from reportlab.pdfgen.canvas import Canvas
+
+    file = BytesIO()
+    canvas = Canvas(file, invariant=1, pageCompression=1)
+    canvas.setTitle(title)
+    canvas.setCreator("stopgo")
+    for name, content in (shared or {}).items():
+        canvas.beginForm(name, lowerx=-1e6, lowery=-1e6, upperx=1e6, uppery=1e6)
+        _Pen(canvas).draw(_parsed(content), {})
+        canvas.endForm()
+    for number, page in enumerate(pages):
+        canvas.setPageSize((page.width * MM, page.height * MM))
+        if page.name:
+            canvas.bookmarkPage(str(number))
+            canvas.addOutlineEntry(page.name, str(number))
+        canvas.transform(MM, 0, 0, -MM, 0, page.height * MM)
+        _Pen(canvas, page.frame).draw(_parsed(page.content), {})
+        canvas.showPage()
+    canvas.save()
+    return file.getvalue()
+
+
+def _parsed(content: str) -> ET.Element:
+    return ET.fromstring(f"<g>{content}</g>")
+
+
+class _Pen:
+    """Draws elements with what they inherit from those round them."""
+
+    def __init__(self, canvas: Any, frame: PaperBox | None = None) -> None:
+        self._canvas = canvas
+        self._frame = frame
+
+    def draw(self, element: ET.Element, inherited: Style) -> None:
+        style = {**inherited, **element.attrib}
+        drawing = _DRAWING.get(element.tag)
+        if drawing is not None:
+            drawing(self, element, style)
+        elif element.tag in ("g", "svg"):
+            self._group(element, style)
+
+    def _group(self, element: ET.Element, style: dict[str, str]) -> None:
+        clips = style.pop("clip-path", None) is not None and self._frame is not None
+        if clips and self._frame is not None:
+            box = self._frame
+            self._canvas.saveState()
+            path = self._canvas.beginPath()
+            path.rect(box.x, box.y, box.width, box.height)
+            self._canvas.clipPath(path, stroke=0, fill=0)
+        for inner in element:
+            self.draw(inner, style)
+        if clips:
+            self._canvas.restoreState()
+
+    def _use(self, element: ET.Element, style: Style) -> None:
+        self._canvas.saveState()
+        self._canvas.translate(float(style["x"]), float(style["y"]))
+        self._canvas.doForm(style["href"].removeprefix("#"))
+        self._canvas.restoreState()
+
+    def _inked(self, style: Style) -> tuple[int, int]:
+        """Set colours and line; whether to stroke and whether to fill."""
+        fill, stroke = style.get("fill", "#000000"), style.get("stroke", "none")
+        if fill != "none":
+            self._canvas.setFillColor(_colour(fill))
+        if stroke != "none":
+            self._canvas.setStrokeColor(_colour(stroke))
+            self._canvas.setLineWidth(float(style.get("stroke-width", 1)))
+            self._canvas.setDash([float(x) for x in style.get("stroke-dasharray", "").split()])
+            self._canvas.setLineJoin(1 if style.get("stroke-linejoin") == "round" else 0)
+        return int(stroke != "none"), int(fill != "none")
+
+    def _path(self, element: ET.Element, style: Style) -> None:
+        stroke, fill = self._inked(style)
+        path = self._canvas.beginPath()
+        for step, points in _steps(style.get("d", "")):
+            if step == "Z":
+                path.close()
+            for number, (x, y) in enumerate(points):
+                (path.moveTo if step == "M" and number == 0 else path.lineTo)(x, y)
+        mode = 0 if style.get("fill-rule") == "evenodd" else 1
+        self._canvas.drawPath(path, stroke=stroke, fill=fill, fillMode=mode)
+
+    def _line(self, element: ET.Element, style: Style) -> None:
+        self._inked(style)
+        self._canvas.line(*(float(style[key]) for key in ("x1", "y1", "x2", "y2")))
+
+    def _rect(self, element: ET.Element, style: Style) -> None:
+        stroke, fill = self._inked(style)
+        box = (float(style[key]) for key in ("x", "y", "width", "height"))
+        self._canvas.rect(*box, stroke=stroke, fill=fill)
+
+    def _circle(self, element: ET.Element, style: Style) -> None:
+        stroke, fill = self._inked(style)
+        self._canvas.circle(*(float(style[key]) for key in ("cx", "cy", "r")), stroke=stroke, fill=fill)
+
+    def _text(self, element: ET.Element, style: Style) -> None:
+        content, size = element.text or "", float(style["font-size"])
+        font, content = _font(content, bold=style.get("font-weight") == "bold")
+        canvas = self._canvas
+        shift = {"middle": 0.5, "end": 1.0}.get(style.get("text-anchor", "start"), 0.0)
+        begin = -shift * canvas.stringWidth(content, font, size)
+        canvas.saveState()
+        turn = _TURN.fullmatch(style.get("transform", ""))
+        canvas.translate(float(style["x"]), float(style["y"]))
+        if turn is not None:  # about its own place
+            canvas.rotate(float(turn[1]))
+        canvas.scale(1, -1)
+        canvas.setFont(font, size)
+        stroke, _ = self._inked(style)
+        if stroke:  # a halo: the letters are painted over it
+            canvas.drawString(begin, 0, content, mode=1)
+        canvas.drawString(begin, 0, content, mode=0)
+        canvas.restoreState()
+
+
+_DRAWING = {
+    "path": _Pen._path, "line": _Pen._line, "rect": _Pen._rect, "circle": _Pen._circle, "text": _Pen._text,
+    "use": _Pen._use,
+}  # fmt: skip
+
+
+def _steps(data: str) -> Iterator[tuple[str, list[tuple[float, float]]]]:
+    """Letters of path data with their points, relative ones made absolute."""
+    letter, numbers, last = "", list[float](), (0.0, 0.0)
+    for found in (*_STEPS.finditer(data), None):
+        if found is not None and found[2] is not None:
+            numbers.append(float(found[2]))
+            continue
+        if letter:
+            points = list(zip(numbers[::2], numbers[1::2], strict=True))
+            if letter == "l":
+                moved = []
+                for x, y in points:
+                    last = (last[0] + x, last[1] + y)
+                    moved.append(last)
+                points = moved
+            last = points[-1] if points else last
+            yield ("L" if letter == "l" else letter), points
+        letter, numbers = (found[1] if found is not None else ""), []
+
+
+@cache
+def _colour(name: str) -> Any:
+    from reportlab.lib.colors import HexColor
+
+    return HexColor("#" + "".join(2 * letter for letter in name[1:]) if len(name) == 4 else name)
+
+
+def _font(content: str, *, bold: bool) -> tuple[str, str]:
+    """The font, and the text as it can be written with it."""
+    if content.isascii() or _is_western(content):
+        return FONTS[bold], content
+    wider = _wider()
+    return (wider, content) if wider else (FONTS[bold], content.encode("cp1252", "replace").decode("cp1252"))
+
+
+def _is_western(content: str) -> bool:
+    try:
+        content.encode("cp1252")
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+@cache
+def _wider() -> str:
+    """A font of this machine's with more letters; empty if it has none of WIDER."""
+    from reportlab.pdfbase.pdfmetrics import registerFont
+    from reportlab.pdfbase.ttfonts import TTFError, TTFont
+
+    for path in filter(lambda path: Path(path).exists(), WIDER):
+        try:
+            registerFont(TTFont("wider", path))
+        except (TTFError, OSError):
+            continue
+        return "wider"
+    return ""

@@ -1,0 +1,345 @@
+"""A plan as a set of sheets for the building site: overview, sheets at a readable scale, lists to tick.
+
+Every sheet says which of how many it is, and where on the floor it lies. What is to scale is drawn once and
+shown through the window of each sheet.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from mission.document import Mission
+from mission.figures import Figures, percent
+from mission.files import plan_panel as panel
+from mission.files.floor_drawing import outline
+from mission.files.pdf import PdfPage, pdf_of
+from mission.files.plan_svg import drawing_of, extent_of, overview, whole_sheet
+from mission.files.room_labels import inside
+from mission.files.sheet import COLUMN, GAP, MARGIN, PAPERS, PaperBox, PaperSheet
+from mission.files.svg import group, line, rect, shortened, text
+from mission.floor import FloorPlan
+from mission.geometry import FloatArray
+from mission.planning import Route
+from mission.schedule import schedule
+from mission.table import duration
+
+READABLE = 100
+"""1:N at which stops and walls are told apart; a floor that one sheet shows so needs no further ones."""
+TILE_PAPER = "A3"
+OVERLAP = 20.0
+"""Millimetres that neighbouring sheets share."""
+KEY_HEIGHT = 60.0
+"""Of the small plan that shows where a sheet lies."""
+LIST_ROW, LIST_SIZE = 5.5, 2.6
+BOX = 3.2
+"""Side of a box to tick, millimetres."""
+COLUMNS = (
+    ("", 0.0), ("no", 7.0), ("stop", 17.0), ("room", 37.0), ("x m", 87.0), ("y m", 107.0),
+    ("heading °", 122.0), ("at", 143.0), ("sheet", 157.0), ("note", 170.0),
+)  # fmt: skip
+"""Of the list of stops: where each begins, millimetres from the margin."""
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A window on the drawing: its name, and its lower left corner and upper right one, metres."""
+
+    name: str
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+    def holds(self, x: float, y: float) -> bool:
+        return self.low[0] <= x <= self.high[0] and self.low[1] <= y <= self.high[1]
+
+
+def needs_sheets(made: Route, mission: Mission) -> bool:
+    """Whether one sheet shows the floor only smaller than can be read."""
+    return whole_sheet(made, mission).scale > READABLE
+
+
+def plan_pdf(
+    made: Route, mission: Mission, figures: Figures, *, date: str, with_range: bool = False
+) -> bytes:
+    """The whole set; equal inputs give equal bytes.
+
+    `with_range` adds a ring of the scanner's range about each stop.
+    """
+    pages, shared = sheets_of(made, mission, figures, date=date, with_range=with_range)
+    return pdf_of(pages, title=f"{mission.name}: scan plan {mission.id[:12]}", shared=shared)
+
+
+def sheets_of(
+    made: Route, mission: Mission, figures: Figures, *, date: str, with_range: bool = False
+) -> tuple[list[PdfPage], dict[str, str]]:
+    """The sheets, and the drawings that several of them show."""
+    floor = made.selection.visibility.candidates.space.floor
+    content, whole = overview(made, mission, date=date, with_range=with_range, with_table=False)
+    pages = [PdfPage(whole.width, whole.height, content, "Overview", whole.drawing)]
+    tiles = tiles_of(made, mission) if whole.scale > READABLE else []
+    shared: dict[str, str] = {}
+    if tiles:
+        site = _site_sheet(made, mission)
+        shared["site"] = "\n".join(drawing_of(made, mission, site, with_range=with_range))
+        shared["key"] = outline(floor, _key_sheet(tiles))
+        pages += [_tile_page(tile, tiles, site, made, mission, date) for tile in tiles]
+    pages += _lists(mission, floor, figures, tiles, date)
+    return [_numbered(page, number, len(pages)) for number, page in enumerate(pages, 1)], shared
+
+
+def _numbered(page: PdfPage, number: int, total: int) -> PdfPage:
+    words = f"sheet {number} of {total}"
+    last = text(page.width - MARGIN, page.height - 4.0, words, size=LIST_SIZE, text_anchor="end")
+    return replace(page, content=page.content + last)
+
+
+# Sheets at a readable scale
+
+
+def _window() -> tuple[float, float]:
+    """Width and height of a tile's drawing, millimetres."""
+    long, short = PAPERS[TILE_PAPER]
+    return long - 2 * MARGIN - GAP - COLUMN, short - 2 * MARGIN
+
+
+def tiles_of(made: Route, mission: Mission) -> list[Tile]:
+    """Windows over the floor in rows from the upper left, those without anything of the plan left out."""
+    x0, y0, x1, y1 = extent_of(made, mission)
+    width, height = (side * READABLE / 1000 for side in _window())
+    step_x, step_y = (side - OVERLAP * READABLE / 1000 for side in (width, height))
+    columns, rows = (max(1, math.ceil((span - (side - step)) / step)) for span, side, step in
+                     ((x1 - x0, width, step_x), (y1 - y0, height, step_y)))  # fmt: skip
+    left = (x0 + x1 - (columns - 1) * step_x - width) / 2
+    top = (y0 + y1 + (rows - 1) * step_y + height) / 2
+    busy = _places(made, mission)
+    found = []
+    for row, column in product(range(rows), range(columns)):
+        low = (left + column * step_x, top - row * step_y - height)
+        tile = Tile(f"{_letters(row)}{column + 1}", low, (low[0] + width, low[1] + height))
+        if ((busy >= tile.low) & (busy <= tile.high)).all(axis=1).any():
+            found.append(tile)
+    return found
+
+
+def _letters(row: int) -> str:
+    return (_letters(row // 26 - 1) if row >= 26 else "") + chr(ord("A") + row % 26)
+
+
+def _places(made: Route, mission: Mission) -> FloatArray:
+    """Points (n, 2) of everything a sheet must show: targets, stops and the way."""
+    legs = [
+        np.array(leg).reshape(-1, 2)
+        for leg in (*(stop.approach for stop in mission.stops), mission.return_ or ())
+    ]
+    return np.concatenate(
+        [made.selection.visibility.targets.unit_xy, *legs, [(mission.start.x, mission.start.y)]]
+    )
+
+
+def _site_sheet(made: Route, mission: Mission) -> PaperSheet:
+    """A sheet without end at the readable scale, with the site's middle at its corner."""
+    x0, y0, x1, y1 = extent_of(made, mission)
+    nowhere = PaperBox(0.0, 0.0, 0.0, 0.0)
+    return PaperSheet("", 0.0, 0.0, READABLE, nowhere, nowhere, nowhere, (), ((x0 + x1) / 2, (y0 + y1) / 2))
+
+
+def _tile_page(
+    tile: Tile, tiles: Sequence[Tile], site: PaperSheet, made: Route, mission: Mission, date: str
+) -> PdfPage:
+    long, short = (float(side) for side in PAPERS[TILE_PAPER])
+    width, height = _window()
+    box = PaperBox(MARGIN, MARGIN, width, height)
+    left = MARGIN + width + GAP
+    facts = [
+        *(("Sheet", tile.name), ("Scale", f"1:{READABLE} on {TILE_PAPER} landscape")),
+        ("Mission", f"{mission.id[:12]}, revision {mission.revision}"),
+        *(("Digest", mission.digest[:12]), ("Floor", mission.origin.floor), ("Date", date)),
+    ]
+    entries = panel.legend_entries(made, mission)
+    title_height, legend_height = panel.title_height(facts), panel.legend_height(entries)
+    middle = ((tile.low[0] + tile.high[0]) / 2, (tile.low[1] + tile.high[1]) / 2)
+    legend = PaperBox(left, MARGIN, COLUMN, legend_height)
+    title = PaperBox(left, short - MARGIN - title_height, COLUMN, title_height)
+    sheet = PaperSheet(TILE_PAPER, long, short, READABLE, box, legend, title, (), middle)
+    at = sheet.on_paper(np.array(site.centre)).tolist()
+    content = (
+        group("drawing", [f'<use href="#site" x="{at[0]}" y="{at[1]}"/>'], clip_path="url(#frame)"),
+        rect(box.x, box.y, box.width, box.height, fill="none", stroke="#000", stroke_width=0.35),
+        panel.coordinate_ticks(sheet),
+        panel.legend(entries, mission, sheet),
+        panel.title_block(mission, facts, title),
+        _key_window(tile, tiles, PaperBox(left, title.y - GAP - KEY_HEIGHT, COLUMN, KEY_HEIGHT)),
+    )
+    return PdfPage(long, short, "\n".join(content), f"Sheet {tile.name}", box)
+
+
+def _key_sheet(tiles: Sequence[Tile]) -> PaperSheet:
+    """The small plan's scale: all the sheets fit into its box."""
+    (x0, y0), (x1, y1) = (
+        np.min([tile.low for tile in tiles], axis=0),
+        np.max([tile.high for tile in tiles], axis=0),
+    )
+    scale = math.ceil(1000 * max((x1 - x0) / (COLUMN - 6), (y1 - y0) / (KEY_HEIGHT - 6)))
+    nowhere = PaperBox(0.0, 0.0, 0.0, 0.0)
+    return PaperSheet("", 0.0, 0.0, scale, nowhere, nowhere, nowhere, (), ((x0 + x1) / 2, (y0 + y1) / 2))
+
+
+def _key_window(tile: Tile, tiles: Sequence[Tile], box: PaperBox) -> str:
+    """Where the sheet lies among the others."""
+    small = _key_sheet(tiles)
+    x, y = box.x + box.width / 2, box.y + box.height / 2
+    marks = []
+    for one in tiles:
+        (x0, y1), (x1, y0) = small.on_paper(np.array([one.low, one.high])).tolist()
+        here = one.name == tile.name
+        look = (
+            {"stroke": "#b00000", "stroke_width": 0.6}
+            if here
+            else {"stroke": "#999999", "stroke_width": 0.15}
+        )
+        marks.append((here, rect(x + x0, y + y0, x1 - x0, y1 - y0, fill="none", **look)))
+        if len(tiles) <= 40 or here:
+            ink = "#b00000" if here else "#777777"
+            marks.append(
+                (
+                    here,
+                    text(
+                        x + (x0 + x1) / 2,
+                        y + (y0 + y1) / 2 + 0.9,
+                        one.name,
+                        size=2.5,
+                        fill=ink,
+                        text_anchor="middle",
+                    ),
+                )
+            )
+    drawn = [mark for _, mark in sorted(marks, key=lambda pair: pair[0])]
+    frame = rect(box.x, box.y, box.width, box.height, fill="#fff", stroke="#000", stroke_width=0.25)
+    return frame + f'<use href="#key" x="{x}" y="{y}"/>' + "".join(drawn)
+
+
+# Lists
+
+
+def _lists(
+    mission: Mission, floor: FloorPlan, figures: Figures, tiles: Sequence[Tile], date: str
+) -> list[PdfPage]:
+    """Stops to tick, then rooms, what is left out and what is doubtful; as many pages as they need."""
+    pages = _paged("Stops", _stop_lines(mission, floor, tiles), mission, date, head=COLUMNS)
+    return pages + _paged("Rooms and findings", _figure_lines(figures), mission, date, head=FIGURE_COLUMNS)
+
+
+ListLine = tuple[tuple[float, str, bool], ...]
+"""Where a cell begins, its words, and whether they are bold."""
+
+
+def _stop_lines(mission: Mission, floor: FloorPlan, tiles: Sequence[Tile]) -> Iterator[ListLine]:
+    arrivals = schedule(mission).arrival_s.tolist()
+    rooms = rooms_of(mission, floor)
+    begins = [begin for _, begin in COLUMNS]
+    for number, (stop, room, arrival) in enumerate(zip(mission.stops, rooms, arrivals, strict=True), 1):
+        sheet = next((tile.name for tile in tiles if tile.holds(stop.x, stop.y)), "1")
+        cells = (
+            *(
+                "☐",
+                str(number),
+                shortened(stop.id, size=LIST_SIZE, width=18),
+                shortened(room, size=LIST_SIZE, width=48),
+            ),
+            *(
+                f"{stop.x:.3f}",
+                f"{stop.y:.3f}",
+                f"{math.degrees(stop.heading):.1f}",
+                duration(arrival),
+                sheet,
+            ),
+            "doorway" if stop.doorway else "",
+        )
+        yield tuple((begin, cell, False) for begin, cell in zip(begins, cells, strict=True))
+
+
+def rooms_of(mission: Mission, floor: FloorPlan) -> list[str]:
+    """The name of the room in which each stop stands; empty between rooms."""
+    xy = np.array([(stop.x, stop.y) for stop in mission.stops], dtype=np.float64).reshape(-1, 2)
+    names = [""] * len(xy)
+    for room in floor.rooms:
+        rings = [ring for part in room.polygons for ring in part.rings]
+        for number in np.flatnonzero(inside(xy, rings)) if rings else ():
+            names[number] = names[number] or room.label
+    return names
+
+
+FIGURE_COLUMNS = (("", 0.0), ("all", 90.0), ("visible", 112.0), ("seen", 134.0), ("seen %", 156.0))
+
+
+def _figure_lines(figures: Figures) -> Iterator[ListLine]:
+    begins = [begin for _, begin in FIGURE_COLUMNS]
+    for share in (figures.whole, *figures.kinds, *figures.rooms):
+        numbers = (f"{share.total:.1f}", f"{share.visible:.1f}", f"{share.seen:.1f}", percent(share.coverage))
+        cells = (shortened(share.name, size=LIST_SIZE, width=86), *numbers)
+        yield tuple((begin, cell, share is figures.whole) for begin, cell in zip(begins, cells, strict=True))
+    parts = (
+        (
+            "Rooms left out",
+            [f"{item.room} ({item.area_m2:.1f} m²): {item.why}" for item in figures.unreached],
+        ),
+        ("To be checked before driving", [item.message for item in figures.grave]),
+        ("Notes", [item.message for item in figures.findings if item not in figures.grave]),
+    )
+    for title, lines in parts:
+        if lines:
+            yield ()
+            yield ((0.0, title, True),)
+        for words in lines:
+            yield ((0.0, shortened(words, size=LIST_SIZE, width=185), False),)
+
+
+def _paged(
+    title: str, lines: Iterator[ListLine], mission: Mission, date: str, *, head: Sequence[tuple[str, float]]
+) -> list[PdfPage]:
+    """Lines over pages of A4, each with a heading of its own."""
+    height, width = (float(side) for side in PAPERS["A4"])
+    every = list(lines)
+    fits = int((height - 2 * MARGIN - 20.0) // LIST_ROW)
+    pages = []
+    for first in range(0, len(every), fits):
+        shown = every[first : first + fits]
+        content = [
+            text(
+                MARGIN,
+                MARGIN + 5,
+                f"{title}: {shortened(mission.name, size=5.0, width=130)}",
+                size=5.0,
+                font_weight="bold",
+            ),
+            text(
+                MARGIN,
+                MARGIN + 10,
+                f"mission {mission.id[:12]}, revision {mission.revision}, {mission.origin.floor}, {date}",
+                size=2.6,
+                fill="#555555",
+            ),
+            *(
+                text(MARGIN + begin, MARGIN + 17, words, size=2.6, font_weight="bold")
+                for words, begin in head
+                if words
+            ),
+        ]
+        for number, cells in enumerate(shown):
+            y = MARGIN + 20 + LIST_ROW * number
+            content.append(line(MARGIN, y, width - MARGIN, y, stroke="#bbbbbb", stroke_width=0.15))
+            content += [_cell(MARGIN + begin, y, words, bold=bold) for begin, words, bold in cells if words]
+        name = title if len(every) <= fits else f"{title} {first // fits + 1}"
+        pages.append(PdfPage(width, height, "\n".join(content), name))
+    return pages
+
+
+def _cell(x: float, y: float, words: str, *, bold: bool) -> str:
+    if words == "☐":
+        return rect(x + 1, y + (LIST_ROW - BOX) / 2, BOX, BOX, fill="none", stroke="#000", stroke_width=0.25)
+    weight: dict[str, object] = {"font_weight": "bold"} if bold else {}
+    return text(x, y + LIST_ROW - 1.7, words, size=LIST_SIZE, **weight)

@@ -1,0 +1,139 @@
+"""The set of sheets shows every place of the plan at a readable scale, and lists every stop once."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+import zlib
+
+import numpy as np
+import pytest
+
+from mission.figures import Figures, Share, Unreached
+from mission.files import plan_sheets
+from mission.files.pdf import PdfPage, pdf_of
+from mission.files.plan_sheets import plan_pdf, rooms_of, sheets_of, tiles_of
+from mission.files.svg import SMALLEST_TEXT
+from tests.mission.worlds import room_mission, room_route
+
+DATE = "2026-11-22"
+FIGURES = Figures(
+    rule="length",
+    whole=Share("all", 24.0, 24.0, 24.0),
+    rooms=(Share("Büro 12", 24.0, 24.0, 24.0),),
+    kinds=(Share("walls", 24.0, 24.0, 24.0),),
+    rooms_m2=32.0,
+    reached_m2=32.0,
+    unreached=(Unreached(room="Lager", area_m2=9.0, why="door-7 is 0.60 m wide"),),
+    findings=(),
+)
+
+
+@pytest.fixture(autouse=True)
+def _small_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A room of 8 m by 4 m needs several sheets at 1:20."""
+    monkeypatch.setattr(plan_sheets, "READABLE", 20)
+
+
+def sheets() -> tuple[list[PdfPage], dict[str, str]]:
+    return sheets_of(room_route(), room_mission(), FIGURES, date=DATE)
+
+
+def words(page: PdfPage) -> list[str]:
+    return [item.text or "" for item in ET.fromstring(f"<g>{page.content}</g>").iter("text")]
+
+
+def streams(pdf: bytes) -> list[bytes]:
+    """What is drawn, page by page and form by form."""
+    from base64 import a85decode
+
+    found = re.findall(rb"stream\r?\n(.*?)endstream", pdf, re.DOTALL)
+    return [zlib.decompress(a85decode(b"<~" + body.strip(), adobe=True)) for body in found]
+
+
+def test_the_same_plan_gives_the_same_bytes() -> None:
+    once = plan_pdf(room_route(), room_mission(), FIGURES, date=DATE)
+    assert once == plan_pdf(room_route(), room_mission(), FIGURES, date=DATE)
+    assert once.startswith(b"%PDF")
+
+
+def test_every_place_of_the_plan_is_on_a_sheet() -> None:
+    route, mission = room_route(), room_mission()
+    tiles = tiles_of(route, mission)
+    assert len(tiles) > 1
+    assert len({tile.name for tile in tiles}) == len(tiles)
+    places = [*route.selection.visibility.targets.unit_xy.tolist(), *((s.x, s.y) for s in mission.stops)]
+    assert all(any(tile.holds(x, y) for tile in tiles) for x, y in places)
+
+
+def test_neighbouring_sheets_share_a_strip() -> None:
+    first, second = tiles_of(room_route(), room_mission())[:2]
+    assert first.high[0] - second.low[0] == pytest.approx(plan_sheets.OVERLAP * 20 / 1000)
+
+
+def test_a_sheet_says_which_of_how_many_it_is_and_shows_the_drawing_through_its_window() -> None:
+    pages, shared = sheets()
+    assert shared.keys() == {"site", "key"}
+    assert [words(page)[-1] for page in pages] == [
+        f"sheet {n} of {len(pages)}" for n in range(1, len(pages) + 1)
+    ]
+    tiles = [page for page in pages if page.name.startswith("Sheet ")]
+    assert all('href="#site"' in page.content and "1:20 on A3 landscape" in words(page) for page in tiles)
+
+
+def test_every_stop_is_listed_once_with_its_room_sheet_and_a_box_to_tick() -> None:
+    pages, _ = sheets()
+    (listed,) = [page for page in pages if page.name == "Stops"]
+    for stop, room in zip(
+        room_mission().stops,
+        rooms_of(room_mission(), room_route().selection.visibility.candidates.space.floor),
+        strict=True,
+    ):
+        assert words(listed).count(stop.id) == 1
+        assert room in words(listed)
+    assert listed.content.count("<rect") == len(room_mission().stops)
+
+
+def test_rooms_left_out_are_told() -> None:
+    pages, _ = sheets()
+    assert "Lager (9.0 m²): door-7 is 0.60 m wide" in words(pages[-1])
+
+
+def test_no_text_is_too_small_to_read() -> None:
+    pages, shared = sheets()
+    for content in (*(page.content for page in pages), *shared.values()):
+        sizes = [float(size) for size in re.findall(r'font-size="([\d.]+)"', content)]
+        assert min(sizes, default=SMALLEST_TEXT) >= 2.5
+
+
+def test_a_millimetre_is_a_millimetre_in_the_pdf() -> None:
+    page = PdfPage(100.0, 50.0, '<path d="M10 20L30 40" stroke="#000" stroke-width="0.5" fill="none"/>')
+    pdf = pdf_of([page], title="t")
+    assert b"/MediaBox [ 0 0 283.4646 141.7323 ]" in pdf
+    (drawn,) = streams(pdf)
+    assert b"2.834646 0 0 -2.834646 0 141.7323 cm" in drawn
+    assert b"10 20 m 30 40 l" in drawn
+
+
+def test_relative_steps_and_turned_words_are_understood() -> None:
+    content = (
+        '<g fill="none" stroke="#fff"><path d="M1 2l3 4l-1 0Z"/></g>'
+        '<text x="5" y="6" font-size="3" transform="rotate(-90 5 6)" text-anchor="middle">Zähler</text>'
+    )
+    (drawn,) = streams(pdf_of([PdfPage(50.0, 50.0, content)], title="t"))
+    assert b"1 2 m 4 6 l 3 6 l h" in drawn
+    assert b"Z\\344hler" in drawn
+
+
+def test_letters_of_any_script_are_written_or_replaced() -> None:
+    content = '<text x="5" y="6" font-size="3">Кабинет 会議室</text>'
+    assert pdf_of([PdfPage(50.0, 50.0, content)], title="Кабинет").startswith(b"%PDF")
+
+
+def test_what_is_drawn_through_a_window_is_cut_at_it() -> None:
+    pages, shared = sheets()
+    drawn = streams(pdf_of(pages, title="t", shared=shared))
+    assert sum(re.search(rb"W\*? n", body) is not None for body in drawn) == 1 + sum(
+        page.name.startswith("Sheet ") for page in pages
+    )
+    assert np.isfinite([page.width for page in pages]).all()
