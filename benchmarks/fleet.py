@@ -18,7 +18,7 @@ import msgspec
 from bridge.commands.spawn import end_robot, start_robot
 from bridge.link.protocol import KeyExpressions
 from bridge.link.zenoh_link import connecting
-from bridge.station.station import fleet
+from bridge.station.fleet import fleet
 from mission.events import PoseReport
 from mission.ports import free_port
 from tests.bridge.station.test_fleet import router

@@ -31,8 +31,8 @@ from bridge.commands.connection import (
 from bridge.console import carried_out, print_json, refusals_in, tell
 
 if TYPE_CHECKING:
+    from bridge.station.fleet import FleetMember
     from bridge.station.roster import LastSeen
-    from bridge.station.station import FleetMember
     from mission.events import StateReport
     from mission.run.orders import Answer, Verb
 
@@ -184,8 +184,8 @@ def fleet_status(
 ) -> None:
     """Tell of all robots of a site, those too that ought to be there; a silent one is an answer of no."""
     from bridge.link.keys import now_utc
+    from bridge.station.fleet import fleet
     from bridge.station.roster import LastSeen, forget, read_roster, remember, remembered, usual_roster
-    from bridge.station.station import fleet
 
     path = usual_roster(endpoint, site)
     if leave_out:

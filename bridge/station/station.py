@@ -12,10 +12,8 @@ import socket
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -43,6 +41,7 @@ from bridge.link.protocol import (
 )
 from bridge.link.tls_probe import why_no_link
 from bridge.station import follow
+from bridge.station.window import Window, windowed
 from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from mission.events import AnyEvent, Scanned, Skipped, StateReport, Unconfirmed
@@ -59,10 +58,6 @@ LEAST_S = 0.5
 """Left for an order itself when finding the robot took nearly all its time."""
 PAUSE_S = 0.05
 """Between tries: a query just after a reconnect may come back empty at once."""
-GATHER_S = 0.3
-"""Once one robot of a fleet has shown itself, the others get this long."""
-MOST_ASKED = 16
-"""Robots of a fleet that are asked at the same time."""
 COMMITS = 3
 """How often a commit is written, if the robot is started anew each time."""
 PATIENCE_S = 20.0
@@ -107,64 +102,6 @@ def connect(
         )
         station.reach(endpoint, why=lambda: why_no_link(endpoint, held))
         yield station
-
-
-@dataclass(frozen=True)
-class FleetMember:
-    """One robot of a site, as it answered or did not."""
-
-    robot: str
-    state: StateReport | None
-    """`None` if it is silent."""
-    trouble: str = ""
-    """Why it is not well, though it may have answered."""
-
-
-def fleet(
-    endpoint: str,
-    *,
-    site: str | None = None,
-    timeout_s: float = 5.0,
-    insecure: bool = False,
-    keys: Path | None = None,
-    known: Iterable[str] = (),
-) -> tuple[FleetMember, ...]:
-    """Every robot of the site that shows itself through `endpoint`, and the `known` that do not, by name.
-
-    Raises
-    ------
-    RobotUnreachable
-        If not a single robot showed itself within `timeout_s`, and none is known.
-    """
-    from bridge.link.zenoh_link import Guard, connecting
-
-    held = None if keys is None else read_keys(keys, now=now_utc())
-    every, names = KeyExpressions.of_every_robot(site), set(known)
-    with connecting(endpoint, Guard(held, insecure), open_s=timeout_s) as link:
-        station = Station(link, every, commander=whoami(), timeout_s=timeout_s)
-        shown: set[str] = set()
-        link.watch_presence(every.alive, lambda key, alive: shown.add(every.robot_of(key)) if alive else None)
-        try:
-            station.reach(endpoint, why=lambda: why_no_link(endpoint, held))
-        except RobotUnreachable as error:
-            if not names:
-                raise
-            return tuple(FleetMember(name, None, str(error)) for name in sorted(names))
-        time.sleep(GATHER_S)
-        with ThreadPoolExecutor(max_workers=MOST_ASKED) as pool:
-            asked = pool.map(lambda name: _member(link, KeyExpressions(name, site), timeout_s, held), shown)
-            found = (*asked, *(FleetMember(name, None, "does not show itself") for name in names - shown))
-    return tuple(sorted(found, key=lambda member: member.robot))
-
-
-def _member(link: Link, keys: KeyExpressions, timeout_s: float, held: HeldKeys | None) -> FleetMember:
-    station = Station(link, keys, commander=whoami(), timeout_s=timeout_s, held=held)
-    try:
-        return FleetMember(keys.robot, station.status())
-    except OutcomeUnknown as silent:
-        return FleetMember(keys.robot, None, f"shows itself, but {silent}")
-    except (AnswerIsNo, InputError) as no:
-        return FleetMember(keys.robot, None, str(no))
 
 
 def whoami() -> str:
@@ -295,8 +232,10 @@ class Station:
             mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
             sha256=hashlib.sha256(document).hexdigest(), chunk_bytes=CHUNK_BYTES,
         )  # fmt: skip
+        began = time.monotonic()
         begun = self._step(manifest, "begin", encode(manifest), Ready)
-        self._send_chunks(manifest, document, set(begun.held), progress)
+        window = Window(time.monotonic() - began)
+        self._send_chunks(manifest, document, set(begun.held), window, progress)
         accepted = self._commit(manifest, take_over=take_over)
         self._read_back(manifest)
         return accepted
@@ -322,14 +261,19 @@ class Station:
         """How long a commit is insisted on: the robot reads and stores a large document before it answers."""
         return self.patience_s + 2 * manifest.size / COMMIT_BYTES_PER_S
 
-    def _send_chunks(self, manifest: Manifest, document: bytes, held: set[int], progress: Progress) -> None:
-        for number in range(manifest.chunks):
+    def _send_chunks(
+        self, manifest: Manifest, document: bytes, held: set[int], window: Window, progress: Progress
+    ) -> None:
+        def send(number: int) -> None:
             data = document[number * manifest.chunk_bytes : (number + 1) * manifest.chunk_bytes]
-            if number not in held:
-                got = self._step(manifest, f"chunk/{number}", data, ChunkHeld, of=manifest.sha256)
-                if got.sha256 != hashlib.sha256(data).hexdigest():
-                    raise AnswerIsNo(f"chunk {number} arrived damaged at {self.keys.robot}; push again")
-            progress(min(manifest.size, (number + 1) * manifest.chunk_bytes), manifest.size)
+            got = self._step(manifest, f"chunk/{number}", data, ChunkHeld, of=manifest.sha256)
+            if got.sha256 != hashlib.sha256(data).hexdigest():
+                raise AnswerIsNo(f"chunk {number} arrived damaged at {self.keys.robot}; push again")
+
+        missing = [number for number in range(manifest.chunks) if number not in held]
+        progress(min(manifest.size, len(held) * manifest.chunk_bytes), manifest.size)
+        for sent, _ in enumerate(windowed(missing, send, window), start=len(held) + 1):
+            progress(min(manifest.size, sent * manifest.chunk_bytes), manifest.size)
 
     def _read_back(self, manifest: Manifest) -> None:
         state = self.info(within_s=self.patience_s).state
@@ -346,12 +290,12 @@ class Station:
 
     def mission(self, mission_id: str, revision: int) -> Mission:
         """The mission as the robot holds it."""
-        parts: list[bytes] = []
-        while True:
-            part = self._part(mission_id, revision, len(parts))
-            parts.append(part.data)
-            if sum(map(len, parts)) >= part.manifest.size or not part.data:
-                break
+        began = time.monotonic()
+        first = self._part(mission_id, revision, 0)
+        window = Window(time.monotonic() - began)
+        rest = range(1, -(-first.manifest.size // max(1, len(first.data))))
+        fetched = windowed(rest, lambda number: self._part(mission_id, revision, number), window)
+        parts = (first.data, *(part.data for _, part in fetched))
         return parse(b"".join(parts), f"mission {mission_id} on {self.keys.robot}")
 
     def command(self, verb: Verb, **details: Any) -> Answer:

@@ -12,7 +12,7 @@ import pytest
 
 from bridge.link import zenoh_link
 from bridge.link.memory_link import MemoryLink
-from bridge.station import station as stations
+from bridge.station import fleet as fleets
 from bridge.station.roster import read_roster
 from mission.__main__ import main
 from mission.errors import InputError
@@ -31,7 +31,7 @@ def field(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Field:
         yield field.board.link()
 
     monkeypatch.setattr(zenoh_link, "connecting", connecting)
-    monkeypatch.setattr(stations, "GATHER_S", 0.0)
+    monkeypatch.setattr(fleets, "GATHER_S", 0.0)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     return field
 
