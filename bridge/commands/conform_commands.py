@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -37,6 +38,7 @@ def conform_commands() -> typer.Typer:
         f"\n\nExample: stopgo conform robot --robot r1 --connect {DEFAULT_ENDPOINT} --drive",
     )
     commands.command("robot")(conform_robot)
+    commands.command("station")(conform_station)
     return commands
 
 
@@ -99,6 +101,50 @@ def _say_what_it_will_do(bench: RobotBench, *, drive: bool) -> None:
     )
 
 
+def conform_station(
+    *,
+    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where the fake robot listens.")] = (
+        DEFAULT_ENDPOINT
+    ),
+    name: Annotated[str, typer.Option("--name", help="Name of the fake robot.")] = "r1",
+    site: SiteName = None,
+    keys: KeyFolder = None,
+    command: Annotated[
+        str | None,
+        typer.Option(
+            metavar="COMMAND",
+            help="Lets the station act; {what} stands for `push FILE`, `start`, … Else you are asked.",
+        ),
+    ] = None,
+    patience: Annotated[
+        float, typer.Option(metavar="S", min=1, help="How long you may take for each, without --command.")
+    ] = 120.0,
+    insecure: Insecure = False,
+    json_: Json = False,
+) -> None:
+    """Be a robot that tries every requirement on a station, and print what it meets and what it does not.
+
+    The robot is simulated, and drives nothing. Its answers are lost, late, forged, of a newer version, and of
+    two robots at once. The command ends with 0 where the station says done, 1 where it says that the robot
+    refused, and 3 where it says that the outcome is unknown.
+
+    Ends with 0 if nothing failed, 1 if something did, and 2 if nothing was tried.
+
+    Example: stopgo conform station --listen tcp/127.0.0.1:7447 --command "my-station {what} --robot r1"
+    """
+    from bridge.conform.conform_station import StationOptions, station_bench, station_verdicts
+    from bridge.conform.station_requirements import STATION_REQUIREMENTS
+
+    options = StationOptions(listen, name, site, keys, insecure, command, patience, say)
+    found: list[ConformVerdict] = []
+    ready = partial(say, f"ready {name} listens on {listen}")
+    with station_bench(options, ready) as bench, Bar("conform", TRIED) as bar:
+        for verdict in station_verdicts(bench):
+            found.append(verdict)
+            bar.show(len(found), len(STATION_REQUIREMENTS))
+    report(f"the station of {name}", "station", found, as_json=json_)
+
+
 def report(peer: str, kind: str, found: Iterable[ConformVerdict], *, as_json: bool) -> None:
     """Tell every verdict, and end with the exit code that they come to."""
     from bridge.conform.requirements import counted
@@ -121,3 +167,5 @@ def report(peer: str, kind: str, found: Iterable[ConformVerdict], *, as_json: bo
         raise typer.Exit(3)
     if counts["failed"]:
         raise typer.Exit(1)
+    if not counts["passed"]:
+        raise typer.Exit(2)

@@ -27,6 +27,10 @@ class Request:
     """Whether it is certain that it was asked just now."""
 
 
+class Unanswered(Exception):
+    """Raised by whoever answers, to give no answer at all."""
+
+
 Answering = Callable[[Request], bytes]
 Hearing = Callable[[str, bytes], None]
 Publish = Callable[[bytes], None]

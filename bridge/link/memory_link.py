@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from bridge.link.link import Answering, Hearing, Presence, Publish, Request, matches
+from bridge.link.link import Answering, Hearing, Presence, Publish, Request, Unanswered, matches
 from bridge.link.seals import NO_SEALS, SealedAnswering, SealedHearing, Seals
 
 
@@ -52,7 +52,10 @@ class Switchboard:
         for asked in self.carried(question):
             request = Request(asked.key, asked.payload, asked.parameters, asked.seal)
             for answer in [answer for _, key, answer in self.serving if matches(key, asked.key)]:
-                payload, seal = answer(request)
+                try:
+                    payload, seal = answer(request)
+                except Unanswered:
+                    continue
                 arrived += self.carried(SealedMessage("answer", asked.key, payload, seal))
         return arrived
 

@@ -21,7 +21,7 @@ from typing import Any
 import zenoh
 
 from bridge.link.keys import HeldKeys, now_utc
-from bridge.link.link import Answering, Hearing, Presence, Publish, Request
+from bridge.link.link import Answering, Hearing, Presence, Publish, Request, Unanswered
 from bridge.link.seals import NO_SEALS, KeySeals, Seals
 from mission.errors import InputError
 
@@ -202,7 +202,10 @@ class ZenohLink:
             with query:
                 payload = b"" if query.payload is None else query.payload.to_bytes()
                 parameters = _parameters(query.parameters)
-                reply, seal = sealed(Request(str(query.key_expr), payload, parameters, _seal_of(query)))
+                try:
+                    reply, seal = sealed(Request(str(query.key_expr), payload, parameters, _seal_of(query)))
+                except Unanswered:
+                    return
                 query.reply(
                     query.key_expr, reply, encoding=JSON, attachment=seal or None,
                     priority=priority, congestion_control=zenoh.CongestionControl.BLOCK,

@@ -1,0 +1,155 @@
+"""`stopgo conform station`: a fake robot sees what somebody's station does when answers go wrong."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bridge.conform.fake_robot import FakeRobot, ForgedAnswers, MeddledLink, at_work
+from bridge.conform.requirements import ConformVerdict, NotTried, tried
+from bridge.conform.station_bench import Doing, StationBench
+from bridge.conform.station_requirements import STATION_REQUIREMENTS
+from bridge.link.access import access_control
+from bridge.link.protocol import KeyExpressions
+from bridge.link.seals import Seals
+from bridge.link.zenoh_link import Guard, listening
+from bridge.robot.controller import new_boot_id
+from bridge.robot.program import robots_keys
+from mission.document import Mission
+from mission.errors import InputError
+from mission.files.mission_json import write
+
+COMMAND_S = 180.0
+"""How long a station's command may take."""
+QUIET_S = 8.0
+"""After this long without a question the station has done what it was to do."""
+LOOK_S = 0.1
+SPEED_UP = 10.0
+
+
+@dataclass(frozen=True)
+class StationOptions:
+    """How the fake robot is reached, and how the station under test is told what to do."""
+
+    listen: str
+    robot: str
+    site: str | None = None
+    keys: Path | None = None
+    insecure: bool = False
+    command: str | None = None
+    """Run for each thing to do; `None` asks a person."""
+    patience_s: float = 120.0
+    """How long a person may take to begin."""
+    say: Callable[[str], None] = lambda line: None
+
+
+@dataclass(frozen=True)
+class ForgingGuard(Guard):
+    """A robot's guard whose answers are sealed wrongly where that is wanted."""
+
+    forged: Any = None
+
+    @property
+    def seals(self) -> Seals:
+        return super().seals if self.forged is None else self.forged
+
+
+@contextmanager
+def station_bench(options: StationOptions, ready: Callable[[], None]) -> Iterator[StationBench]:
+    """A fake robot that listens; `ready` is called once it can be reached."""
+    keys = KeyExpressions(options.robot, options.site)
+    held = None if options.keys is None else robots_keys(options.keys, options.robot)
+    boot_id = new_boot_id()
+    plain = Guard(
+        held, options.insecure, None if held is None else access_control(keys), boot_id
+    )  # fmt: skip
+    forged = None if held is None else ForgedAnswers(plain.seals)
+    guard = ForgingGuard(held, options.insecure, plain.access, boot_id, forged=forged)
+    with (
+        tempfile.TemporaryDirectory(prefix="stopgo-conform-") as folder,
+        listening(options.listen, guard) as link,
+    ):
+        meddled = MeddledLink(link, keys)
+        with at_work(FakeRobot(meddled, keys, boot_id, speed_up=SPEED_UP)) as robot:
+            ready()
+            path = Path(folder) / "mission.json"
+            do = by_command(options, path) if options.command else by_hand(options, meddled, path)
+            yield StationBench(robot, do, forged=forged)
+
+
+def station_verdicts(bench: StationBench) -> Iterator[ConformVerdict]:
+    """Every requirement's verdict."""
+    yield from tried(STATION_REQUIREMENTS, bench)
+
+
+def by_command(options: StationOptions, path: Path) -> Doing:
+    """Lets the station act by a command, which ends with 0 done, 1 the robot said no, 3 unknown.
+
+    Raises
+    ------
+    InputError
+        If the command cannot be one.
+    """
+    command = options.command or ""
+    if "{what}" not in command:
+        raise InputError(
+            f"--command {command}: must hold {{what}}, in whose place push FILE, start, … is put"
+        )
+
+    def do(what: str, mission: Mission | None) -> int | None:
+        if mission is not None:
+            write(mission, path)
+        wanted = what if mission is None else f"{what} {shlex.quote(str(path))}"
+        try:
+            words = shlex.split(command.replace("{what}", wanted))
+            return subprocess.run(
+                words, check=False, timeout=COMMAND_S, capture_output=True, stdin=subprocess.DEVNULL
+            ).returncode
+        except subprocess.TimeoutExpired:
+            raise NotTried(f"the command did not end within {COMMAND_S:g} s: {what}") from None
+        except (OSError, ValueError) as error:
+            raise InputError(f"--command {command}: {error}") from None
+
+    return do
+
+
+def by_hand(options: StationOptions, link: MeddledLink, path: Path) -> Doing:
+    """Asks a person to let the station act, and waits until it has been quiet for a while."""
+
+    def do(what: str, mission: Mission | None) -> int | None:
+        if mission is not None:
+            write(mission, path)
+        options.say(f"now let the station {what} {f'{path} to ' if mission else ''}{options.robot}")
+        deadline = time.monotonic() + options.patience_s
+        while not _has_acted(link, what):
+            if time.monotonic() > deadline:
+                raise NotTried(f"nobody let the station {what} within {options.patience_s:g} s")
+            time.sleep(LOOK_S)
+        seen, since = len(link.asked), time.monotonic()
+        while time.monotonic() - since < QUIET_S:
+            time.sleep(LOOK_S)
+            if len(link.asked) != seen:
+                seen, since = len(link.asked), time.monotonic()
+        return None
+
+    return do
+
+
+KEYS_OF = {"push": "mission/", "watch": "keep", "status": "info"}
+"""What a station asks first of all that is no order."""
+
+
+def _has_acted(link: MeddledLink, what: str) -> bool:
+    """Whether the station has asked something: where it is fooled, the order itself may never come."""
+    return (
+        bool(link.asked)
+        if what not in KEYS_OF
+        else any(asked.tail.startswith(KEYS_OF[what]) for asked in list(link.asked))
+    )

@@ -1,0 +1,195 @@
+"""A whole simulated robot whose answers and publications go wrong as they are told to."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import msgspec
+
+from bridge.link.clock import WallClock
+from bridge.link.link import Answering, Hearing, Link, Presence, Publish, Request, Unanswered
+from bridge.link.protocol import KeyExpressions
+from bridge.link.seals import Question, Seal, SealedAnswering, SealedHearing, Seals
+from bridge.robot.agent import Agent, on_link
+from bridge.robot.bodies import pose_of
+from bridge.robot.controller import Controller
+from bridge.robot.inbox import Inbox
+from bridge.robot.journal import memory_journal
+from bridge.robot.simulator import SimulatedBase, SimulatedScanner
+from mission.document import Mission
+
+Meddling = Callable[[Request, Answering], bytes]
+"""Gives the answer to a question in the robot's place; may raise `Unanswered`."""
+Withholding = Callable[[str, bytes], bytes | None]
+"""What is published instead of a payload on a key; nothing if `None`."""
+
+
+def plainly(request: Request, answer: Answering) -> bytes:
+    return answer(request)
+
+
+def everything(key: str, payload: bytes) -> bytes | None:
+    return payload
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A question as it came, with the part of its key behind the robot's name."""
+
+    tail: str
+    request: Request
+
+
+class MeddledLink:
+    """A robot's link that notes what is asked, and answers and publishes as it is told to."""
+
+    def __init__(self, link: Link, keys: KeyExpressions) -> None:
+        self._link = link
+        self._keys = keys
+        self._lock = threading.Lock()
+        self.meddle: Meddling = plainly
+        self.withhold: Withholding = everything
+        self.asked: list[Asked] = []
+        self.watchers: set[str] = set()
+        self.served: dict[str, Answering] = {}
+        """What answers on each key, without what is made of it."""
+
+    @property
+    def distrusted(self) -> str:
+        return self._link.distrusted
+
+    def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
+        def answered(request: Request) -> bytes:
+            with self._lock:
+                self.asked.append(Asked(request.key.removeprefix(f"{self._keys.root}/"), request))
+            return self.meddle(request, answer)
+
+        self.served[key] = answer
+        self._link.serve(key, answered, bulk=bulk)
+
+    def serve_beside(self, key: str, answer: Answering) -> None:
+        """Answer as another robot of the same name would."""
+        self._link.serve(key, answer)
+
+    def publisher(self, key: str, *, bulk: bool = False) -> Publish:
+        publish = self._link.publisher(key, bulk=bulk)
+
+        def published(payload: bytes) -> None:
+            told = self.withhold(key, payload)
+            if told is not None:
+                publish(told)
+
+        return published
+
+    def announce(self, key: str) -> None:
+        self._link.announce(key)
+
+    def ask(
+        self,
+        key: str,
+        payload: bytes = b"",
+        *,
+        timeout_s: float,
+        parameters: Mapping[str, str] | None = None,
+        bulk: bool = False,
+    ) -> bytes | None:
+        return self._link.ask(key, payload, timeout_s=timeout_s, parameters=parameters, bulk=bulk)
+
+    def ask_all(self, key: str, payload: bytes = b"", *, timeout_s: float) -> list[bytes]:
+        return self._link.ask_all(key, payload, timeout_s=timeout_s)
+
+    def hear(self, key: str, heard: Hearing) -> None:
+        self._link.hear(key, heard)
+
+    def watch_presence(self, key: str, changed: Presence) -> None:
+        def noted(token: str, alive: bool) -> None:
+            if alive and "/watch/" in token:
+                self.watchers.add(token)
+            changed(token, alive)
+
+        self._link.watch_presence(key, noted)
+
+    def close(self) -> None:
+        self._link.close()
+
+
+class ForgedAnswers:
+    """A robot's seals; while `forges` says so of a key, those of its answers do not hold."""
+
+    def __init__(self, seals: Seals) -> None:
+        self._seals = seals
+        self.distrusted = ""
+        self.forges: Callable[[str], bool] = lambda key: False
+
+    def question(self, key: str, payload: bytes, parameters: Mapping[str, str]) -> Question:
+        return self._seals.question(key, payload, parameters)
+
+    def opened(self, question: Question, payload: bytes, seal: bytes) -> bytes | None:
+        return self._seals.opened(question, payload, seal)
+
+    def answering(self, answer: Answering) -> SealedAnswering:
+        sealed = self._seals.answering(answer)
+
+        def answered(request: Request) -> tuple[bytes, bytes]:
+            reply, seal = sealed(request)
+            return (reply, _spoilt(seal)) if self.forges(request.key) else (reply, seal)
+
+        return answered
+
+    def telling(self, key: str, payload: bytes) -> bytes:
+        return self._seals.telling(key, payload)
+
+    def hearing(self, heard: Hearing) -> SealedHearing:
+        return self._seals.hearing(heard)
+
+
+def _spoilt(seal: bytes) -> bytes:
+    told = msgspec.json.decode(seal, type=Seal)
+    signature = bytes([told.signature[0] ^ 1]) + told.signature[1:]
+    return msgspec.json.encode(msgspec.structs.replace(told, signature=signature))
+
+
+class FakeRobot:
+    """A robot in this process, which simulates what it is sent and drives nothing."""
+
+    def __init__(self, link: MeddledLink, keys: KeyExpressions, boot_id: str, *, speed_up: float) -> None:
+        self.link = link
+        self.keys = keys
+        self.journal = memory_journal()
+        self.wall = WallClock()
+        clock = WallClock(speed_up=speed_up)
+        base, scanner = SimulatedBase(clock=clock), SimulatedScanner(clock=clock)
+        self.controller = Controller(
+            robot=keys.robot, journal=self.journal, base=base, scanner=scanner, clock=clock,
+            command_clock=self.wall, boot_id=boot_id,
+            mission_taken=lambda mission: base.stand_at_start(pose_of(mission.start)),
+        )  # fmt: skip
+        self.agent = Agent(
+            keys=keys, link=link, journal=self.journal, runner=self.controller, clock=clock,
+            command_clock=self.wall, inbox=Inbox(self.journal, self.controller, scanner.profiles),
+            speed_up=speed_up,
+        )  # fmt: skip
+
+    def holds(self, mission: Mission | None) -> bool:
+        """Whether this is what lies on it."""
+        run = self.controller.run
+        return mission is not None and (run.mission_id, run.revision) == (mission.id, mission.revision)
+
+
+@contextmanager
+def at_work(robot: FakeRobot) -> Iterator[FakeRobot]:
+    with on_link(robot.agent):
+        yield robot
+
+
+def no_answer(request: Request, answer: Answering) -> bytes:
+    raise Unanswered
+
+
+def lost(request: Request, answer: Answering) -> bytes:
+    """The robot hears and does it, and its answer does not arrive."""
+    answer(request)
+    raise Unanswered

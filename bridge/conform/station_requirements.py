@@ -1,0 +1,372 @@
+"""What a station must do when answers are lost, late, forged, or newer than it is."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+from bridge.conform.fake_robot import lost, no_answer, plainly
+from bridge.conform.requirements import Requirement, must
+from bridge.conform.station_bench import (
+    DONE,
+    NO,
+    UNKNOWN,
+    StationBench,
+    changed_answer,
+    tells,
+)
+from bridge.link.link import Answering, Request, Unanswered
+from bridge.link.protocol import Booted, ChunkHeld, Manifest, Rejected, encode
+from mission.run.orders import LONGEST_VALID_S
+
+LATE_S = 2.0
+"""Longer than anybody waits for one try, shorter than for the whole."""
+STOP_BYTES = 1000
+"""No pause or abort is larger."""
+
+
+def _on(part: str, instead: Callable[[Request, Answering], bytes]) -> Callable[[Request, Answering], bytes]:
+    """Meddle with questions on keys with this in them alone."""
+
+    def meddle(request: Request, answer: Answering) -> bytes:
+        return instead(request, answer) if part in request.key else plainly(request, answer)
+
+    return meddle
+
+
+def _first(part: str, instead: Callable[[Request, Answering], bytes]) -> Any:
+    """Meddle with the first question on such keys alone."""
+    seen: list[Request] = []
+
+    def meddle(request: Request, answer: Answering) -> bytes:
+        if part not in request.key or seen:
+            return plainly(request, answer)
+        seen.append(request)
+        return instead(request, answer)
+
+    return meddle
+
+
+# Orders
+
+
+def an_order_is_for_one_boot_and_state(bench: StationBench) -> None:
+    mission = bench.ready()
+    before_ns = bench.robot.wall.now_ns()
+    tells(bench.does("start"), DONE, "a start that was carried out is not told as done")
+    orders = bench.orders("start")
+    must(orders, "no start came")
+    order = orders[0]
+    must(order.boot_id == bench.robot.controller.boot_id, f"boot_id is {order.boot_id}, not the one of info")
+    must(0 < order.valid_for_s <= LONGEST_VALID_S, f"valid_for_s is {order.valid_for_s}")
+    must(before_ns <= order.issued_ns, "issued_ns is not the clock that info told")
+    must(order.mission_id in (None, mission.id), "mission_id is another mission's")
+    must(order.expect_state is None or "READY" in order.expect_state, "expect_state is not the state told")
+    must(len(order.cmd_id) >= 16, "cmd_id is too short to be nobody else's")
+
+
+def an_order_is_repeated_under_its_id(bench: StationBench) -> None:
+    bench.ready()
+    with bench.meddling(_first("/cmd/start", lost)):
+        code = bench.does("start")
+    ids = {order.cmd_id for order in bench.orders("start")}
+    must(len(ids) == 1, f"a start without an answer was sent under {len(ids)} ids")
+    payloads = {request.payload for request in bench.asked("cmd/start")}
+    must(len(payloads) == 1, "a start that was sent again under one id is another")
+    tells(code, DONE, "a start whose first answer was lost is not told as done")
+
+
+def silence_is_unknown(bench: StationBench) -> None:
+    bench.ready()
+    with bench.meddling(_on("/cmd/start", lost)):
+        tells(bench.does("start"), UNKNOWN, "a start without an answer is not told as unknown")
+    must(bench.orders("start"), "no start came")
+    ids = {order.cmd_id for order in bench.orders("start")}
+    must(len(ids) == 1, f"a start without an answer was sent under {len(ids)} ids")
+
+
+def a_late_answer_counts(bench: StationBench) -> None:
+    bench.ready()
+
+    def late(request: Request, answer: Answering) -> bytes:
+        reply = answer(request)
+        time.sleep(LATE_S)
+        return reply
+
+    with bench.meddling(_first("/cmd/start", late)):
+        tells(bench.does("start"), DONE, "a start that was answered late is not told as done")
+    must(len({order.cmd_id for order in bench.orders("start")}) == 1, "a late answer made a second order")
+
+
+def a_refusal_is_told_and_left_at_that(bench: StationBench) -> None:
+    bench.ready()
+    tells(bench.does("resume"), NO, "a resume that was refused is not told as refused")
+    ids = {order.cmd_id for order in bench.orders("resume")}
+    must(len(ids) <= 1, f"a resume that was refused was ordered {len(ids)} times")
+
+
+def the_lease_is_not_taken_unasked(bench: StationBench) -> None:
+    bench.ready()
+    bench.leased_to("somebody-else")
+    tells(bench.does("start"), NO, "a start under another's lease is not told as refused")
+    must(not any(order.take_over for order in bench.orders("start")), "it takes over though nobody said so")
+    lease = bench.robot.controller.lease
+    must(lease is not None and lease.commander == "somebody-else", "it has taken the lease")
+
+
+def a_stop_asks_nothing_first(bench: StationBench) -> None:
+    bench.ready()
+    bench.gives("start")
+    with bench.meddling(lambda request, answer: _only("/cmd/", request, answer)):
+        tells(bench.does("pause"), DONE, "a pause of a robot that tells no state is not told as done")
+    must(bench.orders("pause"), "where the robot tells no state, no pause comes")
+    size = max(len(request.payload) for request in bench.asked("cmd/pause"))
+    must(size <= STOP_BYTES, f"a pause has {size} bytes")
+    must(bench.robot.controller.run.state == "PAUSED", "the robot was not paused")
+
+
+def _only(part: str, request: Request, answer: Answering) -> bytes:
+    return plainly(request, answer) if part in request.key else no_answer(request, answer)
+
+
+# Missions
+
+
+def a_push_is_whole_and_read_back(bench: StationBench) -> None:
+    bench.at_rest()
+    mission = bench.large()
+    tells(bench.does("push", mission), DONE, "a push that was taken is not told as done")
+    must(bench.robot.holds(mission), "the robot does not hold what was to be pushed")
+    manifest = msgspec.json.decode(bench.asked("mission/")[0].payload, type=Manifest)
+    numbers = bench.chunks()
+    must(sorted(set(numbers)) == list(range(manifest.chunks)), f"chunks {numbers} came of {manifest.chunks}")
+    tails = bench.tails()
+    committed = max(index for index, tail in enumerate(tails) if tail.endswith("/commit"))
+    must(
+        any(tail == "info" or "/part/" in tail for tail in tails[committed + 1 :]),
+        "nothing was read back after the commit",
+    )
+    commit = bench.commits()[-1]
+    must(commit.boot_id == bench.robot.controller.boot_id, "a commit does not name the boot it is for")
+
+
+def a_push_goes_on_where_it_was_cut(bench: StationBench) -> None:
+    bench.at_rest()
+    mission = bench.large()
+
+    def cut(request: Request, answer: Answering) -> bytes:
+        if request.key.endswith(("/chunk/0", "/begin", "/info", "/keep")):
+            return plainly(request, answer)
+        raise Unanswered
+
+    with bench.meddling(cut):
+        tells(bench.does("push", mission), UNKNOWN, "a push that was cut off is not told as unknown")
+    must(not bench.commits(), "a commit was sent before all chunks were held")
+    tells(bench.does("push", mission), DONE, "a push that went on is not told as done")
+    must(0 not in bench.chunks(), "a chunk that is held was sent again")
+    must(bench.robot.holds(mission), "the robot does not hold what was to be pushed")
+
+
+def a_commit_is_repeated_as_it_is(bench: StationBench) -> None:
+    bench.at_rest()
+    mission = bench.mission()
+    with bench.meddling(_first("/commit", lost)):
+        tells(bench.does("push", mission), DONE, "a push whose commit was answered late is not told as done")
+    nonces = {commit.nonce for commit in bench.commits()}
+    must(len(nonces) == 1, f"one commit was sent under {len(nonces)} nonces")
+
+
+def a_damaged_chunk_is_not_committed(bench: StationBench) -> None:
+    bench.at_rest()
+    mission = bench.mission()
+    damaged = encode(ChunkHeld(index=0, sha256="0" * 64))
+    with bench.meddling(_on("/chunk/", lambda request, answer: damaged)):
+        code = bench.does("push", mission)
+    must(code != DONE, "a push whose chunk arrived damaged is told as done")
+    must(not bench.commits(), "what arrived damaged was committed")
+
+
+def a_rejection_is_told(bench: StationBench) -> None:
+    bench.at_rest()
+    no = encode(Rejected(reason="later_reason", messages=("for a reason that nobody knows yet",)))
+    with bench.meddling(_on("/commit", lambda request, answer: no)):
+        tells(bench.does("push", bench.mission()), NO, "a push that was rejected is not told as rejected")
+
+
+def acceptance_is_not_believed_blindly(bench: StationBench) -> None:
+    """Somebody else pushed between the commit and the look."""
+    bench.at_rest()
+    mission = bench.mission()
+    seen: list[Request] = []
+
+    def another_since(request: Request, answer: Answering) -> bytes:
+        if request.key.endswith("/commit"):
+            seen.append(request)
+        if not seen or not request.key.endswith(("/info", "/keep")):
+            return plainly(request, answer)
+        told = msgspec.json.decode(answer(request))
+        told["state"]["mission_id"] = "another"
+        return encode(told)
+
+    with bench.meddling(another_since):
+        code = bench.does("push", mission)
+    must(code != DONE, "a push is told as done though the robot tells of another mission")
+
+
+# A newer robot
+
+
+def newer_fields_are_passed_over(bench: StationBench) -> None:
+    bench.ready()
+
+    def newer(request: Request, answer: Answering) -> bytes:
+        return changed_answer(answer, later={"than": [1, 2]}, also="new")(request)
+
+    with bench.meddling(newer):
+        tells(bench.does("start"), DONE, "a robot that adds fields to its answers cannot be started")
+    must(bench.orders("start"), "to a robot that adds fields to its answers no start comes")
+
+
+def an_unknown_state_is_no_hindrance(bench: StationBench) -> None:
+    bench.ready()
+    bench.gives("start")
+
+    def hovering(request: Request, answer: Answering) -> bytes:
+        told = msgspec.json.decode(answer(request))
+        told["state"]["state"] = "HOVERING"
+        return encode(told)
+
+    with bench.meddling(_on("/info", hovering)):
+        tells(bench.does("status"), DONE, "a robot in a state that is not known cannot be asked")
+        tells(bench.does("pause"), DONE, "a robot in a state that is not known cannot be paused")
+    must(bench.orders("pause"), "to a robot in a state that is not known no pause comes")
+
+
+def unknown_events_are_passed_over(bench: StationBench) -> None:
+    bench.ready()
+    bench.gives("start")
+
+    def newer(request: Request, answer: Answering) -> bytes:
+        page = msgspec.json.decode(answer(request))
+        for event in page["events"]:
+            if event["event"] == "Settled":
+                event["event"], event["later"] = "Levelled", 1
+        return encode(page)
+
+    with bench.meddling(_on("/log", newer)):
+        tells(bench.does("watch"), DONE, "a run with events that are not known is not followed to its end")
+
+
+# Following
+
+
+def missed_events_are_asked_for(bench: StationBench) -> None:
+    bench.ready()
+    bench.gives("start")
+    with bench.meddling(withhold=lambda key, payload: None if key.endswith("/tel/event") else payload):
+        tells(bench.does("watch"), DONE, "a run whose events were lost is not followed to its end")
+    must(bench.asked("log"), "events that were lost are not asked for")
+
+
+def missed_poses_are_asked_for(bench: StationBench) -> None:
+    bench.ready()
+    bench.gives("start")
+    with bench.meddling(withhold=lambda key, payload: None if key.endswith("/tel/pose") else payload):
+        bench.does("watch")
+    must(bench.asked("poses"), "poses that were lost are not asked for")
+
+
+def a_watch_is_known_to_the_robot(bench: StationBench) -> None:
+    bench.ready()
+    bench.gives("start")
+    bench.link.watchers.clear()
+    tells(bench.does("watch"), DONE, "a run that finished is not told as done")
+    must(bench.link.watchers, "no token on watch/<name> was shown")
+    must(bench.asked("keep"), "`keep` was not asked")
+
+
+# Whom it believes
+
+
+def two_of_one_name_are_stopped(bench: StationBench) -> None:
+    bench.ready()
+    bench.gives("start")
+    there = True
+    other = {"boot_id": "twin"}
+
+    def twin(request: Request) -> bytes:
+        if not there:
+            raise Unanswered
+        told = bench.info()
+        return encode({**told, **other, "state": {**told["state"], **other}})
+
+    bench.link.serve_beside(bench.robot.keys.info, twin)
+    bench.link.serve_beside(bench.robot.keys.boot, lambda request: _boot_of(there))
+    try:
+        code = bench.does("resume")
+    finally:
+        there = False
+    must(code != DONE, "an order to two robots of one name is told as done")
+    must(not bench.orders("resume"), "an order was given though two robots answer to the name")
+    must(bench.orders("pause"), "two robots of one name are not paused")
+
+
+def _boot_of(there: bool) -> bytes:
+    if not there:
+        raise Unanswered
+    return encode(Booted(boot_id="twin"))
+
+
+def questions_are_sealed(bench: StationBench) -> None:
+    with bench.forging("no such key"):
+        bench.ready()
+        tells(bench.does("start"), DONE, "a start that was carried out is not told as done")
+    holders = {request.holder for request in bench.asked("cmd/start")}
+    must(holders and None not in holders, "a start without a seal that holds")
+
+
+def forged_states_are_not_believed(bench: StationBench) -> None:
+    bench.ready()
+    with bench.forging("/info"):
+        code = bench.does("start")
+    must(code != DONE, "a start after a forged Info is told as done")
+    must(not bench.orders("start"), "an order was written by an Info whose seal does not hold")
+
+
+def forged_answers_are_not_believed(bench: StationBench) -> None:
+    bench.ready()
+    with bench.forging("/cmd/"):
+        tells(bench.does("start"), UNKNOWN, "a start that was answered by a forger is not told as unknown")
+
+
+STATION_REQUIREMENTS: tuple[Requirement[StationBench], ...] = tuple(
+    Requirement(section, text, find_out)
+    for section, text, find_out in (
+        ("Orders", "an order names boot, clock and state as told", an_order_is_for_one_boot_and_state),
+        ("Orders", "an answer lost: the same order again, under its id", an_order_is_repeated_under_its_id),
+        ("Orders", "no answer: told as unknown, one id", silence_is_unknown),
+        ("Orders", "a late answer makes no second order", a_late_answer_counts),
+        ("Orders", "a refusal is told, and not tried again", a_refusal_is_told_and_left_at_that),
+        ("Orders", "another's lease is not taken unasked", the_lease_is_not_taken_unasked),
+        ("Orders", "`pause` is sent without asking, and small", a_stop_asks_nothing_first),
+        ("Pushing a mission", "every chunk, then the commit, then a look", a_push_is_whole_and_read_back),
+        ("Pushing a mission", "a cut: goes on with what is missing", a_push_goes_on_where_it_was_cut),
+        ("Pushing a mission", "a commit is repeated under its nonce", a_commit_is_repeated_as_it_is),
+        ("Pushing a mission", "a chunk with another hash is not committed", a_damaged_chunk_is_not_committed),
+        ("Pushing a mission", "a rejection is told, for unknown reasons too", a_rejection_is_told),
+        ("Pushing a mission", "done only when the state tells so", acceptance_is_not_believed_blindly),
+        ("Messages", "fields that are not known are passed over", newer_fields_are_passed_over),
+        ("Messages", "a state that is not known is no hindrance", an_unknown_state_is_no_hindrance),
+        ("Events", "events that are not known are passed over", unknown_events_are_passed_over),
+        ("Events", "events that were missed are asked for", missed_events_are_asked_for),
+        ("Events", "poses that were missed are asked for", missed_poses_are_asked_for),
+        ("Keys", "who watches shows a token and asks `keep`", a_watch_is_known_to_the_robot),
+        ("One robot, one name", "two boots: no order, both paused", two_of_one_name_are_stopped),
+        ("Seals", "questions are sealed", questions_are_sealed),
+        ("Seals", "an Info whose seal does not hold: no order", forged_states_are_not_believed),
+        ("Seals", "an answer whose seal does not hold: unknown", forged_answers_are_not_believed),
+    )
+)

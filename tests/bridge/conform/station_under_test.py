@@ -1,0 +1,77 @@
+"""A station that the fake robot puts through its paces, in the test's own time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bridge.conform.fake_robot import FakeRobot, ForgedAnswers, MeddledLink, at_work
+from bridge.conform.requirements import ConformVerdict, tried
+from bridge.conform.station_bench import StationBench
+from bridge.conform.station_requirements import STATION_REQUIREMENTS
+from bridge.link.keys import HeldKeys, now_utc, read_keys
+from bridge.link.link import Link
+from bridge.link.memory_link import Switchboard
+from bridge.link.protocol import KeyExpressions
+from bridge.link.seals import NO_SEALS, KeySeals
+from bridge.station.station import Station
+from bridge.station.watch import Lines, watch_showing
+from mission.document import Mission
+from mission.errors import StopgoError
+
+KEYS = KeyExpressions("r1")
+
+
+class StationUnderTest:
+    """Our own station, told what to do as by a command; subclasses are broken on purpose."""
+
+    station: type[Station] = Station
+
+    def __init__(self, site: Path | None = None) -> None:
+        self.site = site
+        self.board = Switchboard()
+
+    def held(self, name: str) -> HeldKeys | None:
+        return None if self.site is None else read_keys(self.site / name, now=now_utc())
+
+    def link(self) -> Link:
+        held = self.held("alice")
+        return self.board.link(NO_SEALS if held is None else KeySeals(held))
+
+    def does(self, what: str, mission: Mission | None) -> int:
+        station = self.station(
+            self.link(), KEYS, commander="alice", timeout_s=4.0, patience_s=6.0, held=self.held("alice")
+        )
+        try:
+            self.acts(station, what, mission)
+        except StopgoError as error:
+            return error.exit_code
+        return 0
+
+    def acts(self, station: Station, what: str, mission: Mission | None) -> None:
+        if what == "push":
+            assert mission is not None
+            station.push(mission)
+        elif what == "watch":
+            watch_showing(station, None, Lines(lambda line: None))
+        elif what == "status":
+            station.status()
+        else:
+            station.command(what)  # type: ignore[arg-type]
+
+    @contextmanager
+    def bench(self) -> Iterator[StationBench]:
+        held, boot_id = self.held("r1"), "b1"
+        forged = None if held is None else ForgedAnswers(KeySeals(held, boot_id=boot_id))
+        link = MeddledLink(self.board.link(forged or NO_SEALS), KEYS)
+        with at_work(FakeRobot(link, KEYS, boot_id, speed_up=10.0)) as robot:
+            yield StationBench(robot, self.does, forged=forged)
+
+
+def verdicts(station: StationUnderTest, *only: str) -> dict[str, ConformVerdict]:
+    """What the kit finds of a station, by requirement."""
+    wanted = [one for one in STATION_REQUIREMENTS if not only or one.text in only or one.section in only]
+    assert wanted
+    with station.bench() as bench:
+        return {verdict.text: verdict for verdict in tried(wanted, bench)}
