@@ -21,6 +21,7 @@ from mission.run.orders import Answer, Order, Verb
 Doing = Callable[[str, Mission | None], int | None]
 """Lets the station do something (`push` with a mission, `start`, `watch`); its exit code, if it has one."""
 DONE, NO, UNKNOWN = 0, 1, 3
+LONG_SCAN_S = 3_600.0
 
 M = TypeVar("M")
 
@@ -88,19 +89,19 @@ class StationBench:
 
     # The robot's own side
 
-    def mission(self, *, stops: int = 2) -> Mission:
+    def mission(self, *, stops: int = 2, scan_s: float = 1.0) -> Mission:
         self._revision += 1
         here = self.robot.controller.position().pose
-        return trial_mission(self._mission_id, self._revision, here, stops=stops)
+        return trial_mission(self._mission_id, self._revision, here, stops=stops, scan_s=scan_s)
 
     def large(self) -> Mission:
         """A mission of several chunks."""
         return self.mission(stops=3 * CHUNK_BYTES // _bytes_of_a_stop(self.mission()))
 
-    def ready(self, *, stops: int = 2) -> Mission:
+    def ready(self, *, scan_s: float = 1.0) -> Mission:
         """A mission that lies on the robot, and that nobody commands."""
         self.at_rest()
-        mission = self.mission(stops=stops)
+        mission = self.mission(scan_s=scan_s)
         document = msgspec.json.encode(mission)
         manifest = Manifest(
             mission_id=mission.id, revision=mission.revision, digest=mission.digest, size=len(document),
@@ -125,6 +126,11 @@ class StationBench:
         key = self.robot.keys.info
         info: dict[str, Any] = msgspec.json.decode(self.link.served[key](Request(key, b"")))
         return info
+
+    def long_run(self) -> None:
+        """A run that nobody need hurry for: each of its scans takes an hour."""
+        self.ready(scan_s=LONG_SCAN_S)
+        self.gives("start")
 
     def free_lease(self) -> None:
         """Let the lease of whoever holds it be over."""

@@ -118,8 +118,7 @@ def the_lease_is_not_taken_unasked(bench: StationBench) -> None:
 
 
 def a_stop_asks_nothing_first(bench: StationBench) -> None:
-    bench.ready()
-    bench.gives("start")
+    bench.long_run()
     with bench.meddling(lambda request, answer: _only("/cmd/", request, answer)):
         tells(bench.does("pause"), DONE, "a pause of a robot that tells no state is not told as done")
     must(bench.orders("pause"), "where the robot tells no state, no pause comes")
@@ -231,8 +230,7 @@ def newer_fields_are_passed_over(bench: StationBench) -> None:
 
 
 def an_unknown_state_is_no_hindrance(bench: StationBench) -> None:
-    bench.ready()
-    bench.gives("start")
+    bench.long_run()
 
     def hovering(request: Request, answer: Answering) -> bytes:
         told = msgspec.json.decode(answer(request))
@@ -292,8 +290,7 @@ def a_watch_is_known_to_the_robot(bench: StationBench) -> None:
 
 
 def two_of_one_name_are_stopped(bench: StationBench) -> None:
-    bench.ready()
-    bench.gives("start")
+    bench.long_run()
     there = True
     other = {"boot_id": "twin"}
 
