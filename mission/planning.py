@@ -180,6 +180,17 @@ class Candidates:
         return frozen(np.flatnonzero(self.reason == KEPT), np.int64)
 
     @cached_property
+    def generated(self) -> int:
+        """Places that a stop was thought of at: different positions inside rooms, whatever became of them."""
+        never = [OUTSIDE, IN_HOLE, TOO_SMALL, SLIVER]
+        return len(np.unique(self.xy[~np.isin(self.reason, never)], axis=0))
+
+    @cached_property
+    def reachable(self) -> int:
+        """Places where a stop may be; a scanner that does not look all round has several headings at each."""
+        return len(np.unique(self.xy[self.kept], axis=0))
+
+    @cached_property
     def doorway_rows(self) -> IntArray:
         """Rows (indices into `kept`) of the candidates in doorways."""
         return self._rows_where(self.doorway)
@@ -227,10 +238,41 @@ class Visibility:
         start, stop = int(self.pointer[row]), int(self.pointer[row + 1])
         if start == stop:
             return frozen([], np.int64)
-        first, last = self.first[start:stop], self.last[start:stop]
+        order = np.argsort(self.first[start:stop], kind="stable")
+        first, last = self.first[start:stop][order], self.last[start:stop][order]
         lengths = last - first + 1
         offsets = np.repeat(first - np.concatenate([[0], np.cumsum(lengths)[:-1]]), lengths)
-        return frozen(np.unique(np.arange(int(lengths.sum())) + offsets), np.int64)
+        units = np.arange(int(lengths.sum())) + offsets
+        apart = bool(np.all(first[1:] > last[:-1]))
+        return frozen(units if apart else np.unique(units), np.int64)
+
+    @cached_property
+    def runs_apart(self) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+        """Row, segment, first and last unit of runs (k,) that say the same, no unit twice in a row.
+
+        They stand in the order of their rows and, in each, of their units.
+        """
+        row = np.repeat(np.arange(self.rows), np.diff(self.pointer))
+        order = np.lexsort((self.first, row))
+        row, first, last = row[order], self.first[order], self.last[order]
+        far = row * (self.targets.total + 1)
+        reached = np.maximum.accumulate(last + far) - far
+        same = np.diff(row) == 0
+        first = np.concatenate(
+            [first[:1], np.where(same, np.maximum(first[1:], reached[:-1] + 1), first[1:])]
+        )
+        real = first <= last
+        arrays = (row, self.segment[order], first, last)
+        a, b, c, d = (frozen(array[real], np.int64) for array in arrays)
+        return a, b, c, d
+
+    @cached_property
+    def units_seen(self) -> IntArray:
+        """How many units each candidate sees (rows,)."""
+        row, _, first, last = self.runs_apart
+        counts = np.zeros(self.rows, dtype=np.int64)
+        np.add.at(counts, row, last - first + 1)
+        return frozen(counts, np.int64)
 
     @cached_property
     def visible(self) -> BoolArray:

@@ -8,14 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from mission.document import Mission
 from mission.figures import Figures, Share, percent
 from mission.floor import Finding, Rank
-from mission.geometry import FloatArray
 from mission.plan import PartPlan
-from mission.planning import IN_HOLE, OUTSIDE, SLIVER, TOO_SMALL
 from mission.schedule import schedule
 from mission.table import printable
 
@@ -52,7 +48,6 @@ class PlanReport:
         visibility = selection.visibility
         candidates = visibility.candidates
         space, targets = candidates.space, visibility.targets
-        never = [OUTSIDE, IN_HOLE, TOO_SMALL, SLIVER]
         times = schedule(self.mission)
         return {
             "floor": self._floor(),
@@ -68,8 +63,8 @@ class PlanReport:
                 "raw_by_kind": targets.raw,
             },
             "candidates": {
-                "generated": _places(candidates.xy[~np.isin(candidates.reason, never)]),
-                "reachable": _places(candidates.xy[candidates.kept]),
+                "generated": candidates.generated,
+                "reachable": candidates.reachable,
                 "strategy": candidates.strategy,
             },
             "visibility": {"visible": int(visibility.visible.sum()), "method": visibility.method},
@@ -197,8 +192,3 @@ def finding_lines(findings: Sequence[Finding]) -> list[str]:
 
 def _word(finding: Finding) -> str:
     return "warning" if finding.rank == Rank.GRAVE else "finding"
-
-
-def _places(xy: FloatArray) -> int:
-    """Different positions: a scanner that does not look all round has several headings at each."""
-    return len(np.unique(xy, axis=0))

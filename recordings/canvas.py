@@ -78,23 +78,35 @@ class Canvas:
         *,
         step: int | None = None,
         candidate: int | None = None,
+        stop: int | None = None,
         mission_s: float | None = None,
         robot_ns: int | None = None,
     ) -> None:
         """Draw at the given times, of which there must be one: Rerun makes rows without a time static."""
-        if step is candidate is mission_s is robot_ns is None:
+        if step is candidate is stop is mission_s is robot_ns is None:
             raise ValueError(f"{entity}: no time given")
         self.stream.reset_time()
         if step is not None:
             self.stream.set_time(entities.STEP, sequence=step)
         if candidate is not None:
             self.stream.set_time(entities.CANDIDATE, sequence=candidate)
+        if stop is not None:
+            self.stream.set_time(entities.STOP_NUMBER, sequence=stop)
         if mission_s is not None:
             self.stream.set_time(entities.MISSION_TIME, duration=mission_s)
         if robot_ns is not None:
             self.stream.set_time(entities.ROBOT_TIME, timestamp=np.datetime64(robot_ns, "ns"))
         self.counts[entity] += 1
         self.stream.log(entity, archetype)
+
+    def since(self, entity: str, *archetypes: Any, step: int, planning_only: bool = False) -> None:
+        """Draw from a planning step on, and all the time on the other timelines of a plan.
+
+        With `planning_only` not on the mission's time, where all that planning came to is shown at once.
+        """
+        mission_s = None if planning_only else 0.0
+        for archetype in archetypes:
+            self.at(entity, archetype, step=step, candidate=0, stop=1, mission_s=mission_s)
 
     def take(self, chunk: Chunk) -> None:
         """Take a part of another recording of the same origin as it is."""

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 APPLICATION = "stopgo"
 
 STEP = "stage_step"
-"""Sequence: how many stops have been chosen; 0 holds what comes before the selection."""
+"""Sequence: the planning story: floor, space, candidates, each choice of a stop, and at last the route."""
+STOP_NUMBER = "stop"
+"""Sequence: the stops in the order of driving, from 1."""
 CANDIDATE = "candidate"
 """Sequence: the row of `Visibility` whose view is drawn."""
 MISSION_TIME = "mission_time"
@@ -40,7 +42,17 @@ SEEN = "/plan/visibility/seen"
 EYE = "/plan/visibility/candidate"
 SELECTION = "/plan/selection"
 SELECTION_TARGETS = "/plan/selection/targets"
+SELECTION_SEEN = "/plan/selection/seen"
+SELECTION_NEW = "/plan/selection/new"
+SELECTION_SIGHT = "/plan/selection/sight"
 SELECTION_STOPS = "/plan/selection/stops"
+SELECTION_ROUTE = "/plan/selection/route"
+WHY = "/plan/why"
+WHY_SIGHT = "/plan/why/sight"
+WHY_SEEN = "/plan/why/seen"
+WHY_ALONE = "/plan/why/alone"
+WHY_STOP = "/plan/why/stop"
+WHY_RUNNERS = "/plan/why/runners"
 COVERAGE = "/plan/coverage"
 ROUTE = "/plan/route"
 STOPS = "/plan/stops"
@@ -75,11 +87,16 @@ LOG_FIELD = "/log/field"
 REPORT = "/report"
 LATEST_REPORT = "/latest_report"
 """What is to be read first: the plan's report, and from a run's start on that of the run."""
+STORY = "/story"
+"""What a planning step did, in words."""
+STOP_STORY = "/stop_story"
+"""What a stop is for, in words."""
 PLANNED_STATE = "/plan/schedule/planned"
 
 MISSION = "/carried/mission"
 SIGHT = "/carried/sight"
 FINDINGS = "/carried/findings"
+REASONS = "/carried/reasons"
 
 PROPERTIES = "/__properties"
 PROPERTY_PLAN = "plan"
@@ -200,7 +217,7 @@ def sight(revision: int) -> str:
 def carries(entity: str) -> bool:
     """Whether values of the entity are read back."""
     parts = entity.split("/")
-    if entity == FINDINGS or entity.startswith((f"{MISSION}/", f"{SIGHT}/", f"{FLOOR}/")):
+    if entity in (FINDINGS, REASONS) or entity.startswith((f"{MISSION}/", f"{SIGHT}/", f"{FLOOR}/")):
         return True
     return len(parts) == 4 and f"/{parts[1]}" == FIELD and parts[3] in (EVENTS, ROBOT)
 

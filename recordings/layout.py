@@ -32,7 +32,15 @@ def blueprint(bounds: Bounds | None = None, runs: Sequence[str] = ()) -> rrb.Blu
     has a colour and a report of its own.
     """
     return rrb.Blueprint(
-        rrb.Tabs(_mission(bounds, runs), _stages(bounds), _run(runs), _log(), active_tab=0),
+        rrb.Tabs(
+            _mission(bounds, runs),
+            _story(bounds),
+            _stops(bounds),
+            _candidates(bounds),
+            _run(runs),
+            _log(),
+            active_tab=0,
+        ),
         rrb.TimePanel(
             timeline=at.MISSION_TIME,
             play_state="following",
@@ -94,15 +102,41 @@ def _colour(number: int) -> Colour:
     return palette.RUNS[number % len(palette.RUNS)]
 
 
-def _stages(bounds: Bounds | None) -> rrb.Grid:
+def _story(bounds: Bounds | None) -> rrb.Horizontal:
+    """How the plan was made, in one place; on the mission's time, what it came to."""
+    adding = {entity: _rows_so_far() for entity in (at.SELECTION_SEEN, at.SELECTION_STOPS)}
+    contents = (at.FLOOR, at.NAVIGABLE, at.TARGETS, at.CANDIDATES, at.SELECTION)
+    return rrb.Horizontal(
+        _flat("Step by step (timeline: stage_step)", _visible(bounds), *contents, overrides=adding),
+        rrb.Vertical(
+            rrb.TextDocumentView(origin=at.STORY, name="This step (timeline: stage_step)"),
+            _plot("Coverage, % (timeline: stage_step)", at.METRIC_COVERAGE),
+        ),
+        column_shares=[3, 2],
+        name="Planning",
+    )
+
+
+def _rows_so_far() -> rrb.VisibleTimeRanges:
+    """All rows up to now, of what adds up along the story."""
+    return rrb.VisibleTimeRanges([_until_now(timeline) for timeline in (at.STEP, at.MISSION_TIME)])
+
+
+def _stops(bounds: Bounds | None) -> rrb.Horizontal:
+    return rrb.Horizontal(
+        _flat("Why this stop (timeline: stop)", _visible(bounds), at.FLOOR, at.STOPS, at.WHY),
+        rrb.TextDocumentView(origin=at.STOP_STORY, name="In words (timeline: stop)"),
+        column_shares=[3, 2],
+        name="Stops",
+    )
+
+
+def _candidates(bounds: Bounds | None) -> rrb.Horizontal:
     area = _visible(bounds)
-    return rrb.Grid(
+    return rrb.Horizontal(
         _flat("Navigable space and candidates", area, at.FLOOR, at.NAVIGABLE, at.TARGETS, at.CANDIDATES),
         _flat("What a candidate sees (timeline: candidate)", area, at.FLOOR, at.VISIBILITY),
-        _flat("Selection (timeline: stage_step)", area, at.FLOOR, at.SELECTION),
-        _plot("Coverage, %", at.METRIC_COVERAGE),
-        grid_columns=2,
-        name="Planning",
+        name="Candidates",
     )
 
 
@@ -190,11 +224,10 @@ def _whole() -> rrb.TimeAxis:
 
 def _so_far() -> list[rr.VisibleTimeRange]:
     """The driven path is rows of short pieces: show all of them up to now."""
-    return [
-        rrb.VisibleTimeRange(
-            timeline,
-            start=rrb.TimeRangeBoundary.infinite(),
-            end=rrb.TimeRangeBoundary.cursor_relative(),
-        )
-        for timeline in (at.MISSION_TIME, at.ROBOT_TIME)
-    ]
+    return [_until_now(timeline) for timeline in (at.MISSION_TIME, at.ROBOT_TIME)]
+
+
+def _until_now(timeline: str) -> rr.VisibleTimeRange:
+    return rrb.VisibleTimeRange(
+        timeline, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative()
+    )

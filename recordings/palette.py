@@ -89,6 +89,7 @@ GAP: Colour = (255, 255, 255, 255)
 RAY: Colour = (235, 215, 110, 70)
 EYE: Colour = (255, 235, 120, 255)
 STOP: Colour = GREEN
+RUNNER_UP: Colour = ORANGE
 DOORWAY: Colour = (0, 114, 190, 255)
 WITHDRAWN: Colour = (112, 112, 122, 255)
 ROUTE: Colour = YELLOW

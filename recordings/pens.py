@@ -16,7 +16,7 @@ ORDER = {
     name: float(place)
     for place, name in enumerate(
         (
-            *("room", "area", "floor", "solid", "line", "target", "ray", "route"),
+            *("room", "area", "floor", "solid", "line", "target", "seen", "ray", "route"),
             *("candidate", "stop", "arrival", "scan", "robot"),
         )
     )
@@ -36,14 +36,28 @@ class Pen:
 
 
 def draw(
-    canvas: Canvas, entity: str, strips: Iterable[FloatArray], pen: Pen, *, names: list[str] | None = None
+    canvas: Canvas,
+    entity: str,
+    strips: Iterable[FloatArray],
+    pen: Pen,
+    *,
+    names: list[str] | None = None,
+    step: int | None = None,
+    planning_only: bool = False,
 ) -> None:
-    """Draw line strips, if there are any; `names`, one for each, are shown where the mouse points."""
+    """Draw line strips, if there are any, from a planning step on if one is given.
+
+    `names`, one for each, are shown where the mouse points.
+    """
     local = canvas.strips(strips)
     if local:
         named: dict[str, Any] = {"labels": names, "show_labels": False} if names else {}
         look: dict[str, Any] = {"colors": pen.colour, "radii": pen.radius, "draw_order": ORDER[pen.order]}
-        canvas.show(entity, rr.LineStrips2D(local, **look, **named))
+        shape = rr.LineStrips2D(local, **look, **named)
+        if step is None:
+            canvas.show(entity, shape)
+        else:
+            canvas.since(entity, shape, step=step, planning_only=planning_only)
 
 
 def style(canvas: Canvas, entity: str, pen: Pen) -> None:

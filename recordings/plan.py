@@ -15,6 +15,7 @@ from mission.floor import FloorPlan
 from mission.geometry import bounds
 from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
 from mission.sight import Sight
+from mission.stop_reasons import driven_coverage, stop_reasons
 from recordings import entities
 from recordings.canvas import (
     Canvas,
@@ -28,6 +29,7 @@ from recordings.canvas import (
 from recordings.carried.checking import carry_end
 from recordings.carried.findings import carry_findings
 from recordings.carried.missions import carry_mission
+from recordings.carried.reasons import carry_reasons
 from recordings.carried.sight import carry_sight
 from recordings.layout import Bounds
 from recordings.read import check
@@ -41,10 +43,10 @@ from recordings.stages.mission import (
     mission_extent,
     plan_states,
     plot_planned_coverage,
-    tell_route,
 )
 from recordings.stages.selection import draw_selection, paint_coverage
 from recordings.stages.space import draw_space
+from recordings.stages.stop_browser import tell_stops
 from recordings.stages.visibility import draw_visibility
 
 Drawing = Callable[[Canvas, Any], None]
@@ -55,7 +57,6 @@ DRAWINGS: dict[type, tuple[Drawing, ...]] = {
     Candidates: (draw_candidates,),
     Visibility: (draw_visibility,),
     Selection: (draw_selection, paint_coverage),
-    Route: (tell_route,),
     Mission: (draw_mission, carry_mission),
     Sight: (carry_sight,),
     Figures: (carry_findings,),
@@ -136,9 +137,12 @@ def _draw_planned_drive(canvas: Canvas, nouns: Nouns) -> None:
     mission = nouns[Mission]
     drive = planned_drive(mission)
     draw_drive(canvas, drive, radius=mission.robot.radius)
-    if Selection in nouns:
-        visible = int(nouns[Selection].visibility.visible.sum())
-        plot_planned_coverage(canvas, mission, drive, visible=visible)
+    if Route in nouns:
+        route: Route = nouns[Route]
+        reasons = stop_reasons(route, [stop.id for stop in mission.stops])
+        plot_planned_coverage(canvas, driven_coverage(route), drive)
+        tell_stops(canvas, route, mission, reasons, drive)
+        carry_reasons(canvas, reasons)
     plan_states(canvas, mission, drive)
 
 

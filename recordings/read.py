@@ -106,7 +106,13 @@ def rows(chunk: Chunk) -> Iterator[tuple[float | None, dict[str, Any]]]:
         yield None if time is None else time / 1e9, values
 
 
-_INDEXES = (entities.STEP, entities.CANDIDATE, entities.MISSION_TIME, entities.ROBOT_TIME)
+_INDEXES = (
+    entities.STEP,
+    entities.CANDIDATE,
+    entities.STOP_NUMBER,
+    entities.MISSION_TIME,
+    entities.ROBOT_TIME,
+)
 
 
 def _bare(cell: list[Any]) -> Any:

@@ -80,8 +80,8 @@ def _space(space: NavigableSpace) -> dict[str, Any]:
 
 def _candidates(candidates: Candidates) -> dict[str, Any]:
     return {
-        "candidates": len(candidates.xy),
-        "reachable_candidates": len(candidates.kept),
+        "candidates": candidates.generated,
+        "reachable_candidates": candidates.reachable,
         "strategy": candidates.strategy,
     }
 
@@ -197,8 +197,9 @@ _COLOURS = (
 
 _GUIDE = (
     "- timeline `mission_time`: the planned drive, and the field run when its recording is open too",
-    "- timeline `candidate`: what each candidate sees (tab *Planning*)",
-    "- timeline `stage_step`: the selection, stop by stop (tab *Planning*)",
+    "- timeline `candidate`: what each candidate sees (tab *Candidates*)",
+    "- timeline `stage_step`: how the plan was made, step by step (tab *Planning*); the log tells each",
+    "- timeline `stop`: why each stop is there (tab *Stops*); on `mission_time`, the stop that is driven to",
     "- walls in 3D are cut at a nominal 1.2 m: the drawing tells no heights",
 )
 

@@ -9,12 +9,13 @@ from mission.planning import DROP_REASONS, KEPT, Candidates
 from recordings import entities, palette
 from recordings.canvas import Canvas, on_screen
 from recordings.pens import ORDER
+from recordings.stages.story import CANDIDATES, tell_step
 
 
 def draw_candidates(canvas: Canvas, candidates: Candidates) -> None:
     """Every possible position, coloured by what became of it; hovering tells the reason and the room."""
     if not len(candidates.xy):
-        canvas.say("no candidate positions", level="WARN")
+        canvas.say("no candidate positions", level="WARN", step=CANDIDATES)
         return
     kept = candidates.reason == KEPT
     points = rr.Points2D(
@@ -26,7 +27,11 @@ def draw_candidates(canvas: Canvas, candidates: Candidates) -> None:
     )
     names = [candidates.space.rooms[int(room)].name for room in candidates.room]
     why = [DROP_REASONS[int(number)] for number in candidates.reason]
-    canvas.show(entities.CANDIDATES, points, rr.AnyValues(room=names, reason=why))
+    canvas.since(entities.CANDIDATES, points, rr.AnyValues(room=names, reason=why), step=CANDIDATES)
     counts = np.bincount(candidates.reason, minlength=len(DROP_REASONS))
     told = ", ".join(f"{int(count)} {DROP_REASONS[i]}" for i, count in enumerate(counts) if count)
-    canvas.say(f"candidates ({candidates.strategy}): {len(candidates.xy)} generated: {told}")
+    title = (
+        f"candidates ({candidates.strategy}): {candidates.generated} places generated, "
+        f"{candidates.reachable} reachable"
+    )
+    tell_step(canvas, CANDIDATES, title, f"Of {len(candidates.xy)} positions: {told}.")

@@ -10,10 +10,13 @@ import numpy as np
 
 from mission.document import Mission, Point
 from mission.geometry import FloatArray
+from mission.page import route_length
 from mission.schedule import straight_time, turn_time
 
 STEP_M = 0.25
-"""Greatest distance between two poses of the planned drive."""
+"""Greatest distance between two poses of the planned drive …"""
+MOST_POSES = 8000
+"""… unless it is longer than this many such steps: they are as much longer then."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +50,7 @@ class _Walk:
         self.robot = mission.robot
         self.seconds = 0.0
         self.x, self.y, self.heading = mission.start.x, mission.start.y, mission.start.heading
+        self.step_m = max(STEP_M, route_length(mission) / MOST_POSES)
         self.rows: list[tuple[float, float, float, float]] = []
         self._note()
 
@@ -69,7 +73,7 @@ class _Walk:
         """Evenly from a to b; only the time at b is exact, as the robot speeds up and slows down."""
         begin, length = self.seconds, math.dist(a, b)
         takes = straight_time(length, speed=self.robot.speed, acceleration=self.robot.acceleration)
-        steps = max(1, math.ceil(length / STEP_M))
+        steps = max(1, math.ceil(length / self.step_m))
         for step in range(1, steps + 1):
             t = step / steps
             self.seconds = begin + t * takes

@@ -12,6 +12,8 @@ from mission.geometry import FloatArray, Polygon
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
 from recordings.pens import ORDER, THICK, THIN, Pen, draw
+from recordings.stages import story
+from recordings.stages.story import tell_step
 
 MOST_NAMES = 30
 """With more rooms than these their names hide one another, and are shown where the mouse points."""
@@ -33,7 +35,8 @@ def draw_floor(canvas: Canvas, floor: FloorPlan) -> None:
     openings = [opening.line for opening in floor.openings]
     draw(canvas, entities.OPENINGS, openings, Pen(palette.PASSABLE, "line", THICK))
     say_findings(canvas, floor.findings)
-    canvas.say(f"floor {floor.name}: {floor.area:.1f} m², {len(floor.rooms)} rooms, {len(openings)} openings")
+    told = f"floor {floor.name}: {floor.area:.1f} m², {len(floor.rooms)} rooms, {len(openings)} openings"
+    tell_step(canvas, story.FLOOR, told)
 
 
 def raise_floor(canvas: Canvas, floor: FloorPlan) -> None:
@@ -48,10 +51,10 @@ def raise_floor(canvas: Canvas, floor: FloorPlan) -> None:
         _mesh(canvas, entities.part(entities.WORLD_FLOOR, kind), np.concatenate([sides, top]), colour)
 
 
-def say_findings(canvas: Canvas, findings: Iterable[Finding]) -> None:
+def say_findings(canvas: Canvas, findings: Iterable[Finding], *, step: int = story.FLOOR) -> None:
     """Each finding as a warning in the plan's log."""
     for finding in findings:
-        canvas.say(f"{finding.code}: {finding.message}", level="WARN")
+        canvas.say(f"{finding.code}: {finding.message}", level="WARN", step=step)
 
 
 def _draw_rooms(canvas: Canvas, rooms: tuple[Room, ...]) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from mission.document import Mission, Point, Stop
-from mission.geometry import bounds
-from mission.planning import Route
+from mission.geometry import FloatArray, bounds
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
 from recordings.layout import Bounds
@@ -52,16 +52,6 @@ def mission_extent(mission: Mission) -> Bounds:
     return (left - reach, low - reach, right + reach, high + reach)
 
 
-def tell_route(canvas: Canvas, route: Route) -> None:
-    """The route in words; the mission made from it is what is drawn."""
-    stops = len(route.order)
-    canvas.say(
-        f"route ({route.method}, {route.tour}): {stops} stops, {route.length:.2f} m,"
-        f" at least {route.bound:.2f} m; begins at {route.start_reason}",
-        step=stops,
-    )
-
-
 def plan_states(canvas: Canvas, mission: Mission, drive: Drive) -> None:
     """What the robot is planned to be doing, and what is tolerated of it, beside what runs tell."""
     lane = entities.PLANNED_STATE
@@ -92,13 +82,12 @@ def state_colours() -> rr.StateConfiguration:
     )
 
 
-def plot_planned_coverage(canvas: Canvas, mission: Mission, drive: Drive, *, visible: int) -> None:
-    """Coverage over mission time, if every scan is done as planned."""
-    gained = np.cumsum([stop.sees.new_units for stop in mission.stops]) * (100.0 / max(visible, 1))
+def plot_planned_coverage(canvas: Canvas, coverage: FloatArray, drive: Drive) -> None:
+    """Coverage over mission time, if every scan is done as planned; `coverage` after each scan (k,)."""
     seconds = np.concatenate([[0.0], drive.leaving_s])
     planned = entities.COVERAGE_PLANNED
     index = rr.TimeColumn(entities.MISSION_TIME, duration=seconds)
-    canvas.columns(planned, index, rr.Scalars.columns(scalars=np.concatenate([[0.0], gained])))
+    canvas.columns(planned, index, rr.Scalars.columns(scalars=np.concatenate([[0.0], 100 * coverage])))
     style = rr.SeriesLines(
         colors=palette.ROUTE, names="coverage as planned", widths=2, interpolation_mode="StepAfter"
     )
@@ -114,7 +103,7 @@ def draw_drive(canvas: Canvas, drive: Drive, *, radius: float) -> None:
         columns = rr.Transform3D.columns(translation=strokes.level(xy, 0.0), quaternion=turn)
         canvas.columns(robot, index, columns)
     robots = (entities.PLANNED_ROBOT, entities.WORLD_PLANNED_ROBOT)
-    draw_robot(canvas.show, *robots, radius=radius, colour=palette.PLANNED)
+    draw_robot(partial(canvas.at, mission_s=0.0), *robots, radius=radius, colour=palette.PLANNED)
 
 
 def _draw_route(canvas: Canvas, mission: Mission) -> None:

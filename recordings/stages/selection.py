@@ -1,17 +1,19 @@
-"""Selection: the choice step by step, and the coverage it reaches."""
+"""Selection: the choice of the stops, one step of the planning story each, and the coverage it reaches."""
 
 from __future__ import annotations
 
 import numpy as np
 import rerun as rr
 
+from mission.figures import percent
 from mission.geometry import FloatArray, IntArray
-from mission.planning import Selection
+from mission.planning import Selection, Visibility
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
-from recordings.pens import ORDER, THICK
+from recordings.pens import BOLD, ORDER, THICK, Pen, style
 from recordings.stages.floor import CUT
 from recordings.stages.mission import MOST_NAMES
+from recordings.stages.story import FIRST_CHOICE, step_of_choice
 
 SKIN = 0.01
 """How far the painted targets stand clear of the cut walls, so that both are seen."""
@@ -19,13 +21,15 @@ SKIN = 0.01
 
 def draw_selection(canvas: Canvas, selection: Selection) -> None:
     """The choice step by step, and what it comes to."""
-    steps = len(selection.chosen)
+    count = len(selection.chosen)
     lines, first_step = strokes.pieces(selection.visibility.targets, step_of_units(selection))
-    index = rr.TimeColumn(entities.STEP, sequence=np.arange(steps + 1))
-    _draw_targets(canvas, lines, first_step, index, steps=steps)
-    _draw_chosen(canvas, selection, index)
-    _plot_coverage(canvas, selection, index)
-    canvas.show(entities.COVERAGE, _pieces(canvas, lines, class_ids=_final(first_step, steps)))
+    steps = np.arange(count) + FIRST_CHOICE
+    _clear_space(canvas)
+    _draw_targets(canvas, lines, first_step)
+    _draw_seen(canvas, lines, first_step, steps)
+    _draw_chosen(canvas, selection, steps)
+    _plot_coverage(canvas, selection)
+    canvas.show(entities.COVERAGE, _pieces(canvas, lines, class_ids=_final(first_step, count)))
 
 
 def paint_coverage(canvas: Canvas, selection: Selection) -> None:
@@ -43,7 +47,7 @@ def paint_coverage(canvas: Canvas, selection: Selection) -> None:
 
 
 def step_of_units(selection: Selection) -> IntArray:
-    """The step, from 1, that first sees each unit; steps + 1 if none does, -1 if no candidate does."""
+    """The choice, from 1, that first sees each unit; choices + 1 if none does, -1 if no candidate does."""
     visibility = selection.visibility
     never = len(selection.chosen) + 1
     first = np.where(visibility.visible, never, -1)
@@ -53,18 +57,42 @@ def step_of_units(selection: Selection) -> IntArray:
     return first
 
 
-def _draw_targets(
-    canvas: Canvas, lines: FloatArray, first_step: IntArray, index: rr.TimeColumn, *, steps: int
-) -> None:
-    """Pieces of the targets that change their class as stops are chosen; where they are never changes."""
-    targets = entities.SELECTION_TARGETS
-    canvas.show(targets, _pieces(canvas, lines))
-    classes = np.concatenate([_classes(first_step, step) for step in range(steps + 1)])
-    column = rr.LineStrips2D.columns(class_ids=classes)
-    canvas.columns(targets, index, column.partition(np.full(steps + 1, len(lines))))
-    # The other timelines show what the selection came to.
-    final = rr.LineStrips2D.from_fields(class_ids=_final(first_step, steps))
-    canvas.at(targets, final, mission_s=0.0, candidate=0)
+def sight_of_row(visibility: Visibility, row: int) -> FloatArray:
+    """What a candidate sees, as lines (k, 2, 2)."""
+    runs = slice(int(visibility.pointer[row]), int(visibility.pointer[row + 1]))
+    parts = (visibility.segment[runs], visibility.first[runs], visibility.last[runs])
+    return strokes.runs(visibility.targets, *parts)
+
+
+def _draw_targets(canvas: Canvas, lines: FloatArray, first_step: IntArray) -> None:
+    """All targets, as long as no stop sees them: from the first choice on, what was only marked before."""
+    colours = np.where(first_step < 0, palette.HIDDEN.number, palette.UNSEEN.number)
+    shape = _pieces(canvas, lines, class_ids=colours)
+    canvas.since(entities.SELECTION_TARGETS, shape, step=FIRST_CHOICE)
+
+
+def _draw_seen(canvas: Canvas, lines: FloatArray, first_step: IntArray, steps: IntArray) -> None:
+    """Each choice adds what it newly sees; views show the rows of all choices so far.
+
+    What is new stands once more by itself, where a row replaces the one before.
+    """
+    order = np.argsort(first_step, kind="stable")
+    counts = np.bincount(first_step[first_step > 0], minlength=len(steps) + 2)[1:-1]
+    seen = order[np.isin(first_step[order], np.arange(1, len(steps) + 1))]
+    strips = canvas.local(lines[seen])
+    column = rr.LineStrips2D.columns(strips=strips).partition(counts)
+    canvas.columns(entities.SELECTION_SEEN, _so_far(steps), column)
+    canvas.columns(entities.SELECTION_NEW, rr.TimeColumn(entities.STEP, sequence=steps), column)
+    style(canvas, entities.SELECTION_SEEN, Pen(palette.SEEN.colour, "seen", THICK))
+    style(canvas, entities.SELECTION_NEW, Pen(palette.NEW.colour, "ray", BOLD))
+
+
+def _so_far(steps: IntArray) -> list[rr.TimeColumn]:
+    """Rows that add up along the story, and are all there on the mission's time."""
+    return [
+        rr.TimeColumn(entities.STEP, sequence=steps),
+        rr.TimeColumn(entities.MISSION_TIME, duration=np.zeros(len(steps))),
+    ]
 
 
 def _pieces(canvas: Canvas, lines: FloatArray, class_ids: IntArray | None = None) -> rr.LineStrips2D:
@@ -73,51 +101,44 @@ def _pieces(canvas: Canvas, lines: FloatArray, class_ids: IntArray | None = None
     )
 
 
-def _classes(first_step: IntArray, step: int) -> IntArray:
-    """Class ids of the target pieces once `step` stops are chosen."""
-    conditions = [first_step < 0, first_step < step, first_step == step]
-    choices = [palette.HIDDEN.number, palette.SEEN.number, palette.NEW.number]
-    return np.select(conditions, choices, default=palette.UNSEEN.number)
+def _final(first_step: IntArray, count: int) -> IntArray:
+    """Class ids when all stops are chosen."""
+    conditions = [first_step < 0, first_step <= count]
+    return np.select(conditions, [palette.HIDDEN.number, palette.SEEN.number], palette.UNSEEN.number)
 
 
-def _final(first_step: IntArray, steps: int) -> IntArray:
-    """Class ids when all stops are chosen, and none of it is new any more."""
-    classes = _classes(first_step, steps)
-    return np.where(classes == palette.NEW.number, palette.SEEN.number, classes)
-
-
-def _draw_chosen(canvas: Canvas, selection: Selection, index: rr.TimeColumn) -> None:
+def _draw_chosen(canvas: Canvas, selection: Selection, steps: IntArray) -> None:
     """The stops chosen so far, numbered in the order of choice as long as numbers do not bury the plan."""
     stops = entities.SELECTION_STOPS
-    counts = np.arange(len(selection.chosen) + 1)
-    xy = canvas.local(selection.xy)
-    labels = [str(number + 1) for number in range(len(xy))]
-    numbered = len(xy) <= MOST_NAMES
-    columns = rr.Points2D.columns(
-        positions=np.concatenate([xy[:count] for count in counts]),
-        labels=[label for count in counts for label in labels[:count]] if numbered else None,
-    )
-    canvas.columns(stops, index, columns.partition(counts))
-    canvas.at(stops, rr.Points2D.from_fields(positions=xy, labels=labels), mission_s=0.0, candidate=0)
-    style = rr.Points2D.from_fields(
+    numbered = len(steps) <= MOST_NAMES
+    labels = [str(number + 1) for number in range(len(steps))]
+    if len(steps):
+        columns = rr.Points2D.columns(positions=canvas.local(selection.xy), labels=labels)
+        canvas.columns(stops, _so_far(steps), columns)
+    look = rr.Points2D.from_fields(
         colors=palette.STOP, radii=on_screen(4), show_labels=numbered, draw_order=ORDER["stop"]
     )
-    canvas.show(stops, style)
+    canvas.show(stops, look)
 
 
-def _plot_coverage(canvas: Canvas, selection: Selection, index: rr.TimeColumn) -> None:
-    steps = len(selection.chosen)
+def _plot_coverage(canvas: Canvas, selection: Selection) -> None:
+    count = len(selection.chosen)
+    index = rr.TimeColumn(entities.STEP, sequence=np.arange(count + 1) + FIRST_CHOICE - 1)
     reached = np.concatenate([[0.0], selection.coverage_steps]) * 100
     chosen, required = entities.COVERAGE_CHOSEN, entities.COVERAGE_REQUIRED
     canvas.columns(chosen, index, rr.Scalars.columns(scalars=reached))
-    canvas.columns(required, index, rr.Scalars.columns(scalars=np.full(steps + 1, selection.required * 100)))
+    canvas.columns(required, index, rr.Scalars.columns(scalars=np.full(count + 1, selection.required * 100)))
     canvas.show(chosen, rr.SeriesLines(colors=palette.STOP, names="coverage of the chosen stops", widths=2))
     canvas.show(required, rr.SeriesLines(colors=palette.ROOM_NAME, names="required", widths=1))
-    for step, share in enumerate(selection.coverage_steps, start=1):
-        line = rr.TextLog(f"stop {step} of {steps} chosen: coverage {share:.1%}", level="INFO")
-        canvas.at(entities.LOG_PLAN, line, step=step)
     canvas.say(
-        f"selection ({selection.method}): {steps} stops, coverage {selection.coverage:.1%},"
+        f"selection ({selection.method}): {count} stops, coverage {percent(selection.coverage)},"
         f" at least {selection.bound} are needed",
-        step=steps,
+        step=step_of_choice(max(count, 1)),
     )
+
+
+def _clear_space(canvas: Canvas) -> None:
+    """Hatches make way for the choices."""
+    for entity in (entities.DRIVE_AREA, entities.STOP_AREA, entities.TARGETS):
+        if entity in canvas.counts:
+            canvas.at(entity, rr.LineStrips2D.from_fields(strips=[]), step=FIRST_CHOICE)

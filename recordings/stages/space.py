@@ -12,25 +12,36 @@ from recordings import entities, palette, strokes
 from recordings.canvas import Canvas
 from recordings.pens import ORDER, THICK, THIN, Pen, draw
 from recordings.stages.floor import say_findings
+from recordings.stages.story import SPACE, tell_step
 
 
 def draw_space(canvas: Canvas, space: NavigableSpace) -> None:
     """Where the robot may drive and stop, which openings it passes, what it is to look at."""
     spacing = _hatch_spacing(space.floor)
     drive = strokes.hatch(space.drive_area, spacing=spacing, angle=np.pi / 4)
-    draw(canvas, entities.DRIVE_AREA, drive, Pen(palette.DRIVE, "area", THIN))
+    draw(canvas, entities.DRIVE_AREA, drive, Pen(palette.DRIVE, "area", THIN), step=SPACE, planning_only=True)
     stop_polygons = [polygon for room in space.rooms for polygon in room.stop_area]
     stop_area = strokes.hatch(stop_polygons, spacing=spacing, angle=-np.pi / 4)
-    draw(canvas, entities.STOP_AREA, stop_area, Pen(palette.STOP_AREA, "area", THIN))
+    inside = Pen(palette.STOP_AREA, "area", THIN)
+    draw(canvas, entities.STOP_AREA, stop_area, inside, step=SPACE, planning_only=True)
     edges = strokes.outlines(stop_polygons)
-    draw(canvas, entities.STOP_AREA_EDGE, edges, Pen(palette.STOP_AREA, "area", THIN))
-    draw(canvas, entities.GAPS, space.gaps, Pen(palette.GAP, "line", THICK))
+    draw(canvas, entities.STOP_AREA_EDGE, edges, Pen(palette.STOP_AREA, "area", THIN), step=SPACE)
+    draw(canvas, entities.GAPS, space.gaps, Pen(palette.GAP, "line", THICK), step=SPACE)
     _draw_openings(canvas, space.openings)
     targets = space.targets
     lines = np.stack([targets.a, targets.b], axis=1)
-    draw(canvas, entities.TARGETS, lines, Pen(palette.TARGET.colour, "target", THIN))
-    say_findings(canvas, [item for item in space.findings if item not in space.floor.findings])
-    canvas.say(f"navigable space: {len(space.rooms)} rooms, {targets.total} target units")
+    draw(
+        canvas,
+        entities.TARGETS,
+        lines,
+        Pen(palette.TARGET.colour, "target", THIN),
+        step=SPACE,
+        planning_only=True,
+    )
+    new = [item for item in space.findings if item not in space.floor.findings]
+    say_findings(canvas, new, step=SPACE)
+    told = f"navigable space: {len(space.rooms)} rooms, {targets.total} target units"
+    tell_step(canvas, SPACE, told, "Blue: where the robot may drive. Green: where it may stop and scan.")
 
 
 def _hatch_spacing(floor: FloorPlan) -> float:

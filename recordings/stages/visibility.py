@@ -10,6 +10,10 @@ from mission.planning import Visibility
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
 from recordings.pens import BOLD, HAIR, ORDER, Pen, style
+from recordings.stages.story import CANDIDATES
+
+MOST_FANS = 5000
+"""With more candidates than these their rays, most of a large floor's recording, are left out."""
 
 
 def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
@@ -20,10 +24,11 @@ def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
     eyes = visibility.candidates.xy[visibility.candidates.kept]
     counts = np.diff(visibility.pointer)
     seen = strokes.runs(visibility.targets, visibility.segment, visibility.first, visibility.last)
-    fans = np.stack([seen[:, 0], np.repeat(eyes, counts, axis=0), seen[:, 1]], axis=1)
-    _rows_of_lines(canvas, entities.RAYS, index, fans, counts)
+    if visibility.rows <= MOST_FANS:
+        fans = np.stack([seen[:, 0], np.repeat(eyes, counts, axis=0), seen[:, 1]], axis=1)
+        _rows_of_lines(canvas, entities.RAYS, index, fans, counts)
+        style(canvas, entities.RAYS, Pen(palette.RAY, "ray", HAIR))
     _rows_of_lines(canvas, entities.SEEN, index, seen, counts)
-    style(canvas, entities.RAYS, Pen(palette.RAY, "ray", HAIR))
     style(canvas, entities.SEEN, Pen(palette.SEEN.colour, "target", BOLD))
     eye = entities.EYE
     canvas.columns(eye, index, rr.Points2D.columns(positions=canvas.local(eyes)))
@@ -32,12 +37,13 @@ def draw_visibility(canvas: Canvas, visibility: Visibility) -> None:
     )
     _plot_sight(canvas, visibility, index)
     visible = int(visibility.visible.sum())
-    canvas.say(f"visibility ({visibility.method}): {visible} of {visibility.targets.total} units seen by any")
+    told = f"visibility ({visibility.method}): {visible} of {visibility.targets.total} units seen by any"
+    canvas.say(told, step=CANDIDATES)
 
 
 def _plot_sight(canvas: Canvas, visibility: Visibility, index: rr.TimeColumn) -> None:
     visible = max(1, int(visibility.visible.sum()))
-    seen = [len(visibility.seen_by(row)) / visible * 100 for row in range(visibility.rows)]
+    seen = visibility.units_seen * (100.0 / visible)
     sight = entities.SIGHT
     canvas.columns(sight, index, rr.Scalars.columns(scalars=seen))
     canvas.show(sight, rr.SeriesLines(colors=palette.EYE, names="seen by the candidate", widths=1))

@@ -23,7 +23,7 @@ def test_every_view_is_drawn_to_a_file_of_its_own(plan: Path, field: Path, tmp_p
     names = [path.stem.partition("-")[2] for path in pictures]
     assert names[:4] == ["Plan-and-run", "3D", "Report", "Plan-report"]
     assert names[-1] == "Log"
-    assert len(names) == len(set(names)) == 13
+    assert len(names) == len(set(names)) == 16
     colours = [
         len(np.unique(np.asarray(Image.open(path).convert("RGB")).reshape(-1, 3), axis=0))
         for path in pictures

@@ -24,7 +24,7 @@ NS = 1_000_000_000
 def test_it_carries_the_mission_id_and_the_four_stages_of_time(plan: Path) -> None:
     held = check(plan)
     assert (held.application, held.recording_id, held.complete) == ("stopgo", world.MISSION_ID, True)
-    assert held.timelines == ("candidate", "mission_time", "stage_step")
+    assert held.timelines == ("candidate", "mission_time", "stage_step", "stop")
 
 
 @pytest.mark.parametrize(
@@ -34,6 +34,13 @@ def test_it_carries_the_mission_id_and_the_four_stages_of_time(plan: Path) -> No
         *("/plan/floor/walls", "/plan/floor/columns", "/plan/floor/stairs", "/plan/floor/beams"),
         *("/plan/navigable/drive", "/plan/navigable/stop", "/plan/targets", "/plan/candidates"),
         *("/plan/visibility/rays", "/plan/visibility/seen", "/plan/selection/targets", "/plan/coverage"),
+        *(
+            "/plan/selection/sight",
+            "/plan/selection/route",
+            "/plan/why/sight",
+            "/plan/why/alone",
+            "/stop_story",
+        ),
         *("/plan/stops", "/plan/route", "/plan/robot", "/world/floor/walls", "/world/stops"),
         *("/metrics/coverage/chosen", "/log/plan", "/report"),
     ],
@@ -47,22 +54,62 @@ def test_nothing_that_changes_is_hidden_by_something_static(plan: Path) -> None:
         assert not fixed & changing, f"{entity}: static {fixed & changing} hides what changes"
 
 
+def test_the_story_is_told_on_one_timeline_each_step_where_the_log_says(plan: Path) -> None:
+    """Floor, space, candidates, two choices, route; hatches make way for the choices."""
+    space = on(plan, entities.DRIVE_AREA, "LineStrips2D:strips", entities.STEP)
+    assert [(step, bool(strips)) for step, strips in sorted(space.items())] == [(1, True), (3, False)]
+    assert list(on(plan, entities.CANDIDATES, "Points2D:positions", entities.STEP)) == [2]
+    sights = on(plan, entities.SELECTION_SIGHT, "LineStrips2D:strips", entities.STEP)
+    assert [(step, len(strips)) for step, strips in sorted(sights.items())] == [(3, 1), (4, 1), (5, 0)]
+    assert list(on(plan, entities.SELECTION_ROUTE, "LineStrips2D:strips", entities.STEP)) == [5]
+    lines = cells(plan, entities.LOG_PLAN, "TextLog:text")
+    said = {times[entities.STEP]: text for times, (text,) in lines if text.startswith("step")}
+    assert said[0].startswith("step 0: floor small room")
+    assert said[3] == "step 3: choice 1 of 2 is S1"
+    assert [said[k].split()[2] for k in (1, 2, 5)] == ["navigable", "candidates", "route"]
+    told = on(plan, entities.STORY, "TextDocument:text", entities.STEP)
+    assert sorted(told) == [0, 1, 2, 3, 4, 5]
+
+
 def test_the_final_state_is_there_on_mission_time(plan: Path) -> None:
-    for entity in ("/plan/selection/targets", "/plan/selection/stops"):
-        component = "Points2D:positions" if entity.endswith("stops") else "LineStrips2D:class_ids"
-        steps = on(plan, entity, component, entities.STEP)
-        (final,) = on(plan, entity, component, entities.MISSION_TIME).values()
-        assert len(final) == len(steps[2])
-    assert (
-        palette.NEW.number
-        not in on(plan, "/plan/selection/targets", "LineStrips2D:class_ids", entities.MISSION_TIME)[0]
-    )
+    for entity, component in (
+        (entities.SELECTION_SEEN, "LineStrips2D:strips"),
+        (entities.SELECTION_STOPS, "Points2D:positions"),
+    ):
+        found = cells(plan, entity, component)
+        assert [times[entities.MISSION_TIME] for times, _ in found] == [0, 0]
+        assert [times[entities.STEP] for times, _ in found] == [3, 4]
+    assert not on(plan, entities.SELECTION_NEW, "LineStrips2D:strips", entities.MISSION_TIME)
+
+
+def test_nothing_stands_at_the_origin(tmp_path: Path) -> None:
+    """Whatever has a place has one on the floor, far from (0, 0); the robot is there when it has a pose."""
+    path = write_plan(tmp_path / "plan.rrd", 300.0, 200.0)
+    placed = ("Points2D:positions", "LineStrips2D:strips", "Arrows2D:origins")
+    for entity in check(path).rows:
+        for times, value in (cell for component in placed for cell in cells(path, entity, component)):
+            if entity == entities.shape(entities.PLANNED_ROBOT):
+                assert list(times) == [entities.MISSION_TIME]
+            elif value:
+                assert np.concatenate([np.ravel(item) for item in value]).min() > 199, entity
+
+
+def test_a_stop_says_why_it_is_there(plan: Path) -> None:
+    """S2 sees column 1's left and right face; the left is S1's, too. Three units of 0.1 m are its own."""
+    told = on(plan, entities.STOP_STORY, "TextDocument:text", entities.STOP_NUMBER)
+    assert sorted(told) == [1, 2]
+    assert "alone sees 3 units, 0.3 m" in told[2][0].replace("\\", "")
+    alone = on(plan, entities.WHY_ALONE, "LineStrips2D:strips", entities.STOP_NUMBER)
+    length = [sum(float(np.hypot(*(np.array(b) - a))) for a, b in alone[k]) for k in (1, 2)]
+    assert np.allclose(length, [0.4, 0.3], atol=1e-6)
+    during = on(plan, entities.WHY_STOP, "Points2D:labels", entities.MISSION_TIME)
+    assert [label for _, (label,) in sorted(during.items())] == ["S1", "S2"]
 
 
 def test_each_candidate_says_why_it_was_dropped(plan: Path) -> None:
-    classes = static(plan, entities.CANDIDATES, "Points2D:class_ids")
+    ((_, classes),) = cells(plan, entities.CANDIDATES, "Points2D:class_ids")
     assert classes == [palette.reason(number).number for number in (0, 3, 0, 0, 1)]
-    reasons = static(plan, entities.CANDIDATES, "reason")
+    ((_, reasons),) = cells(plan, entities.CANDIDATES, "reason")
     assert reasons == [DROP_REASONS[number] for number in (0, 3, 0, 0, 1)]
 
 
@@ -84,23 +131,23 @@ def test_each_candidate_has_a_row_with_what_it_sees(plan: Path) -> None:
     assert np.allclose(rays[2][0], [(4.0, 2.0), (5.0, 1.0), (4.3, 2.0)], atol=1e-6)
 
 
-def test_units_change_their_class_as_they_get_seen(plan: Path) -> None:
-    lines = static(plan, "/plan/selection/targets", "LineStrips2D:strips")
-    lengths = np.array([np.hypot(*(np.array(b) - a)) for a, b in lines]) / 0.1
-    steps = on(plan, "/plan/selection/targets", "LineStrips2D:class_ids", entities.STEP)
+def test_each_choice_adds_what_it_newly_sees(plan: Path) -> None:
+    def units(strips: list) -> int:
+        return round(sum(float(np.hypot(*(np.array(b) - a))) for a, b in strips) / 0.1)
 
-    def units(step: int, meaning: palette.Meaning) -> int:
-        return round(float(lengths[np.array(steps[step]) == meaning.number].sum()))
-
-    told = (palette.UNSEEN, palette.NEW, palette.SEEN, palette.HIDDEN)
-    assert [units(0, item) for item in told] == [14, 0, 0, 18]
-    assert [units(1, item) for item in told] == [6, 8, 0, 18]
-    assert [units(2, item) for item in told] == [3, 3, 8, 18]
+    ((_, all_of_them),) = cells(plan, entities.SELECTION_TARGETS, "LineStrips2D:strips")
+    ((_, classes),) = cells(plan, entities.SELECTION_TARGETS, "LineStrips2D:class_ids")
+    hidden = [strip for strip, number in zip(all_of_them, classes, strict=True)
+              if number == palette.HIDDEN.number]  # fmt: skip
+    assert (units(all_of_them), units(hidden)) == (32, 18)
+    for entity in (entities.SELECTION_SEEN, entities.SELECTION_NEW):
+        added = on(plan, entity, "LineStrips2D:strips", entities.STEP)
+        assert [units(added[step]) for step in (3, 4)] == [8, 3]
 
 
 def test_coverage_rises_with_each_stop(plan: Path) -> None:
     coverage = on(plan, "/metrics/coverage/chosen", "Scalars:scalars", entities.STEP)
-    assert [round(coverage[step][0], 2) for step in range(3)] == [0.0, 57.14, 78.57]
+    assert [round(coverage[step][0], 2) for step in (2, 3, 4)] == [0.0, 57.14, 78.57]
     planned = on(plan, "/metrics/coverage/planned", "Scalars:scalars", entities.MISSION_TIME)
     assert [round(value[0], 2) for _, value in sorted(planned.items())] == [0.0, 57.14, 78.57]
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
-from rerun.experimental import ViewerClient
+from rerun.experimental import View, ViewerClient
 
 from bridge.station.watch import hand_over
 from mission.document import Mission
@@ -18,47 +20,59 @@ from recordings import palette
 from recordings.carried.reading import read_recording
 from recordings.field import FieldRecording
 from recordings.viewer import Viewed
-from tests.recordings import run
+from tests.recordings import run, world
+from tests.recordings.conftest import write_field, write_plan
+from tests.recordings.pictures import LIMIT, WRONG, difference, fields, kept
 from tests.recordings.viewer import PATIENCE_S, has_vulkan, look, viewer
 
 pytestmark = pytest.mark.skipif(
     not has_vulkan(), reason="no Vulkan driver: install mesa-vulkan-drivers to look at recordings"
 )
 
-VIEWS = {
+WINDOW = "1200x750"
+END = ("mission_time", {"duration": 100.0})
+
+VIEWS: dict[str, dict[str, tuple[tuple[str, dict[str, Any]], dict[str, palette.Colour | None]]]] = {
     "plan": {
-        "Mission": {"Plan and run": palette.ROUTE, "3D": palette.ROUTE, "Report": None},
-        "Planning": {
+        "Mission": (END, {"Plan and run": palette.ROUTE, "3D": palette.ROUTE, "Report": None}),
+        "Planning": (("stage_step", {"sequence": 4}), {
+            "Step by step (timeline: stage_step)": palette.NEW.colour,
+            "This step (timeline: stage_step)": None,
+            "Coverage, % (timeline: stage_step)": palette.STOP,
+        }),
+        "Stops": (("stop", {"sequence": 2}), {
+            "Why this stop (timeline: stop)": palette.LOST,
+            "In words (timeline: stop)": None,
+        }),
+        "Candidates": (("candidate", {"sequence": 1}), {
             "Navigable space and candidates": palette.STOP_AREA,
-            "What a candidate sees (timeline: candidate)": palette.KIND_COLOURS["columns"],
-            "Selection (timeline: stage_step)": palette.SEEN.colour,
-            "Coverage, %": palette.ROUTE,
-        },
-        "Run": {
+            "What a candidate sees (timeline: candidate)": palette.SEEN.colour,
+        }),
+        "Run": (END, {
             "States": None,
             "Distance from the route, mm (left positive)": palette.FAILED.colour,
             "Deviation at each stop, mm": palette.FAILED.colour,
             "Battery, %": palette.FAILED.colour,
-        },
-        "Log": {"Log": None},
+        }),
+        "Log": (END, {"Log": None}),
     },
     "field": {
-        "Mission": {"Plan and run": palette.DRIVEN, "3D": palette.DRIVEN, "Report": None},
-        "Run": {
+        "Mission": (END, {"Plan and run": palette.DRIVEN, "3D": palette.DRIVEN, "Report": None}),
+        "Run": (END, {
             "States": None,
             "Distance from the route, mm (left positive)": palette.DRIVEN,
             "Deviation at each stop, mm": palette.FAILED.colour,
             "Battery, %": palette.DRIVEN,
-        },
-        "Log": {"Log": None},
+        }),
+        "Log": (END, {"Log": None}),
     },
-}
-"""Views by tab, and a colour that each must show."""
+}  # fmt: skip
+"""Views by tab, when they are looked at, and a colour that each must show."""
 
 
 @pytest.fixture(scope="module")
 def plan_viewer(plan: Path) -> Iterator[ViewerClient]:
-    with viewer([plan]) as client:
+    with viewer([plan], size=WINDOW) as client:
         yield client
 
 
@@ -67,14 +81,44 @@ def test_every_view_of_a_plan_shows_its_subject(plan_viewer: ViewerClient, tmp_p
 
 
 def test_every_view_of_a_run_shows_its_subject(field: Path, tmp_path: Path) -> None:
-    with viewer([field]) as client:
+    with viewer([field], size=WINDOW) as client:
         assert_every_view_shown(client, "field", tmp_path)
 
 
+def test_no_view_of_a_plan_opens_empty(plan_viewer: ViewerClient, tmp_path: Path) -> None:
+    """It opens at the mission's time, whichever timeline a view is best looked at on."""
+    plan_viewer.set_time("mission_time", play_state="following")
+    for tab, (_, colours) in VIEWS["plan"].items():
+        assert_shown(plan_viewer, tab, dict.fromkeys(colours), tmp_path)
+
+
 def assert_every_view_shown(client: ViewerClient, which: str, into: Path) -> None:
-    client.set_time("mission_time", duration=100.0, play_state="paused")
-    for tab, colours in VIEWS[which].items():
-        assert_shown(client, tab, colours, into)
+    """Each looks as it did when somebody looked at it; emptied, turned over or recoloured it would not."""
+    for tab, ((timeline, time_), colours) in VIEWS[which].items():
+        client.set_time(timeline, play_state="paused", **time_)
+        views = assert_shown(client, tab, colours, into, which)
+        for name, colour in colours.items():
+            found, expected = fields(views[name][1]), fields(kept(picture_name(which, name)))
+            for wrong, spoilt in WRONG.items():
+                if colour is not None or wrong == "empty":
+                    assert difference(spoilt(found), expected) > LIMIT, f"{name}: {wrong}"
+
+
+def drawn_views(into: Path) -> Iterator[tuple[str, Path]]:
+    """Every view and its picture, once it has settled."""
+    mission: Mission = world.nouns_at()[-1]
+    files = {"plan": write_plan(into / "plan.rrd"), "field": write_field(into / "field.rrd", mission)}
+    for which, path in files.items():
+        with viewer([path], size=WINDOW) as client:
+            time.sleep(10.0)  # what the viewer first tells of itself is gone
+            for tab, ((timeline, time_), colours) in VIEWS[which].items():
+                client.set_time(timeline, play_state="paused", **time_)
+                views = assert_shown(client, tab, colours, into)
+                yield from ((picture_name(which, name), views[name][1]) for name in colours)
+
+
+def picture_name(which: str, view: str) -> str:
+    return "-".join([which, *re.findall(r"\w+", view.partition(" (")[0])])
 
 
 def test_what_was_lost_is_shown_whatever_is_opened_first(
@@ -100,17 +144,6 @@ def test_plan_and_run_overlay(plan: Path, field: Path, tmp_path: Path) -> None:
             assert_shown(client, "Mission", {"Plan and run": colour}, tmp_path)
 
 
-@pytest.mark.parametrize(("timeline", "view", "colour"), [
-    ("candidate", "What a candidate sees (timeline: candidate)", palette.SEEN.colour),
-    ("stage_step", "Selection (timeline: stage_step)", palette.NEW.colour),
-])  # fmt: skip
-def test_planning_is_played_on_its_own_timelines(
-    timeline: str, view: str, colour: palette.Colour, plan_viewer: ViewerClient, tmp_path: Path
-) -> None:
-    plan_viewer.set_time(timeline, sequence=1, play_state="paused")
-    assert_shown(plan_viewer, "Planning", {view: colour}, tmp_path)
-
-
 def test_a_viewer_follows_a_run_that_is_being_recorded(
     tmp_path: Path, mission: Mission, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -130,17 +163,26 @@ def test_a_viewer_follows_a_run_that_is_being_recorded(
 
 
 def assert_shown(
-    client: ViewerClient, tab: str, colours: dict[str, palette.Colour | None], into: Path
-) -> None:
-    """No view of the tab reports anything, and before long each named one shows its colour."""
+    client: ViewerClient, tab: str, colours: Mapping[str, palette.Colour | None], into: Path, which: str = ""
+) -> dict[str, tuple[View, Path]]:
+    """No view of the tab reports anything, and before long each named one shows its colour.
+
+    With `which`, each also looks like the picture that is kept of it.
+    """
     deadline = time.monotonic() + PATIENCE_S
     while True:
         views = look(client, tab, into)
         assert not {name: view.reports for name, (view, _) in views.items() if view.reports}
         missing = {name for name, colour in colours.items() if not shows(views[name][1], colour)}
+        if which:
+            missing |= {name for name in colours if _difference(views[name][1], which, name) > LIMIT}
         if not missing:
-            return
+            return views
         assert time.monotonic() < deadline, f"{tab}: {missing} not shown"
+
+
+def _difference(picture: Path, which: str, view: str) -> float:
+    return difference(fields(picture), fields(kept(picture_name(which, view))))
 
 
 def shows(picture: Path, colour: palette.Colour | None) -> bool:

@@ -1,0 +1,51 @@
+"""A plan's numbers are the same on the terminal, in JSON, in its recording and on its page."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from mission.plan import PartPlan
+from planner.appraisal.figures_of_route import figures_of
+from planner.report import PlanReport
+from recordings.carried.reading import read_recording
+from recordings.page import report_html
+from recordings.page.from_recordings import subject_of
+from recordings.plan import PlanRecording
+from recordings.read import check
+from recordings.review import reviewed
+from tests.mission.comparing.test_compare import planned
+from tests.recordings import world
+from tests.recordings.reading import cells, static
+
+
+def test_candidates_stops_and_coverage_agree_wherever_they_are_told(tmp_path: Path) -> None:
+    nouns = world.nouns_at()
+    route, mission = nouns[5], nouns[-1]
+    figures = figures_of(route)
+    told = PlanReport(PartPlan(route, figures, mission), {}, {})
+    numbers = told.as_json()
+    path = tmp_path / "plan.rrd"
+    recording = PlanRecording(world.MISSION_ID)
+    for noun in (*nouns, figures, planned()[1]):
+        recording.observe(noun)
+    recording.write(path)
+    in_file = check(path).properties["plan"]
+    for where, name, in_property in (
+        ("candidates", "generated", "candidates"),
+        ("candidates", "reachable", "reachable_candidates"),
+        ("visibility", "visible", "visible_units"),
+        ("selection", "stops", "stops"),
+        ("selection", "bound", "stops_bound"),
+    ):
+        assert in_file[in_property] == numbers[where][name], name
+    assert in_file["coverage"] == round(numbers["selection"]["coverage"], 4)
+    text = told.as_text()
+    assert "14 visible from 3 candidates" in text and "stops       2 " in text and "78.5 %" in text
+    (report,) = static(path, "/report", "TextDocument:text")
+    assert re.search(r"\| reachable candidates \| 3 \|", report) and "| stops | 2 |" in report
+    page = report_html(subject_of(reviewed([read_recording(path)]))).decode()
+    assert "78.5 %" in page and ">2</b>" in page
+    log = [line for _, (line,) in cells(path, "/log/plan", "TextLog:text")]
+    assert "selection (greedy): 2 stops, coverage 78.5 %, at least 2 are needed" in log
+    assert any("5 positions" in line or "3 reachable" in line for line in log)
