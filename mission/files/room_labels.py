@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise, product
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from mission.files.sheet import PaperSheet
 from mission.files.svg import group, shortened, text, text_width
 from mission.floor import Room
-from mission.geometry import BoolArray, FloatArray
+from mission.geometry import BoolArray, FloatArray, IntArray
 
 NAME, AREA = 2.6, 2.5
 """Text sizes in millimetres."""
@@ -46,8 +47,21 @@ class Busy:
         return Busy(np.concatenate([self.xy, points]), np.concatenate([self.weight, weights]))
 
     def near(self, low: FloatArray, high: FloatArray) -> Busy:
-        there = ((self.xy > low) & (self.xy < high)).all(axis=1)
+        """Those between two corners, in their order."""
+        begin = np.searchsorted(self._sorted_x, low[0], side="right")
+        end = np.searchsorted(self._sorted_x, high[0], side="left")
+        between = self._by_x[begin:end]
+        y = self.xy[between, 1]
+        there = np.sort(between[(y > low[1]) & (y < high[1])])
         return Busy(self.xy[there], self.weight[there])
+
+    @cached_property
+    def _by_x(self) -> IntArray:
+        return np.argsort(self.xy[:, 0], kind="stable")
+
+    @cached_property
+    def _sorted_x(self) -> FloatArray:
+        return np.asarray(self.xy[self._by_x, 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,17 +84,18 @@ class Label:
 def room_labels(rooms: tuple[Room, ...], sheet: PaperSheet, *, avoid: Busy) -> str:
     """Name and area of each room, off `avoid` and each other where the room is large enough."""
     labels: list[Label] = []
+    written = np.empty((0, 2))
     # The smallest rooms first: they have the least choice.
     for room in sorted((room for room in rooms if room.polygons), key=lambda room: room.area):
-        labels.append(_label(room, sheet, avoid))
-        avoid = avoid.and_also(LABEL, labels[-1].points)
+        labels.append(_label(room, sheet, avoid, written))
+        written = np.concatenate([written, labels[-1].points])
     style: dict[str, object] = {"paint_order": "stroke", "stroke": "#ffffff", "stroke_width": 0.5}
     drawn = ("".join(_lines(label)) for label in labels)
     return group("names", drawn, text_anchor="middle", fill="#222222", stroke_linejoin="round", **style)
 
 
-def _label(room: Room, sheet: PaperSheet, avoid: Busy) -> Label:
-    """On one line or two, whichever covers less."""
+def _label(room: Room, sheet: PaperSheet, avoid: Busy, written: FloatArray) -> Label:
+    """On one line or two, whichever covers less; other labels are at the points `written` (n, 2)."""
     rings = [sheet.on_paper(ring) for part in room.polygons for ring in part.rings]
     widest = max(float(np.ptp(np.concatenate(rings)[:, 0])) - 1.0, LEAST)
     layouts = (wrapped(room.label, width=widest), wrapped(room.label, width=0.0, cut=widest))
@@ -89,7 +104,7 @@ def _label(room: Room, sheet: PaperSheet, avoid: Busy) -> Label:
         lines = [(name, NAME) for name in names] + [(f"{room.area:.1f} m²", AREA)]
         size = (max(text_width(*item) for item in lines), sum(size + 0.4 for _, size in lines))
         half = np.array(size) / 2
-        cost, centre = _best_place(rings, half, avoid)
+        cost, centre = _best_place(rings, half, avoid, written)
         labels.append(Label(lines, centre, half, cost))
     return min(labels, key=lambda label: label.cost)
 
@@ -111,20 +126,21 @@ def _lines(label: Label) -> Iterator[str]:
         yield text(x, top - 0.2 * size, content, size=size)
 
 
-def _best_place(rings: list[FloatArray], half: FloatArray, avoid: Busy) -> tuple[float, FloatArray]:
-    """Cost and centre of the label: inside the room with its corners, off `avoid`, near the middle."""
+def _best_place(
+    rings: list[FloatArray], half: FloatArray, avoid: Busy, written: FloatArray
+) -> tuple[float, FloatArray]:
+    """Cost and centre of the label: inside the room with its corners, off all else, near the middle."""
     corners = np.concatenate(rings)
     low, high = corners.min(axis=0), corners.max(axis=0)
     x, y = np.linspace(low, high, _TRIES).T
     tried = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    outside = sum((~inside(tried + half * side, rings)).astype(np.float64) for side in _SAMPLES)
-    cost = _covered(x, y, half + AROUND, avoid.near(low - half, high + half)) + OUTSIDE * outside
+    (wx, wy), (left, bottom), (right, top) = written.T, low - half, high + half
+    close = written[(wx > left) & (wx < right) & (wy > bottom) & (wy < top)]
+    busy = avoid.near(low - half, high + half).and_also(LABEL, close)
+    cost = _covered(x, y, half + AROUND, busy) + OUTSIDE * _outside(x, y, half, rings)
     far = np.hypot(*((tried - (low + high) / 2) / (high - low + 1e-9)).T)
     order = np.lexsort((np.arange(len(tried)), np.round(far, 6), cost))
     return float(cost[order[0]]), np.asarray(tried[order[0]])
-
-
-_SAMPLES = tuple(product((-1, 0, 1), repeat=2))
 
 
 def _covered(x: FloatArray, y: FloatArray, half: FloatArray, avoid: Busy) -> FloatArray:
@@ -135,16 +151,25 @@ def _covered(x: FloatArray, y: FloatArray, half: FloatArray, avoid: Busy) -> Flo
     return np.asarray(np.einsum("yn,xn->yx", near_y * avoid.weight, near_x.astype(np.float64)).ravel())
 
 
-def inside(points: FloatArray, rings: list[FloatArray]) -> BoolArray:
-    """Whether each point (n, 2) is inside the rings, by the even-odd rule."""
-    result = np.zeros(len(points), dtype=bool)
-    x, y = points[:, 0, None], points[:, 1, None]
+def _outside(x: FloatArray, y: FloatArray, half: FloatArray, rings: list[FloatArray]) -> FloatArray:
+    """How many of a label's nine points lie outside the rings, at each place of the grid, row by row."""
+    sides = np.array([-1.0, 0.0, 1.0])[:, None]
+    within = inside((x + half[0] * sides).ravel(), (y + half[1] * sides).ravel(), rings)
+    counts = (~within).reshape(3, len(y), 3, len(x)).sum(axis=(0, 2))
+    return np.asarray(counts.ravel(), dtype=np.float64)
+
+
+def inside(x: FloatArray, y: FloatArray, rings: list[FloatArray]) -> BoolArray:
+    """Whether each point of the grid x by y is inside the rings, by the even-odd rule (rows of y)."""
+    result = np.zeros((len(y), len(x)), dtype=bool)
     for ring in rings:
         after = np.roll(ring, -1, axis=0)
-        spans = (ring[:, 1] > y) != (after[:, 1] > y)
+        level = y[:, None]
+        spans = (ring[:, 1] > level) != (after[:, 1] > level)
         with np.errstate(divide="ignore", invalid="ignore"):
-            at = ring[:, 0] + (y - ring[:, 1]) * (after[:, 0] - ring[:, 0]) / (after[:, 1] - ring[:, 1])
-        result ^= (spans & (x < at)).sum(axis=1) % 2 == 1
+            at = ring[:, 0] + (level - ring[:, 1]) * (after[:, 0] - ring[:, 0]) / (after[:, 1] - ring[:, 1])
+        at = np.where(spans, at, -np.inf)
+        result ^= (x[None, :, None] < at[:, None]).sum(axis=2) % 2 == 1
     return result
 
 

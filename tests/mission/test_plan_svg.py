@@ -203,8 +203,8 @@ def test_a_floor_in_the_wrong_unit_by_far_is_refused() -> None:
 def test_inside_is_the_even_odd_rule() -> None:
     outer = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], dtype=float)
     hole = np.array([[1, 1], [1, 3], [3, 3], [3, 1]], dtype=float)
-    points = np.array([[0.5, 0.5], [2.0, 2.0], [5.0, 2.0]])
-    assert inside(points, [outer, hole]).tolist() == [True, False, False]
+    found = inside(np.array([0.5, 2.0, 5.0]), np.array([0.5, 2.0]), [outer, hole])
+    assert found.tolist() == [[True, True, False], [True, False, False]]
 
 
 def test_a_long_room_name_is_broken_where_its_halves_are_alike() -> None:
