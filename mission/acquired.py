@@ -20,7 +20,7 @@ class Acquired:
     sight: Sight
     """The plan, by the revision that the run followed last of those that are known."""
     seen: BoolArray
-    """Whether a scanned stop saw each unit (n,)."""
+    """Whether enough scanned stops saw each unit (n,)."""
     perhaps: BoolArray
     """The same, if every stop was scanned of which nobody says so, though the robot was through with it."""
     lost: dict[str, float]

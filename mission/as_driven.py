@@ -17,9 +17,9 @@ class AsDriven:
     ledger: Ledger
     """The units of the floor, n of them."""
     planned: BoolArray
-    """Whether the mission's stops see each unit (n,)."""
+    """Whether enough of the mission's stops see each unit (n,)."""
     driven: BoolArray
-    """Whether one of the places where the robot stood sees it (n,)."""
+    """Whether enough of the places where the robot stood see it (n,)."""
 
     @cached_property
     def shares(self) -> Shares:

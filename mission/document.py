@@ -9,9 +9,10 @@ import hashlib
 from typing import Any, Final, Literal
 
 import msgspec
+from msgspec import UNSET, UnsetType
 
 from mission.floor_source import FloorSource
-from mission.settings import FLOOR_PARAMETERS, Settings
+from mission.settings import FLOOR_PARAMETERS, Settings, told_of
 
 SCHEMA: Final = "stopgo/mission"
 VERSION: Final = 1
@@ -58,6 +59,29 @@ class ScannerSpec(Document, frozen=True):
     profile: str
     range: float
     fov_deg: float = 360.0
+    model: str | UnsetType = UNSET
+    """Its name among those that stopgo knows; what follows is left out where nobody tells."""
+    step_deg: float | UnsetType = UNSET
+    """Between neighbouring points."""
+    near: float | UnsetType = UNSET
+    """What is nearer is not measured."""
+    blind_cone_deg: float | UnsetType = UNSET
+    """The cone under the scanner that it does not see, from side to side."""
+    height: float | UnsetType = UNSET
+    """Above the floor."""
+
+
+class LimitsSpec(Document, frozen=True):
+    """When a target counts as seen; what is left out is no limit."""
+
+    max_incidence_deg: float | UnsetType = UNSET
+    """From square on."""
+    near: float | UnsetType = UNSET
+    """Distance from the scanner, of a wall down to its foot."""
+    density_mm: float | UnsetType = UNSET
+    """Between neighbouring points, at the scanner's height."""
+    views: int | UnsetType = UNSET
+    """Stops that must see it."""
 
 
 class Start(Document, frozen=True):
@@ -77,7 +101,7 @@ class Sees(Document, frozen=True):
     units: int
     """Target units this stop sees."""
     new_units: int
-    """Of those, the ones that no stop before it on the route sees."""
+    """Of those, the ones that count as seen from this stop of the route on."""
 
 
 class Stop(Document, frozen=True):
@@ -125,6 +149,8 @@ class Mission(Document, frozen=True, kw_only=True):
     georeference: SiteOrigin | None
     robot: RobotSpec
     scanner: ScannerSpec
+    limits: LimitsSpec | UnsetType = UNSET
+    """Absent where there are none."""
     start: Start
     stops: tuple[Stop, ...]
     return_: tuple[Point, ...] | None = msgspec.field(name="return")
@@ -154,7 +180,6 @@ def mission_id(source: FloorSource, settings: Settings, version: str, part: int 
 
     What the settings tell the floor's reader is in the source.
     """
-    told = msgspec.to_builtins(settings)
-    parameters = {key: value for key, value in told.items() if key not in FLOOR_PARAMETERS}
+    parameters = {key: value for key, value in told_of(settings).items() if key not in FLOOR_PARAMETERS}
     basis = [source.basis, parameters, version, part]
     return hashlib.sha256(canonical({"basis": basis})).hexdigest()[:32]

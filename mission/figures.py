@@ -63,6 +63,32 @@ class Shares:
 
 
 @dataclass(frozen=True)
+class LimitCost:
+    """What one limit on how targets are seen costs, by plans made quickly with it and without it."""
+
+    limit: str
+    """The parameter that sets it."""
+    words: str
+    stops: int
+    """With all limits."""
+    without: int
+    """Without this one."""
+    bound: int
+    """Without this one there are never fewer."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How well targets are to be seen, and what that comes to."""
+
+    costs: tuple[LimitCost, ...]
+    in_sight: float
+    """Of the targets, in the plan's unit, what some candidate has in sight at all."""
+    possible: float
+    """Of that, what enough candidates see well enough."""
+
+
+@dataclass(frozen=True)
 class Figures:
     """A plan in numbers."""
 
@@ -80,6 +106,8 @@ class Figures:
     unreached: tuple[Unreached, ...]
     findings: tuple[Finding, ...]
     """Everything odd, what bears on the plan most first."""
+    quality: Quality | None = None
+    """None where any view counts, from any stop."""
 
     @property
     def unit(self) -> str:

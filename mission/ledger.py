@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -56,6 +56,12 @@ class Ledger:
     """Least share of the whole."""
     kind_required: float | None
     """Least share of each kind."""
+    asked: IntArray = field(default_factory=lambda: frozen([1], np.int64))
+    """From how many stops each unit must be seen until it counts (n,), or every unit (1,)."""
+
+    def enough(self, views: IntArray) -> BoolArray:
+        """Whether each unit counts as seen (n,), where so many stops see it."""
+        return frozen(views >= self.asked, np.bool_)
 
     def shares(self, seen: BoolArray) -> Shares:
         """What a mask of units (n,) comes to; rooms and kinds with targets, the one least seen first."""
@@ -133,4 +139,5 @@ def ledger_of(visibility: Visibility, why: Mapping[str, str] | None = None) -> L
         elements=tuple(Seen(item.id, item.kind) for item in space.floor.elements),
         required=settings.coverage,
         kind_required=settings.least_of_kind,
+        asked=visibility.asked,
     )

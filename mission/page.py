@@ -9,6 +9,7 @@ import msgspec
 
 from mission.document import Mission, Stop
 from mission.geometry import frozen, polyline_length
+from mission.limits import limits_in_words
 from mission.planning import Schedule
 from mission.table import duration, printable, table
 
@@ -54,6 +55,7 @@ def _head(mission: Mission) -> str:
         "robot": f"radius {robot.radius:g} m, {robot.speed:g} m/s, {robot.acceleration:g} m/s², "
         f"turns {math.degrees(robot.turn_rate):g} °/s",
         "scanner": f"profile {scanner.profile}, range {scanner.range:g} m, {scanner.fov_deg:g}°",
+        **({"seen": told} if (told := ", ".join(limits_in_words(mission.limits).values())) else {}),
         "start": f"({start.x:.3f}, {start.y:.3f}) facing {math.degrees(start.heading):.1f}° ({start.reason})",
         "made by": f"stopgo {mission.origin.stopgo}",
     }

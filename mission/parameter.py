@@ -51,6 +51,8 @@ class Parameter:
     """What such words may be."""
     option: str = ""
     """The option's name, where it is another. Such an option, as every list of lists, may be repeated."""
+    quiet: bool = False
+    """Where it is undecided, missions do not tell of it, so that they stay what they were before it came."""
     name: str = ""
     type: Any = None
     default: Any = None

@@ -223,6 +223,8 @@ class Visibility:
     first: IntArray
     last: IntArray
     method: str
+    in_sight: Visibility | None = None
+    """What lies in sight, seen well enough or not; None where that is the same."""
 
     @property
     def targets(self) -> Targets:
@@ -277,10 +279,38 @@ class Visibility:
     @cached_property
     def visible(self) -> BoolArray:
         """Whether any candidate, those added beside chosen ones aside, sees each unit (n,)."""
-        return self.seen_from(np.setdiff1d(np.arange(self.rows), self.candidates.extra_rows))
+        return self._seen_by_any(self._pattern)
+
+    @cached_property
+    def asked(self) -> IntArray:
+        """From how many stops each unit must be seen until it counts (n,).
+
+        As many as the settings ask for; where fewer candidates see it, from that many, so that no floor is
+        given up because more is asked for.
+        """
+        most = self.candidates.space.settings.least_views
+        views = np.ones(self.targets.total) if most == 1 else self.views_from(self._pattern)
+        return frozen(np.clip(views, 1, most), np.int64)
 
     def seen_from(self, rows: IntArray) -> BoolArray:
-        """Whether any of the candidates in `rows` sees each unit (n,)."""
+        """Whether as many of the candidates in `rows` see each unit as it asks for (n,)."""
+        if self.candidates.space.settings.least_views == 1:
+            return self._seen_by_any(rows)
+        return frozen(self.views_from(rows) >= self.asked, np.bool_)
+
+    def views_from(self, rows: IntArray) -> IntArray:
+        """How many of the candidates in `rows` see each unit (n,)."""
+        views = np.zeros(self.targets.total, dtype=np.int64)
+        for row in rows:
+            views[self.seen_by(int(row))] += 1
+        return frozen(views, np.int64)
+
+    @property
+    def _pattern(self) -> IntArray:
+        """The rows that were not added beside chosen ones."""
+        return np.setdiff1d(np.arange(self.rows), self.candidates.extra_rows)
+
+    def _seen_by_any(self, rows: IntArray) -> BoolArray:
         change = np.zeros(self.targets.total + 1, dtype=np.int64)
         for row in rows:
             start, stop = int(self.pointer[row]), int(self.pointer[row + 1])

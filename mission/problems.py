@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from msgspec import UNSET
+
 from mission.document import Mission, Point, Start, Stop
 from mission.geodesy import out_of_reach
 
@@ -67,6 +69,17 @@ def _machine(mission: Mission) -> Iterator[Problem]:
     yield from _positive("$.scanner.range", scanner.range)
     if not 0 < scanner.fov_deg <= 360:
         yield Problem("$.scanner.fov_deg", f"is {scanner.fov_deg}; it must be above 0 and at most 360")
+    known = {f"$.scanner.{key}": getattr(scanner, key) for key in ("step_deg", "height")}
+    limits = ("max_incidence_deg", "density_mm", "views")
+    known |= {f"$.limits.{key}": getattr(mission.limits, key, UNSET) for key in limits}
+    for path, value in known.items():
+        if value is not UNSET:
+            yield from _positive(path, value)
+    near = getattr(mission.limits, "near", UNSET)
+    blind = {"$.scanner.near": scanner.near, "$.scanner.blind_cone_deg": scanner.blind_cone_deg}
+    for path, value in {**blind, "$.limits.near": near}.items():
+        if value is not UNSET:
+            yield from _not_negative(path, value)
 
 
 def _start(start: Start) -> Iterator[Problem]:

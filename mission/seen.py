@@ -20,7 +20,7 @@ class SeenStretches:
 
 
 def seen_units(selection: Selection) -> BoolArray:
-    """Whether the chosen stops see each unit (n,)."""
+    """Whether enough of the chosen stops see each unit (n,)."""
     return selection.visibility.seen_from(selection.chosen)
 
 

@@ -19,6 +19,7 @@ from mission.errors import InputError
 from mission.kinds import KINDS
 from mission.layer_kinds import check_entries, entries_in, kinds_by_name
 from mission.parameter import Parameter, words
+from mission.scanners import SCANNERS, ScannerName
 from mission.toml_file import read_toml
 
 LEAST_SHARE = 0.7
@@ -27,6 +28,7 @@ _floor, _plan, _robot, _scanner, _policy = (
     partial(Parameter, table) for table in ("floor", "plan", "robot", "scanner", "policy")
 )
 _share = partial(_plan, least=0, most=1, why="0.7 is 70 %", undecided=f"{LEAST_SHARE:g}; none by units")
+_limit = partial(_plan, quiet=True)
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
@@ -103,6 +105,15 @@ class Settings:
     ] = 0.9
     room_coverage: Annotated[float | None, _share("Least share of what each room shows")] = None
     kind_coverage: Annotated[float | None, _share("Least share of each kind of element")] = None
+    views: Annotated[
+        int | None, _plan("Stops that must see a target", least=1, most=20, undecided="1", quiet=True)
+    ] = None
+    max_incidence: Annotated[
+        float | None, _limit("Flattest ray that counts, from square on", "degrees", above=0, below=90)
+    ] = None
+    density: Annotated[
+        float | None, _limit("Widest spacing of points on a target, by angular_step", "mm", above=0)
+    ] = None
     coverage_rule: Annotated[
         Literal["length", "paper"],
         _plan("Count metres; or, as the paper does, units of the whole"),
@@ -190,6 +201,33 @@ class Settings:
     speed: Annotated[float, _robot("The robot's speed", "m/s", least=0.001)] = 0.5
     turn_rate: Annotated[float, _robot("How fast it turns", "degrees/s", least=0.01)] = 45.0
     acceleration: Annotated[float, _robot("How fast it speeds up", "m/s²", least=0.001)] = 0.5
+    scanner: Annotated[
+        ScannerName | None,
+        _scanner("Scanner by name, which gives what is not given besides", quiet=True),
+    ] = None
+    near: Annotated[
+        float | None, _scanner("What is nearer is not seen", "m", least=0, undecided="0", quiet=True)
+    ] = None
+    angular_step: Annotated[
+        float | None, _scanner("Between neighbouring points", "degrees", above=0, most=5, quiet=True)
+    ] = None
+    blind_cone: Annotated[
+        float | None,
+        _scanner(
+            "Cone under the scanner that it does not see",
+            "degrees",
+            least=0,
+            most=170,
+            undecided="0",
+            quiet=True,
+        ),
+    ] = None
+    scanner_height: Annotated[
+        float | None,
+        _scanner(
+            "Scanner above the floor", "m", above=0, below=10, undecided="scan_height, else 1.3", quiet=True
+        ),
+    ] = None
     range: Annotated[float, _scanner("The scanner's range", "m", above=0)] = 5.0
     fov: Annotated[float, _scanner("The scanner's field of view", "degrees", least=10, most=360)] = 360.0
     profile: Annotated[str, _scanner("The scanner's own name for how it scans")] = "default"
@@ -223,6 +261,11 @@ class Settings:
         """Least share of what is visible of each kind of element; None where none is asked for."""
         return self._least(self.kind_coverage)
 
+    @property
+    def least_views(self) -> int:
+        """From how many stops a target must be seen until it counts."""
+        return 1 if self.views is None else self.views
+
     def _least(self, given: float | None) -> float | None:
         if self.coverage_rule == "paper":
             return None
@@ -254,6 +297,14 @@ FLOOR_PARAMETERS = tuple(name for name, item in PARAMETERS.items() if item.secti
 """Those that choose and shape the floor that is read."""
 
 
+def told_of(settings: Settings) -> dict[str, Any]:
+    """What missions tell of the settings, by name, as JSON holds it."""
+    import msgspec
+
+    told = msgspec.to_builtins(settings)
+    return {name: value for name, value in told.items() if value is not None or not PARAMETERS[name].quiet}
+
+
 def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
     """Settings from plan.toml (if given) and then `overrides`; both are checked.
 
@@ -273,7 +324,9 @@ def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
         typed = msgspec.convert(values, Settings)
     except msgspec.ValidationError as error:
         raise InputError(_said(str(error), values, path)) from None
-    settings = Settings(**{key: getattr(typed, key) for key in values})  # typed itself lacks the defaults
+    given = {key: getattr(typed, key) for key in values}  # typed itself lacks the defaults
+    facts = {} if given.get("scanner") is None else SCANNERS[given["scanner"]].values()
+    settings = Settings(**{**facts, **given})
     check_settings(settings)
     return settings
 
@@ -343,6 +396,16 @@ def _check_together(settings: Settings) -> None:
     if settings.refine and (settings.coverage_rule == "paper" or settings.fov < 360):
         other = "coverage_rule = paper" if settings.coverage_rule == "paper" else f"fov = {settings.fov:g}"
         raise InputError(f"refine = true: is not done with {other}; leave one of them out")
+    if settings.density is not None and settings.angular_step is None:
+        raise InputError(
+            f"density = {settings.density:g}: needs the scanner's angular_step; give it, or a scanner: "
+            f"{', '.join(SCANNERS)}"
+        )
+    if settings.least_views > 1 and settings.fov < 360:
+        raise InputError(
+            f"views = {settings.views}: is not done with fov = {settings.fov:g}, where one place may have "
+            "several stops; leave one of them out"
+        )
     if settings.tour == "closed" and settings.end is not None:
         raise InputError("tour = closed and end are both given; a closed tour ends where it starts")
 

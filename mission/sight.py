@@ -53,7 +53,7 @@ class Sight:
 
     @cached_property
     def all_seen(self) -> BoolArray:
-        """Whether any stop sees each unit (n,)."""
+        """Whether each unit is seen from as many stops as it asks for (n,)."""
         return self.seen_units(self.ids)
 
     @cached_property
@@ -69,24 +69,35 @@ class Sight:
         return bool(np.hypot(known.x - stop.x, known.y - stop.y) <= SAME_PLACE_M)
 
     def seen_units(self, stops: Collection[str]) -> BoolArray:
-        """Whether any of these stops sees each unit (n,); stops of other plans see nothing."""
-        change = np.zeros(len(self.ledger.weight) + 1, dtype=np.int64)
+        """Whether enough of these stops see each unit (n,); stops of other plans see nothing."""
+        return self.ledger.enough(self.views_from(stops))
+
+    def views_from(self, stops: Collection[str]) -> IntArray:
+        """How many of these stops see each unit (n,)."""
+        views = np.zeros(len(self.ledger.weight), dtype=np.int64)
         for stop in stops:
             number = self._number.get(stop)
             if number is not None:
-                runs = slice(int(self.pointer[number]), int(self.pointer[number + 1]))
-                np.add.at(change, self.first[runs], 1)
-                np.add.at(change, self.last[runs] + 1, -1)
-        return frozen(np.cumsum(change[:-1]) > 0, np.bool_)
+                views += self._seen_by(number)
+        return frozen(views, np.int64)
+
+    def _seen_by(self, number: int) -> BoolArray:
+        """Whether a stop sees each unit (n,)."""
+        runs = slice(int(self.pointer[number]), int(self.pointer[number + 1]))
+        change = np.zeros(len(self.ledger.weight) + 1, dtype=np.int64)
+        np.add.at(change, self.first[runs], 1)
+        np.add.at(change, self.last[runs] + 1, -1)
+        return np.asarray(np.cumsum(change[:-1]) > 0)
 
     def shares(self, stops: Collection[str]) -> Shares:
         """What these stops see."""
         return self.ledger.shares(self.seen_units(stops))
 
-    def brings(self, stop: str, seen: BoolArray) -> float:
-        """The share of what is visible that this stop sees beside what is seen already (n,)."""
+    def brings(self, stop: str, views: IntArray) -> float:
+        """The share of what is visible that counts as seen with this stop, after views from others (n,)."""
         visible = self.ledger.amount(self.ledger.visible)
-        more = self.seen_units([stop]) & ~seen & self.ledger.visible
+        after = self.ledger.enough(views + self.views_from([stop]))
+        more = after & ~self.ledger.enough(views) & self.ledger.visible
         return self.ledger.amount(more) / visible if visible else 0.0
 
     @cached_property

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import msgspec
+from msgspec import UNSET, UnsetType
 
 from mission import __version__
-from mission.document import Origin, Policy, RobotSpec, Scan, ScannerSpec, SiteOrigin
-from mission.settings import FLOOR_PARAMETERS, Settings
+from mission.document import LimitsSpec, Origin, Policy, RobotSpec, Scan, ScannerSpec, SiteOrigin
+from mission.limits import blind_range
+from mission.settings import FLOOR_PARAMETERS, Settings, told_of
 
 DECIMALS = 6
 """Missions hold micrometres and microradians: finer would be float noise."""
@@ -28,8 +31,28 @@ def robot_of(settings: Settings) -> RobotSpec:
 
 
 def scanner_of(settings: Settings) -> ScannerSpec:
-    """The scanner."""
-    return ScannerSpec(profile=settings.profile, range=settings.range, fov_deg=settings.fov)
+    """The scanner, and what is known of it besides."""
+    facts: dict[str, Any] = {
+        "model": settings.scanner,
+        "step_deg": settings.angular_step,
+        "near": settings.near,
+        "blind_cone_deg": settings.blind_cone,
+        "height": settings.scanner_height,
+    }
+    known = {key: value for key, value in facts.items() if value is not None}
+    return ScannerSpec(profile=settings.profile, range=settings.range, fov_deg=settings.fov, **known)
+
+
+def limits_spec_of(settings: Settings) -> LimitsSpec | UnsetType:
+    """When a target counts as seen; absent where there is no limit."""
+    limits = {
+        "max_incidence_deg": settings.max_incidence,
+        "near": blind_range(settings) or None,
+        "density_mm": settings.density,
+        "views": settings.least_views if settings.least_views > 1 else None,
+    }
+    known: dict[str, Any] = {key: value for key, value in limits.items() if value is not None}
+    return LimitsSpec(**known) if known else UNSET
 
 
 def policy_of(settings: Settings) -> Policy:
@@ -57,7 +80,7 @@ def site_origin_of(settings: Settings) -> SiteOrigin | None:
 
 def origin_of(settings: Settings, *, floor: str, digest: str) -> Origin:
     """What the mission was made from: a file's name and digest, and every setting that was decided."""
-    told = msgspec.json.decode(msgspec.json.encode(settings))
+    told = msgspec.json.decode(msgspec.json.encode(told_of(settings)))
     parameters = {
         key: value for key, value in told.items() if value not in (None, []) or key not in FLOOR_PARAMETERS
     }

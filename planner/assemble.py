@@ -25,6 +25,7 @@ from mission.planning import Candidates, NavigableSpace, Route
 from mission.settings import Settings
 from mission.specs import (
     DECIMALS,
+    limits_spec_of,
     origin_of,
     policy_of,
     robot_of,
@@ -58,6 +59,7 @@ def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
             georeference=_georeference(space),
             robot=robot_of(settings),
             scanner=scanner_of(settings),
+            limits=limits_spec_of(settings),
             start=Start(
                 x=rounded(route.start[0]),
                 y=rounded(route.start[1]),
@@ -83,14 +85,14 @@ def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
     visibility = route.selection.visibility
     rows = route.selection.chosen[route.order]
     doorways = set(visibility.candidates.doorway_rows.tolist())
-    seen = np.zeros(visibility.targets.total, dtype=bool)
+    views = np.zeros(visibility.targets.total, dtype=np.int64)
     width = max(2, len(str(len(rows))))
     stops = []
     heading = _turned(route.start[2])
     for number, (row, approach) in enumerate(zip(rows, route.approaches, strict=True), start=1):
         units = visibility.seen_by(int(row))
-        new = int(np.count_nonzero(~seen[units]))
-        seen[units] = True
+        views[units] += 1
+        new = int(np.count_nonzero(views[units] == visibility.asked[units]))
         heading = _scan_heading(visibility.candidates, int(row), _arrival_heading(approach, heading))
         sees = Sees(units=len(units), new_units=new)
         name, doorway = f"s{number:0{width}d}", int(row) in doorways

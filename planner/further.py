@@ -20,9 +20,10 @@ from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError
 from mission.floor import Element, FloorPlan
 from mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
-from mission.ledger import ledger_of
+from mission.ledger import Ledger, ledger_of
 from mission.planning import KEPT, Candidates, NavigableSpace, Visibility
 from mission.settings import Settings, read_settings
+from mission.specs import limits_spec_of
 from planner.assemble import assemble
 from planner.candidates import candidates
 from planner.floors import options_of, read_floor
@@ -95,18 +96,20 @@ def as_driven(planned: PlannedFloor, places: Places) -> AsDriven:
     """
     lines = SightLines(planned.space)
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in planned.mission.stops]).reshape(-1, 3)
+    ledger = ledger_of(planned.seen)
     return AsDriven(
-        ledger=ledger_of(planned.seen),
-        planned=_seen_by(_views(planned.space, lines, stops), planned.space),
-        driven=_seen_by(_views(planned.space, lines, places), planned.space),
+        ledger=ledger,
+        planned=_seen_by(_views(planned.space, lines, stops), ledger),
+        driven=_seen_by(_views(planned.space, lines, places), ledger),
     )
 
 
-def _seen_by(views: Iterable[IntArray], space: NavigableSpace) -> BoolArray:
-    seen = np.zeros(space.targets.total, dtype=bool)
+def _seen_by(views: Iterable[IntArray], ledger: Ledger) -> BoolArray:
+    """Whether enough of the places that see these units see each unit."""
+    counted = np.zeros(len(ledger.weight), dtype=np.int64)
     for units in views:
-        seen[units] = True
-    return frozen(seen, np.bool_)
+        counted[units] += 1
+    return ledger.enough(counted)
 
 
 def _views(space: NavigableSpace, lines: SightLines, places: Places) -> list[IntArray]:
@@ -147,9 +150,8 @@ def top_up(
         return None
     mission = assemble(route(selection))
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
-    alone = ledger_of(known.seen).shares(
-        _seen_by(_views(known.space, SightLines(known.space), stops), known.space)
-    )
+    once = replace(ledger_of(known.seen), asked=frozen([1], np.int64))
+    alone = once.shares(_seen_by(_views(known.space, SightLines(known.space), stops), once))
     return _further(mission, planned.mission, evidence, alone.whole.coverage or 0.0)
 
 
@@ -192,8 +194,14 @@ def _frozen(one: Any, other: Any) -> Any:
 
 
 def _further(mission: Mission, before: Mission, evidence: str, coverage: float) -> Mission:
-    """With an id of its own, what the mission before was told besides its plan, and what it sees."""
+    """With an id of its own, what the mission before was told besides its plan, and what it sees.
+
+    What it adds to what was seen before is for one view of each target; it claims no more of its own.
+    """
     asked = {"coverage": math.floor(coverage * 1e6) / 1e6, "room_coverage": 0.0, "kind_coverage": 0.0}
+    parameters = {**mission.origin.parameters, **asked}
+    parameters.pop("views", None)
+    settings = read_settings(None, parameters)
     basis = f"{before.id}:{before.revision}:{evidence}:{mission.digest}"
     return sealed(
         changed(
@@ -202,7 +210,8 @@ def _further(mission: Mission, before: Mission, evidence: str, coverage: float) 
             name=f"{before.name}-top-up",
             frame=before.frame,
             georeference=before.georeference,
-            origin=changed(mission.origin, parameters={**mission.origin.parameters, **asked}),
+            limits=limits_spec_of(settings),
+            origin=changed(mission.origin, parameters=parameters),
         )
     )
 

@@ -75,6 +75,7 @@ class PlanReport:
                 "method": selection.method,
             },
             "coverage": coverage_table(self.figures),
+            **quality_told(self.figures),
             "route": {
                 "length_m": self.part.route.length,
                 "bound_m": self.part.route.bound,
@@ -127,6 +128,7 @@ class PlanReport:
             f"(no route is below {route['bound_m']:.1f} m), from {route['start']}",
             f"  time        {times['total_s'] / 60:.0f} min: drive {times['drive_s']:.0f} s, "
             f"turn {times['turn_s']:.0f} s, settle {times['settle_s']:.0f} s, scan {times['scan_s']:.0f} s",
+            *quality_lines(figures),
             *coverage_lines(figures),
         ]
         lines += [
@@ -135,6 +137,35 @@ class PlanReport:
         ]
         lines += finding_lines(figures.findings)
         return "\n".join([*lines, *(f"  {key:<11} {path}" for key, path in self.files.items())])
+
+
+def quality_told(figures: Figures) -> dict[str, Any]:
+    """How well targets are to be seen, for JSON; nothing where any view counts."""
+    quality = figures.quality
+    if quality is None:
+        return {}
+    costs = [
+        {"limit": item.limit, "stops": item.stops, "without": item.without, "bound_without": item.bound}
+        for item in quality.costs
+    ]
+    return {"limits": {"in_sight": quality.in_sight, "possible": quality.possible, "costs": costs}}
+
+
+def quality_lines(figures: Figures) -> list[str]:
+    """How well targets are to be seen, and about how many stops each limit costs."""
+    quality = figures.quality
+    if quality is None:
+        return []
+    share = percent(quality.possible / quality.in_sight if quality.in_sight else None)
+    lines = [
+        f"  seen well   {share} of the {quality.in_sight:.0f} {figures.unit} in sight can be seen as asked"
+    ]
+    for item in quality.costs:
+        more = item.stops - item.without
+        cost = "costs no stop" if more <= 0 else f"costs about {more} stop{'s' * (more > 1)}"
+        told = f"{cost} (about {item.without} without, at least {item.bound})"
+        lines.append(f"    {item.words:<29} {told}")
+    return lines
 
 
 MOST_ROOMS = 12

@@ -9,7 +9,7 @@ import numpy as np
 from mission.acquired import Acquired
 from mission.comparison import StopComparison
 from mission.document import Mission, Stop
-from mission.geometry import BoolArray, frozen
+from mission.geometry import IntArray, frozen
 from mission.sight import Sight
 
 SCANNED, UNSURE = "scanned", "unconfirmed"
@@ -30,13 +30,14 @@ def acquired_by(
     places = {stop.id: stop for mission in missions for stop in mission.stops}
     done = [item.stop for item in stops if item.outcome == SCANNED]
     unsure = [item.stop for item in stops if item.outcome == UNSURE]
-    seen = _seen(done, places, known)
+    views = _views(done, places, known)
+    seen = last.ledger.enough(views)
     wanted = [item.stop for item in stops if item.outcome not in (SCANNED, UNSURE)]
     return Acquired(
         sight=last,
         seen=seen,
-        perhaps=frozen(seen | _seen(unsure, places, known), np.bool_),
-        lost={stop: last.brings(stop, seen) for stop in wanted if stop in last.ids},
+        perhaps=last.ledger.enough(views + _views(unsure, places, known)),
+        lost={stop: last.brings(stop, views) for stop in wanted if stop in last.ids},
         unknown=tuple(stop for stop in done if _knowing(stop, places, known) is None),
     )
 
@@ -50,13 +51,14 @@ def _of(mission: Mission, sights: Iterable[Sight]) -> list[Sight]:
     return [item for item in mine if len(item.ledger.weight) == len(mine[-1].ledger.weight)]
 
 
-def _seen(stops: Iterable[str], places: dict[str, Stop], sights: Sequence[Sight]) -> BoolArray:
-    seen = np.zeros(len(sights[-1].ledger.weight), dtype=bool)
+def _views(stops: Iterable[str], places: dict[str, Stop], sights: Sequence[Sight]) -> IntArray:
+    """How many of these stops see each unit."""
+    views = np.zeros(len(sights[-1].ledger.weight), dtype=np.int64)
     for stop in stops:
         sight = _knowing(stop, places, sights)
         if sight is not None:
-            seen |= sight.seen_units([stop])
-    return frozen(seen, np.bool_)
+            views += sight.views_from([stop])
+    return frozen(views, np.int64)
 
 
 def _knowing(stop: str, places: dict[str, Stop], sights: Sequence[Sight]) -> Sight | None:

@@ -14,6 +14,7 @@ from mission.files import floor_drawing as floor_look
 from mission.files import route_drawing as route_look
 from mission.files.sheet import COLUMN, HEADER, ROW, Chunk, PaperBox, PaperSheet
 from mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
+from mission.limits import limits_in_words
 from mission.planning import Route
 from mission.schedule import schedule
 from mission.table import duration
@@ -58,6 +59,11 @@ def facts_of(route: Route, mission: Mission, *, date: str) -> list[tuple[str, st
         ("Floor digest", mission.origin.floor_digest[:12]),
         ("Date", date),
         ("Scanner", f"{mission.scanner.profile}, range {mission.scanner.range:g} m"),
+        *(
+            [("Seen", ", ".join(told.values()))]
+            if (told := limits_in_words(mission.limits, brief=True))
+            else []
+        ),
         ("Stops", f"{len(mission.stops)}, of these candidates at least {selection.bound}"),
         (
             "Coverage",
@@ -86,10 +92,11 @@ def legend_entries(route: Route, mission: Mission) -> list[tuple[str, str]]:
     """(symbol, words) for everything that is on this plan, and nothing else."""
     space = route.selection.visibility.candidates.space
     openings = {state.passable for state in space.openings}
+    any_view = not limits_in_words(mission.limits)
     some: list[tuple[str, str, bool]] = [
         ("seen", "seen by the stops", True),
-        ("unseen", "in sight, not seen", True),
-        ("hidden", "out of sight", True),
+        ("unseen", "in sight, not seen" if any_view else "can be seen so, is not", True),
+        ("hidden", "out of sight" if any_view else "cannot be seen so", True),
         ("passable", "opening, passable", True in openings),
         ("blocked", "opening, not passable", False in openings),
         ("stop", "stop, and its heading", bool(mission.stops)),

@@ -10,6 +10,7 @@ from mission.ledger import ledger_of
 from mission.planning import Candidates, Route, Selection
 from mission.seen import seen_units
 from planner.appraisal.plausible import doubts_of, near_legs
+from planner.appraisal.quality import not_met, quality_of
 from planner.appraisal.unreached import unreached
 from planner.shapes import local_origin, to_shape
 from planner.space.reach import reach_of
@@ -23,7 +24,7 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
     parts = planned or frozenset([candidates.chosen_part])
     left_out = unreached(candidates, parts)
     reached = _reached_m2(candidates, parts)
-    findings = (*space.findings, *doubts_of(route, reached_m2=reached))
+    findings = (*space.findings, *doubts_of(route, reached_m2=reached), *not_met(selection))
     shares = shares_of(selection, why={item.room: item.why for item in left_out})
     return Figures(
         rule=settings.coverage_rule,
@@ -34,6 +35,7 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
         reached_m2=reached,
         unreached=left_out,
         findings=ranked(findings, near_legs(findings, route)),
+        quality=quality_of(selection),
     )
 
 

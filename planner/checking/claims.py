@@ -19,7 +19,7 @@ from mission.document import Mission, Stop
 from mission.errors import AnswerIsNo, InputError
 from mission.figures import percent
 from mission.files.coverage_json import DIGITS, Coverage
-from mission.geometry import BoolArray, IntArray
+from mission.geometry import BoolArray, IntArray, frozen
 from mission.planning import Candidates, NavigableSpace, weights_of
 from mission.problems import Problem
 from planner.candidates import STRATEGIES, candidates
@@ -43,18 +43,23 @@ class Recount:
     space: NavigableSpace
     by_stop: tuple[IntArray, ...]
     """Units each stop sees, ascending."""
-    visible: BoolArray | None
-    """Whether each unit can be seen by a candidate; None where that is not known."""
+    could: IntArray | None
+    """How many candidates see each unit, up to as many as are asked for; None where that is not known."""
     why_not: str = ""
     """Why it is not known."""
 
     @cached_property
+    def visible(self) -> BoolArray | None:
+        """Whether each unit can be seen by a candidate."""
+        return None if self.could is None else frozen(self.could > 0, np.bool_)
+
+    @cached_property
     def seen(self) -> BoolArray:
-        """Whether any stop sees each unit."""
-        seen = np.zeros(self.space.targets.total, dtype=bool)
+        """Whether as many stops see each unit as it asks for; any stop, where that is not known."""
+        views = np.zeros(self.space.targets.total, dtype=np.int64)
         for units in self.by_stop:
-            seen[units] = True
-        return seen
+            views[units] += 1
+        return frozen(views >= (1 if self.could is None else np.maximum(1, self.could)), np.bool_)
 
     @property
     def share(self) -> float | None:
@@ -85,10 +90,10 @@ def recount(mission: Mission, space: NavigableSpace) -> Recount:
     lines = SightLines(space)
     by_stop = tuple(_seen_from(stop, space, lines) for stop in mission.stops)
     try:
-        visible = _visible(_candidates(mission, space), lines)
+        could = _could_see(_candidates(mission, space), lines)
     except (AnswerIsNo, InputError) as error:
         return Recount(space, by_stop, None, str(error))
-    return Recount(space, by_stop, visible)
+    return Recount(space, by_stop, could)
 
 
 def _seen_from(stop: Stop, space: NavigableSpace, lines: SightLines) -> IntArray:
@@ -96,7 +101,7 @@ def _seen_from(stop: Stop, space: NavigableSpace, lines: SightLines) -> IntArray
     xy = np.array([stop.x, stop.y])
     closed_door = stop.doorway and space.settings.doors == "closed" and bool(space.openings)
     places = sides_of_door(space, xy) if closed_door else xy[None]
-    units = np.unique(np.concatenate([lines.seen_from(place) for place in places]))
+    units = np.unique(np.concatenate([lines.seen_from(place, scanner=xy) for place in places]))
     if space.settings.fov >= 360:
         return units
     way = space.targets.unit_xy[units] - xy
@@ -115,17 +120,26 @@ def _candidates(mission: Mission, space: NavigableSpace) -> Candidates:
     return candidates(space, part=counts.most_common(1)[0][0])
 
 
-def _visible(found: Candidates, lines: SightLines) -> BoolArray:
-    """Whether each unit is seen by any candidate; places added beside chosen ones are none."""
+def _could_see(found: Candidates, lines: SightLines) -> IntArray:
+    """How many candidates see each unit, up to as many as are asked for.
+
+    Places added beside chosen ones are none.
+    """
     places, row = viewpoints_of(found)
+    stands = found.xy[found.kept]
+
+    def seen_by(k: int, among: BoolArray | None = None) -> IntArray:
+        views = [lines.seen_from(place, among, scanner=stands[k]) for place in places[row == k]]
+        return np.unique(np.concatenate(views))
+
     if found.space.settings.fov < 360 and (len(found.must_rows) or len(found.doorway_rows)):
-        units = [[lines.seen_from(place) for place in places[row == k]] for k in range(len(found.kept))]
-        alone = (np.unique(np.concatenate(several)) for several in units)
-        return with_headings(visibility_of(found, alone, method="line by line")).visible
-    visible = np.zeros(found.space.targets.total, dtype=bool)
-    for place in places:
-        visible[lines.seen_from(place, ~visible)] = True
-    return visible
+        alone = (seen_by(k) for k in range(len(stands)))
+        seen = with_headings(visibility_of(found, alone, method="line by line"))
+        return frozen(seen.visible, np.int64)
+    could = np.zeros(found.space.targets.total, dtype=np.int64)
+    for k in range(len(stands)):
+        could[seen_by(k, could < found.space.settings.least_views)] += 1
+    return frozen(could, np.int64)
 
 
 def overclaims(mission: Mission, counted: Recount, coverage: Coverage | None) -> Iterator[Problem]:

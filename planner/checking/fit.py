@@ -20,6 +20,7 @@ from mission.floor import Element, FloorPlan
 from mission.geometry import FloatArray
 from mission.problems import Problem
 from mission.settings import Settings
+from mission.specs import limits_spec_of
 from planner.appraisal.plausible import over_ignored
 from planner.assemble import CLEAR_SLACK
 from planner.shapes import HAIRLINE, SLACK, holds, segments_of
@@ -53,6 +54,8 @@ def other_machine(mission: Mission, settings: Settings) -> Iterator[Problem]:
     for path, sent, key, planned in pairs:
         if not math.isclose(sent, planned, rel_tol=1e-9):
             yield Problem(path, f"is {sent:g}, but $.origin.parameters.{key} planned with {planned:g}")
+    if mission.limits != limits_spec_of(settings):
+        yield Problem("$.limits", "are not those that $.origin.parameters planned with")
 
 
 @dataclass(frozen=True)

@@ -57,19 +57,32 @@ def select(visibility: Visibility) -> Selection:
 
     Stops that must be used, and doorways added for registration, are chosen first and count.
     """
+    settings = visibility.candidates.space.settings
+    method = variant("selector", settings.selector, METHODS)
+    whole, fixed, problem = _posed(visibility)
+    rows, bound = _solved(method, problem, settings)
+    chosen = np.concatenate([fixed, in_greedy_order(problem, rows)]).astype(np.int64)
+    return _selection(visibility, whole, chosen, len(fixed) + bound, method)
+
+
+def quick(visibility: Visibility) -> tuple[int, int]:
+    """About how many stops it takes, by greedy choice, and the number that no choice goes below."""
+    _, fixed, problem = _posed(visibility)
+    rows, bound = _greedy(problem, visibility.candidates.space.settings)
+    return len(fixed) + len(rows), len(fixed) + bound
+
+
+def _posed(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
+    """The whole problem, the rows that are chosen in any case, and what is left to choose after them."""
     candidates = visibility.candidates
     settings = candidates.space.settings
-    method = variant("selector", settings.selector, METHODS)
     whole = cover_of(visibility, demands_of(visibility))
     fixed = np.union1d(candidates.must_rows, candidates.doorway_rows if settings.door_scan else [])
     fixed = fixed.astype(np.int64)
     offered = np.arange(whole.rows)
     if not settings.door_candidates:
         offered = np.setdiff1d(offered, candidates.doorway_rows)
-    problem = whole.after(fixed).offering(offered)
-    rows, bound = _solved(method, problem, settings)
-    chosen = np.concatenate([fixed, in_greedy_order(problem, rows)]).astype(np.int64)
-    return _selection(visibility, whole, chosen, len(fixed) + bound, method)
+    return whole, fixed, whole.after(fixed).offering(offered)
 
 
 def select_further(visibility: Visibility, done: IntArray) -> Selection:
@@ -139,4 +152,4 @@ def _coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
     return np.array(steps)
 
 
-__all__ = ["METHODS", "Selector", "select", "select_further"]
+__all__ = ["METHODS", "Selector", "quick", "select", "select_further"]

@@ -133,7 +133,7 @@ def cover_of(visibility: Visibility, demands: Demands) -> Cover:
     merged = _sorted(sees[:, np.flatnonzero(seen)[first]])
     worth = _worth(demands, np.repeat(group, np.diff(np.append(piece_first, len(demands.weight)))))
     needed = demands.needed(np.asarray(worth.sum(axis=1)).ravel())
-    return Cover(merged, worth, needed)
+    return Cover(merged, worth, needed, visibility.asked[piece_first[seen][first]])
 
 
 def _alike(sees: csr_array, weight: IntArray, piece_first: IntArray) -> IntArray:

@@ -17,8 +17,10 @@ import numpy as np
 import shapely
 
 from mission.geometry import BoolArray, FloatArray, IntArray
+from mission.limits import limits_of
 from mission.planning import NavigableSpace
 from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
+from planner.sight.well_seen import SeenSegments, well_seen
 from planner.space.targets import face_segments
 
 SPLIT = 27
@@ -65,17 +67,28 @@ class SightLines:
         self._midpoints = Midpoints.of(a, b, targets.units, targets.occluding)
         outlines = whole_steps_of(space.occluders, self._origin)
         self._edges = np.rint(face_segments(outlines)).astype(np.int64)
-        self._reach = space.settings.range
+        self._reach, self._limits = space.settings.range, limits_of(space.settings)
         self._points = shapely.STRtree(shapely.points(targets.unit_xy - self._origin))
         self._lines = shapely.STRtree(shapely.linestrings(self._edges * GRID))
 
-    def seen_from(self, xy: FloatArray, among: BoolArray | None = None) -> IntArray:
-        """Units that a place (2,) in the drawing's coordinates sees within range, of `among` if given."""
+    def seen_from(
+        self, xy: FloatArray, among: BoolArray | None = None, *, scanner: FloatArray | None = None
+    ) -> IntArray:
+        """Units that a place (2,) in the drawing's coordinates sees well enough, of `among` if given.
+
+        `scanner` is where the scanner stands, if it looks past a door's line from beside it.
+        """
         place = to_grid(xy - self._origin)
         units, edges = self._near(self._points, place), self._near(self._lines, place)
         units = units if among is None else units[among[units]]
         reach = round(self._reach / GRID)
-        return units[sees(place, self._midpoints.among(units), self._edges[edges], reach=reach)]
+        units = units[sees(place, self._midpoints.among(units), self._edges[edges], reach=reach)]
+        stand = place if scanner is None else to_grid(scanner - self._origin)
+        return units if self._limits.none else units[self._well_seen(stand, self._midpoints.among(units))]
+
+    def _well_seen(self, place: IntArray, midpoints: Midpoints) -> BoolArray:
+        stretches = SeenSegments(midpoints.a - place, midpoints.b - place, midpoints.pieces // 2)
+        return well_seen(stretches, (midpoints.odd - 1) // 2, self._limits)
 
     def _near(self, tree: shapely.STRtree, place: IntArray) -> IntArray:
         """What may lie within range, and a little more, ascending."""

@@ -16,6 +16,7 @@ from mission.plugins import Variant, variant
 from planner.visibility.bresenham import bresenham
 from planner.visibility.exact_sight import exact
 from planner.visibility.headings import with_headings
+from planner.visibility.limited import within_limits
 
 VisibilityMethod = Callable[[Candidates], Visibility]
 METHODS: dict[str, VisibilityMethod] = {"exact": exact, "bresenham": bresenham}
@@ -24,7 +25,8 @@ METHODS: dict[str, VisibilityMethod] = {"exact": exact, "bresenham": bresenham}
 def visibility(candidates: Candidates) -> Visibility:
     """What the kept candidates see, by the method named in the settings.
 
-    With a field of view below 360° the candidates of the result are positions with headings.
+    What is not seen within the settings' limits counts as not seen, whatever the method. With a field of view
+    below 360° the candidates of the result are positions with headings.
     """
     settings = candidates.space.settings
     method = variant("visibility", settings.visibility, METHODS)
@@ -34,7 +36,19 @@ def visibility(candidates: Candidates) -> Visibility:
             f"{candidates.space.floor.name}: no target is within {settings.range:g} m of a candidate "
             "and in its sight; raise --range or lower --grid"
         )
-    return with_headings(found) if settings.fov < 360 else found
+    return seen_well(found)
+
+
+def seen_well(in_sight: Visibility) -> Visibility:
+    """What of the things in sight is seen within the settings' limits, and along which headings.
+
+    Raises
+    ------
+    AnswerIsNo
+        When the limits leave nothing.
+    """
+    seen = within_limits(in_sight)
+    return with_headings(seen) if in_sight.candidates.space.settings.fov < 360 else seen
 
 
 def _sound(method: Variant[VisibilityMethod], given: object, candidates: Candidates) -> Visibility:
@@ -60,4 +74,4 @@ def _sound(method: Variant[VisibilityMethod], given: object, candidates: Candida
     return Visibility(candidates, pointer, segment, first, last, found.method)
 
 
-__all__ = ["METHODS", "VisibilityMethod", "visibility"]
+__all__ = ["METHODS", "VisibilityMethod", "seen_well", "visibility"]

@@ -40,7 +40,7 @@ def with_headings(seen: Visibility) -> Visibility:
     turned = _turned(candidates, [[heading for heading, _ in view] for view in views])
     units = (units for view in views for _, units in view)
     name = f"{seen.method}, field of view {candidates.space.settings.fov:g}°"
-    return visibility_of(turned, units, method=name)
+    return replace(visibility_of(turned, units, method=name), in_sight=seen.in_sight)
 
 
 def headings_of(candidates: Candidates, *, fov: float) -> FloatArray:

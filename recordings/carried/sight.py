@@ -46,7 +46,9 @@ def sights_in(values: Values, name: str) -> tuple[Sight, ...]:
 def _values(sight: Sight) -> dict[str, Sized]:
     targets, ledger = sight.targets, sight.ledger
     first = targets.first_unit[:-1]
-    change = _changes(np.stack([ledger.room, ledger.visible], axis=1))
+    asked = np.broadcast_to(ledger.asked, len(ledger.weight))
+    change = _changes(np.stack([ledger.room, ledger.visible, asked], axis=1))
+    more = {"asked": asked[change].astype(np.int32)} if (asked > 1).any() else {}
     shares = [ledger.required, _asked(ledger.kind_required)]
     return {
         "mission": [sight.mission_id, sight.digest, ledger.rule],
@@ -62,6 +64,7 @@ def _values(sight: Sight) -> dict[str, Sized]:
         "change": change.astype(np.int32),
         "room": ledger.room[change].astype(np.int32),
         "visible": ledger.visible[change],
+        **more,
         "room_names": [group.name for group in ledger.rooms],
         "room_why": [group.why for group in ledger.rooms],
         "room_shares": np.array([_asked(group.required) for group in ledger.rooms]),
@@ -136,4 +139,5 @@ def _ledger(row: Cells, targets: Targets, rule: str) -> Ledger:
         elements=tuple(Seen(*pair) for pair in zip(row["element_ids"], row["element_kinds"], strict=True)),
         required=float(row["shares"][0]),
         kind_required=_told(row["shares"][1]),
+        asked=frozen(np.repeat(row["asked"], counts) if "asked" in row else [1], np.int64),
     )

@@ -59,12 +59,13 @@ def _growth(comparison: Comparison) -> Iterator[str]:
     acquired = comparison.acquired
     if acquired is None:
         return
-    ledger, seen = acquired.sight.ledger, np.zeros(len(acquired.seen), dtype=bool)
+    ledger, views = acquired.sight.ledger, np.zeros(len(acquired.seen), dtype=np.int64)
     visible = ledger.amount(ledger.visible)
     times, shares = [0.0], [0.0]
     for event in comparison.log.events:
         if isinstance(event, Scanned) and visible:
-            seen |= acquired.sight.seen_units([event.stop]) & acquired.seen
+            views = views + acquired.sight.views_from([event.stop])
+            seen = ledger.enough(views) & acquired.seen
             times.append(event.mission_time_s)
             shares.append(100 * ledger.amount(seen & ledger.visible) / visible)
     if len(times) > 1:

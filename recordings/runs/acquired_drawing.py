@@ -24,14 +24,14 @@ CROSS_M = 0.3
 class AcquiredDrawing:
     """Knows what the scans of one run have seen so far.
 
-    What a skipped stop would have seen is lost once no stop that is still to come sees it.
+    What a skipped stop would have seen is lost once the stops still to come cannot make up for it.
     """
 
     def __init__(self, sight: Sight) -> None:
         self._sight = sight
         self._stops = {stop.id: stop for stop in sight.stops}
         self._coming = set(sight.ids)
-        self._seen = np.zeros(len(sight.ledger.weight), dtype=bool)
+        self._views = np.zeros(len(sight.ledger.weight), dtype=np.int64)
         self._lost = np.zeros(len(sight.ledger.weight), dtype=bool)
         self._styled = False
 
@@ -40,8 +40,9 @@ class AcquiredDrawing:
         self._style(canvas, names)
         if isinstance(event, Scanned) and event.stop in self._stops:
             self._coming.discard(event.stop)
-            new = self._sight.seen_units([event.stop]) & ~self._seen
-            self._seen |= new
+            before = self._seen
+            self._views = self._views + self._sight.views_from([event.stop])
+            new = self._seen & ~before
             self._draw(canvas, names.flat(entities.ACQUIRED), new, draw)
         elif isinstance(event, Skipped) and event.stop in self._stops:
             self._give_up([self._stops[event.stop]], canvas, names, draw)
@@ -56,13 +57,19 @@ class AcquiredDrawing:
         share, wanted = percent(now.coverage), percent(planned.coverage)
         return f"**{share}** of what is visible is scanned ({asked}{wanted} planned)"
 
+    @property
+    def _seen(self) -> BoolArray:
+        """Whether each unit counts as seen so far (n,)."""
+        return self._sight.ledger.enough(self._views)
+
     def _give_up(
         self, stops: list[SeenFrom], canvas: Canvas, names: entities.RunEntities, draw: Draw
     ) -> None:
-        """These stops will not be scanned: what none of those to come sees either is lost."""
+        """These stops will not be scanned: what those to come do not make up for is lost."""
         self._coming -= {stop.id for stop in stops}
-        wanted = self._sight.seen_units([stop.id for stop in stops]) & ~self._seen & ~self._lost
-        lost = wanted & ~self._sight.seen_units(self._coming)
+        still = self._views + self._sight.views_from(self._coming)
+        given_up = self._sight.views_from([stop.id for stop in stops]) > 0
+        lost = given_up & ~self._lost & ~self._sight.ledger.enough(still)
         self._lost |= lost
         self._draw(canvas, names.flat(entities.LOST), lost, draw)
         if stops:

@@ -47,13 +47,16 @@ def paint_coverage(canvas: Canvas, selection: Selection) -> None:
 
 
 def step_of_units(selection: Selection) -> IntArray:
-    """The choice, from 1, that first sees each unit; choices + 1 if none does, -1 if no candidate does."""
+    """The choice, from 1, with which each unit is seen; choices + 1 if with none, -1 if no candidate sees it."""
     visibility = selection.visibility
     never = len(selection.chosen) + 1
     first = np.where(visibility.visible, never, -1)
+    views = np.zeros(len(first), dtype=np.int64)
     for step, row in enumerate(selection.chosen, start=1):
         seen = visibility.seen_by(int(row))
-        first[seen] = np.where(first[seen] == never, step, first[seen])
+        views[seen] += 1
+        enough = (views[seen] >= visibility.asked[seen]) & (first[seen] == never)
+        first[seen] = np.where(enough, step, first[seen])
     return first
 
 

@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 import pytest
@@ -14,7 +14,8 @@ import pytest
 import stopgo
 from mission.__main__ import main
 from mission.errors import InputError
-from mission.settings import PARAMETERS, Settings, check_settings, read_settings, settings_toml
+from mission.scanners import SCANNERS, ScannerName
+from mission.settings import PARAMETERS, Settings, check_settings, read_settings, settings_toml, told_of
 from mission.specs import robot_of
 
 OTHER: dict[str, Any] = {
@@ -42,8 +43,15 @@ OTHER: dict[str, Any] = {
     "date": "2024-05-31",
     "since": "2024-04-30",
     "schedule_columns": ("guid=GlobalId", "task=Name"),
+    "views": 2,
+    "max_incidence": 70.0,
+    "density": 5.0,
+    "near": 0.6,
+    "angular_step": 0.036,
+    "blind_cone": 60.0,
+    "scanner_height": 1.8,
 }
-NEEDS = dict.fromkeys(("since", "schedule", "in_progress"), "date")
+NEEDS = {**dict.fromkeys(("since", "schedule", "in_progress"), "date"), "density": "angular_step"}
 """What says nothing without another parameter."""
 
 
@@ -73,7 +81,8 @@ def test_a_parameter_is_the_same_as_option_in_the_file_and_in_python(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     told = {one: other(one) for one in (name, NEEDS.get(name, name))}
-    expected = replace(Settings(), **told)
+    facts = SCANNERS[told["scanner"]].values() if "scanner" in told else {}
+    expected = replace(Settings(), **facts, **told)
     assert expected != Settings()
     made = stopgo.settings(**told)
     assert made == expected
@@ -150,6 +159,24 @@ def test_a_refusal_says_what_would_be_right(name: str) -> None:
     value, message = MESSAGES[name]
     with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
         stopgo.settings(**{name: value})
+
+
+def test_a_scanner_gives_what_is_not_given_besides(tmp_path: Path) -> None:
+    assert tuple(SCANNERS) == get_args(ScannerName)
+    (tmp_path / "plan.toml").write_text('[scanner]\nscanner = "rtc360-medium"\nrange = 8\n', encoding="utf-8")
+    settings = read_settings(tmp_path / "plan.toml", {"near": 1.0})
+    assert (settings.range, settings.near, settings.blind_cone, settings.scan_time) == (8.0, 1.0, 60.0, 51.0)
+    assert settings.angular_step == pytest.approx(math.degrees(0.0006), rel=1e-4)
+    assert read_settings(None, told_of(settings)) == settings
+    with pytest.raises(InputError, match=r"^scanner = none: known: rtc360-high, "):
+        stopgo.settings(scanner="none")
+
+
+def test_limits_that_need_more_say_what(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"^density = 5: needs the scanner's angular_step; .*rtc360-high, "):
+        stopgo.settings(density=5)
+    with pytest.raises(InputError, match=r"^views = 2: is not done with fov = 120"):
+        stopgo.settings(views=2, fov=120)
 
 
 def test_a_parameter_that_is_none_is_named() -> None:

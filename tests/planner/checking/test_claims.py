@@ -42,6 +42,15 @@ WORLDS: dict[str, tuple[FloorPlan, Settings]] = {
     "closed doors": (two_rooms(0.9), Settings(doors="closed", door_scan=True)),
     "a field of view": (HALL, Settings(fov=120.0)),
     "a field of view in a doorway": (two_rooms(0.9), Settings(doors="closed", door_scan=True, fov=100.0)),
+    "limits on views": (
+        HALL,
+        Settings(max_incidence=60, near=1.0, density=5, angular_step=0.1, views=2, grid=2),
+    ),
+    "limits past closed doors": (
+        two_rooms(0.9),
+        Settings(doors="closed", door_scan=True, max_incidence=70, near=0.8, views=2),
+    ),
+    "limits and a field of view": (HALL, Settings(fov=120.0, max_incidence=65, blind_cone=60, grid=2)),
     "triangulation": (HALL, Settings(candidates="triangulation")),
 }
 

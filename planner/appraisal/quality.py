@@ -1,0 +1,78 @@
+"""How well a plan's targets are to be seen: what that costs in stops, and where it cannot be had."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from mission.figures import LimitCost, Quality, percent
+from mission.floor import Finding
+from mission.geometry import BoolArray, frozen
+from mission.ledger import ledger_of
+from mission.limits import limits_in_words
+from mission.planning import Selection, Visibility
+from mission.settings import Settings
+from mission.specs import limits_spec_of
+from planner.selection import quick
+from planner.visibility import seen_well
+from planner.visibility.limited import without
+
+MOST_NAMED = 5
+"""Rooms and kinds that a finding names."""
+
+
+def quality_of(selection: Selection) -> Quality | None:
+    """What the limits on views cost, each switched off alone; None where there are none.
+
+    Plans for that are made by greedy choice from what is known to be in sight, so they are about right.
+    """
+    seen = selection.visibility
+    settings = seen.candidates.space.settings
+    told = limits_in_words(limits_spec_of(settings))
+    if not told:
+        return None
+    in_sight = _in_sight(seen)
+    stops, _ = quick(_under(in_sight, settings))
+    costs = []
+    for key, words in told.items():
+        fewer, bound = quick(_under(in_sight, without(settings, key)))
+        costs.append(LimitCost(key, words, stops=stops, without=fewer, bound=bound))
+    ledger = ledger_of(seen)
+    return Quality(tuple(costs), ledger.amount(in_sight.visible), ledger.amount(_possible(seen)))
+
+
+def _in_sight(seen: Visibility) -> Visibility:
+    return seen if seen.in_sight is None else seen.in_sight
+
+
+def _under(in_sight: Visibility, settings: Settings) -> Visibility:
+    """What is seen well enough by other settings."""
+    candidates = in_sight.candidates
+    space = replace(candidates.space, settings=settings)
+    return seen_well(replace(in_sight, candidates=replace(candidates, space=space)))
+
+
+def _possible(seen: Visibility) -> BoolArray:
+    """Whether as many candidates see each unit well enough as stops are asked for."""
+    asked = seen.candidates.space.settings.least_views
+    return frozen(seen.visible & (seen.asked >= asked), np.bool_)
+
+
+def not_met(selection: Selection) -> Iterator[Finding]:
+    """Where so little can be seen well enough that the shares asked for are out of reach of any stops."""
+    seen = selection.visibility
+    told = limits_in_words(limits_spec_of(seen.candidates.space.settings))
+    if not told:
+        return
+    ledger = replace(ledger_of(seen), visible=_in_sight(seen).visible)
+    shares = ledger.shares(_possible(seen))
+    short = [f"{item.name} {percent(item.coverage)}" for item in shares.short]
+    if short:
+        more = f" and {len(short) - MOST_NAMED} more" if len(short) > MOST_NAMED else ""
+        yield Finding(
+            "limits_not_met",
+            f"seen {', '.join(told.values())} can be, of what is in sight, only: "
+            f"{', '.join(short[:MOST_NAMED])}{more}; lower --grid or --d-sec, or ask for less",
+        )
