@@ -80,7 +80,7 @@ class Window:
 
 
 @dataclass(frozen=True)
-class Asked(Generic[P, T]):
+class SentPiece(Generic[P, T]):
     """A piece, and what it was answered with or what went wrong."""
 
     number: int
@@ -102,9 +102,9 @@ def windowed(pieces: Iterable[P], ask: Callable[[P], T], window: Window) -> Iter
 
     What it raises is raised here; what else is under way is then let go.
     """
-    done: queue.SimpleQueue[Asked[P, T]] = queue.SimpleQueue()
+    done: queue.SimpleQueue[SentPiece[P, T]] = queue.SimpleQueue()
     waiting = enumerate(pieces)
-    ahead: dict[int, Asked[P, T]] = {}
+    ahead: dict[int, SentPiece[P, T]] = {}
     under_way = told = 0
     while True:
         for number, piece in islice(waiting, max(0, window.size - under_way)):
@@ -122,7 +122,7 @@ def windowed(pieces: Iterable[P], ask: Callable[[P], T], window: Window) -> Iter
             told += 1
 
 
-def _ask(number: int, piece: P, ask: Callable[[P], T], done: queue.SimpleQueue[Asked[P, T]]) -> None:
+def _ask(number: int, piece: P, ask: Callable[[P], T], done: queue.SimpleQueue[SentPiece[P, T]]) -> None:
     began = time.monotonic()
     answer, error = None, None
     try:
@@ -130,4 +130,4 @@ def _ask(number: int, piece: P, ask: Callable[[P], T], done: queue.SimpleQueue[A
     except BaseException as raised:  # noqa: BLE001 (the end of a thread; raised again where it is waited for)
         error = raised
     at_s = time.monotonic()
-    done.put(Asked(number, piece, answer, error, at_s - began, at_s))
+    done.put(SentPiece(number, piece, answer, error, at_s - began, at_s))

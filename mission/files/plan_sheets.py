@@ -268,8 +268,13 @@ def rooms_of(mission: Mission, floor: FloorPlan) -> list[str]:
     names = [""] * len(xy)
     for room in floor.rooms:
         rings = [ring for part in room.polygons for ring in part.rings]
-        for number in np.flatnonzero(inside(xy, rings)) if rings else ():
-            names[number] = names[number] or room.label
+        corners = np.concatenate([*rings, np.empty((0, 2))])
+        if not len(corners):
+            continue
+        near = ((xy >= corners.min(axis=0)) & (xy <= corners.max(axis=0))).all(axis=1)
+        for number in np.flatnonzero(near).tolist():
+            within = inside(xy[number, :1], xy[number, 1:], rings)[0, 0]
+            names[number] = names[number] or (room.label if within else "")
     return names
 
 

@@ -47,7 +47,7 @@ def paint_coverage(canvas: Canvas, selection: Selection) -> None:
 
 
 def step_of_units(selection: Selection) -> IntArray:
-    """The choice, from 1, with which each unit is seen; choices + 1 if with none, -1 if no candidate sees it."""
+    """The choice, from 1, with which each unit is seen; choices + 1 if with none, -1 if none can see it."""
     visibility = selection.visibility
     never = len(selection.chosen) + 1
     first = np.where(visibility.visible, never, -1)
