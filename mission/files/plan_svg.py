@@ -10,7 +10,7 @@ from mission.document import Mission
 from mission.figures import Figures
 from mission.files import plan_panel as panel
 from mission.files.floor_drawing import building, targets
-from mission.files.room_labels import Busy, points_along, room_labels
+from mission.files.room_labels import STOPS, WALLS, WAY, Busy, points_along, room_labels
 from mission.files.route_drawing import STOP, rings, route, stops
 from mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit
 from mission.files.svg import FONT, attributes, clean, group, number, rect
@@ -92,9 +92,9 @@ def _busy(mission: Mission, floor: FloorPlan, sheet: PaperSheet) -> Busy:
     closed = [np.concatenate([ring, ring[:1]]) for ring in solids]
     lines = [line for item in floor.elements for line in item.lines]
     return Busy.of(
-        (6.0, discs),
-        (1.0, list(points_along([sheet.on_paper(leg) for leg in _legs(mission)], spacing=1.0))),
-        (0.7, list(points_along([sheet.on_paper(line) for line in (*closed, *lines)], spacing=1.5))),
+        (STOPS, discs),
+        (WAY, list(points_along([sheet.on_paper(leg) for leg in _legs(mission)], spacing=1.0))),
+        (WALLS, list(points_along([sheet.on_paper(line) for line in (*closed, *lines)], spacing=1.5))),
     )
 
 

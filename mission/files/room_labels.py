@@ -20,6 +20,8 @@ LEAST = 9.0
 """Millimetres that a name may take even in a narrower room."""
 AROUND = 0.4
 """Millimetres kept free round a label."""
+STOPS, WAY, WALLS = 6.0, 1.0, 0.7
+"""Cost of each point of a stop, of the route (which a label may cross) and of an element."""
 OUTSIDE = 6.0
 """Cost of each of nine points of a label that lies outside its room."""
 LABEL = 2.0
@@ -45,6 +47,10 @@ class Busy:
     def and_also(self, weight: float, points: FloatArray) -> Busy:
         weights = np.full(len(points), weight)
         return Busy(np.concatenate([self.xy, points]), np.concatenate([self.weight, weights]))
+
+    def of_weight(self, weight: float) -> Busy:
+        there = self.weight == weight
+        return Busy(self.xy[there], self.weight[there])
 
     def near(self, low: FloatArray, high: FloatArray) -> Busy:
         """Those between two corners, in their order."""
@@ -73,6 +79,8 @@ class Label:
     half: FloatArray
     """Half its width and height."""
     cost: float
+    crosses: bool
+    """A wall, a stop or another label."""
 
     @property
     def points(self) -> FloatArray:
@@ -82,31 +90,52 @@ class Label:
 
 
 def room_labels(rooms: tuple[Room, ...], sheet: PaperSheet, *, avoid: Busy) -> str:
-    """Name and area of each room, off `avoid` and each other where the room is large enough."""
+    """Name and area of each room, off `avoid` and each other.
+
+    Where there is no room for both the name stands alone, then its first word; a room that has no place even
+    for that has no label here.
+    """
     labels: list[Label] = []
     written = np.empty((0, 2))
     # The smallest rooms first: they have the least choice.
     for room in sorted((room for room in rooms if room.polygons), key=lambda room: room.area):
-        labels.append(_label(room, sheet, avoid, written))
-        written = np.concatenate([written, labels[-1].points])
+        label = _label(room, sheet, avoid, written)
+        if label is not None:
+            labels.append(label)
+            written = np.concatenate([written, label.points])
     style: dict[str, object] = {"paint_order": "stroke", "stroke": "#ffffff", "stroke_width": 0.5}
     drawn = ("".join(_lines(label)) for label in labels)
     return group("names", drawn, text_anchor="middle", fill="#222222", stroke_linejoin="round", **style)
 
 
-def _label(room: Room, sheet: PaperSheet, avoid: Busy, written: FloatArray) -> Label:
-    """On one line or two, whichever covers less; other labels are at the points `written` (n, 2)."""
+def _label(room: Room, sheet: PaperSheet, avoid: Busy, written: FloatArray) -> Label | None:
+    """The fullest that crosses no wall and no other label; they are at the points `written` (n, 2)."""
     rings = [sheet.on_paper(ring) for part in room.polygons for ring in part.rings]
-    widest = max(float(np.ptp(np.concatenate(rings)[:, 0])) - 1.0, LEAST)
-    layouts = (wrapped(room.label, width=widest), wrapped(room.label, width=0.0, cut=widest))
-    labels = []
-    for names in layouts:
-        lines = [(name, NAME) for name in names] + [(f"{room.area:.1f} m²", AREA)]
-        size = (max(text_width(*item) for item in lines), sum(size + 0.4 for _, size in lines))
-        half = np.array(size) / 2
-        cost, centre = _best_place(rings, half, avoid, written)
-        labels.append(Label(lines, centre, half, cost))
-    return min(labels, key=lambda label: label.cost)
+    for layouts in _layouts(room, max(float(np.ptp(np.concatenate(rings)[:, 0])) - 1.0, LEAST)):
+        placed = (_placed(lines, rings, avoid, written) for lines in layouts)
+        clear = [label for label in placed if not label.crosses]
+        if clear:
+            return min(clear, key=lambda label: label.cost)
+    return None
+
+
+def _layouts(room: Room, widest: float) -> Iterator[list[list[tuple[str, float]]]]:
+    """What a label may say, the fullest first: on one line or two, with and without the area."""
+    area = (f"{room.area:.1f} m²", AREA)
+    names = [wrapped(room.label, width=widest), wrapped(room.label, width=0.0, cut=widest)]
+    on_lines = [[(name, NAME) for name in halves] for halves in names]
+    yield [[*lines, area] for lines in on_lines]
+    yield on_lines
+    yield [[(room.label.partition(" ")[0], NAME)]]
+
+
+def _placed(
+    lines: list[tuple[str, float]], rings: list[FloatArray], avoid: Busy, written: FloatArray
+) -> Label:
+    size = (max(text_width(*item) for item in lines), sum(size + 0.4 for _, size in lines))
+    half = np.array(size) / 2
+    cost, crossed, centre = _best_place(rings, half, avoid, written)
+    return Label(lines, centre, half, cost, crossed > 0)
 
 
 def wrapped(name: str, *, width: float, cut: float | None = None) -> list[str]:
@@ -128,8 +157,11 @@ def _lines(label: Label) -> Iterator[str]:
 
 def _best_place(
     rings: list[FloatArray], half: FloatArray, avoid: Busy, written: FloatArray
-) -> tuple[float, FloatArray]:
-    """Cost and centre of the label: inside the room with its corners, off all else, near the middle."""
+) -> tuple[float, float, FloatArray]:
+    """Cost of a label, how much of it is for what it may not cross, and its centre.
+
+    It is inside the room with its corners, off all else, and near the middle.
+    """
     corners = np.concatenate(rings)
     low, high = corners.min(axis=0), corners.max(axis=0)
     x, y = np.linspace(low, high, _TRIES).T
@@ -137,10 +169,13 @@ def _best_place(
     (wx, wy), (left, bottom), (right, top) = written.T, low - half, high + half
     close = written[(wx > left) & (wx < right) & (wy > bottom) & (wy < top)]
     busy = avoid.near(low - half, high + half).and_also(LABEL, close)
-    cost = _covered(x, y, half + AROUND, busy) + OUTSIDE * _outside(x, y, half, rings)
+    outside = OUTSIDE * _outside(x, y, half, rings)
+    cost = _covered(x, y, half + AROUND, busy) + outside
     far = np.hypot(*((tried - (low + high) / 2) / (high - low + 1e-9)).T)
     order = np.lexsort((np.arange(len(tried)), np.round(far, 6), cost))
-    return float(cost[order[0]]), np.asarray(tried[order[0]])
+    best = order[0]
+    on_way = _covered(x, y, half + AROUND, busy.of_weight(WAY))
+    return float(cost[best]), float(cost[best] - on_way[best]), np.asarray(tried[best])
 
 
 def _covered(x: FloatArray, y: FloatArray, half: FloatArray, avoid: Busy) -> FloatArray:

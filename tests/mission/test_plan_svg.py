@@ -16,11 +16,13 @@ from hypothesis import strategies as st
 from mission.errors import InputError
 from mission.files.plan_panel import coordinate_ticks
 from mission.files.plan_svg import plan_svg
-from mission.files.room_labels import inside, wrapped
+from mission.files.room_labels import Busy, inside, room_labels, wrapped
 from mission.files.sheet import MARGIN, PAPERS, PaperBox, PaperSheet, SheetContents, fit
 from mission.files.svg import SMALLEST_TEXT, shortened, text_width
+from mission.floor import Room
+from mission.geometry import Polygon
 from mission.planning import Route
-from tests.mission.worlds import mission_of, room_mission, room_route, stop
+from tests.mission.worlds import box, mission_of, room_mission, room_route, stop
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -217,3 +219,34 @@ def test_a_long_room_name_is_broken_where_its_halves_are_alike() -> None:
 def test_shortened_text_is_never_wider(content: str, width: float) -> None:
     short = shortened(content, size=2.0, width=width)
     assert text_width(short, 2.0) <= width or len(short) <= 2
+
+
+@pytest.mark.parametrize("wide", [0.4, 1.2, 2.0, 4.0, 9.0])
+def test_room_names_cross_no_wall_and_no_other_name(wide: float) -> None:
+    """Where the whole name has no place its first word has; where that has none the room has no name."""
+    sheet = PaperSheet(
+        *("A0", 1189.0, 841.0, 200, PaperBox(10.0, 10.0, 1000.0, 800.0), NOWHERE, NOWHERE, ()), (0.0, 0.0)
+    )
+    corners = [(n * wide, m * 3.0) for n in range(6) for m in range(2)]
+    rooms = tuple(
+        Room(f"R{k}", f"{k} Meeting and conference", (Polygon.of(box(x, y, x + wide, y + 3.0)),))
+        for k, (x, y) in enumerate(corners, 101)
+    )
+    avoid = Busy(np.empty((0, 2)), np.empty(0))
+    root = ET.fromstring(f"<g>{room_labels(rooms, sheet, avoid=avoid)}</g>")
+    rings = [sheet.on_paper(room.polygons[0].exterior) for room in rooms]
+    for item in root.iter("text"):
+        x, size = float(item.get("x", "")), float(item.get("font-size", ""))
+        half = text_width(item.text or "", size) / 2
+        y = float(item.get("y", ""))
+        within = [
+            bool(inside(np.array([x - half, x + half]), np.array([y - 0.8 * size, y]), [ring]).all())
+            for ring in rings
+        ]
+        assert sum(within) == 1, item.text
+    said = {word for item in root.iter("text") for word in (item.text or "").split()}
+    assert any(word.startswith("101") for word in said) == (wide > 1.0)
+    assert ("m²" in said) == (wide > 1.5)
+
+
+NOWHERE = PaperBox(0.0, 0.0, 0.0, 0.0)
