@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 RobotName = Annotated[str, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
 AnyRobot = Annotated[str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
 Connect = Annotated[
-    str, typer.Option("--connect", metavar="ENDPOINT", help="Where it listens, such as tcp/127.0.0.1:7447.")
+    str,
+    typer.Option(
+        "--connect", metavar="ENDPOINT", help="Where it listens, as tcp/127.0.0.1:7447; several: A,B."
+    ),
 ]
 SiteName = Annotated[str | None, typer.Option("--site", metavar="NAME", help="Prefix of the site's keys.")]
 As = Annotated[

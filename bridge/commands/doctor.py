@@ -82,7 +82,7 @@ def doctor(
         checks += _checked("keys", lambda: _keys(told["keys"]))
     if told["robot"] is not None:
         connection = connection_of(given, **told, timeout=timeout, insecure=insecure)
-        checks += [*_port(connection.endpoint), *_checked("robot", lambda: _asked(connection))]
+        checks += [*_ports(connection.endpoint), *_checked("robot", lambda: _asked(connection))]
     else:
         checks += _checked("port", lambda: _unasked(told, insecure=insecure))
     say_checks(checks, as_json=json_)
@@ -102,11 +102,13 @@ def _unasked(told: dict[str, Any], *, insecure: bool) -> Iterator[Check]:
         yield Check("port", True, f"{read_url(told['mavlink'])} is a MAVLink URL; nobody was asked there")
     elif told["connect"] != DEFAULT_ENDPOINT:
         from bridge.link.keys import now_utc, read_keys
+        from bridge.link.link import endpoints_in
         from bridge.link.zenoh_link import Guard, check_endpoint
 
         held = None if told["keys"] is None else read_keys(told["keys"], now=now_utc())
-        check_endpoint(told["connect"], Guard(held, insecure), option="--connect")
-        yield from _port(told["connect"])
+        for endpoint in endpoints_in(told["connect"]):
+            check_endpoint(endpoint, Guard(held, insecure), option="--connect")
+        yield from _ports(told["connect"])
 
 
 def say_checks(checks: list[Check], *, as_json: bool) -> None:
@@ -182,6 +184,13 @@ def _keys(folder: Path) -> Iterator[Check]:
     days = (holder.not_after - now).days
     told = f"{folder}: of {holder.role} {holder.name}, valid for {days} more days"
     yield Check("keys", True, told, "issue new ones soon" if days < 14 else "")
+
+
+def _ports(endpoints: str) -> Iterator[Check]:
+    from bridge.link.link import endpoints_in
+
+    for endpoint in endpoints_in(endpoints):
+        yield from _port(endpoint)
 
 
 def _port(endpoint: str) -> Iterator[Check]:

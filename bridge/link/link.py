@@ -82,6 +82,11 @@ class Link(Protocol):
     def close(self) -> None: ...
 
 
+def endpoints_in(text: str) -> list[str]:
+    """Where to connect to, as it is typed: endpoints with commas between them."""
+    return text.split(",")
+
+
 def matches(pattern: str, key: str) -> bool:
     """Whether a key expression with `*` (one part) and a last `**` (any number) includes `key`."""
     wanted, parts = pattern.split("/"), key.split("/")

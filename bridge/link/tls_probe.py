@@ -6,25 +6,49 @@ import socket
 import ssl
 
 from bridge.link.keys import HeldKeys
+from bridge.link.link import endpoints_in
 
 PROBE_S = 2.0
 ALERT_S = 0.5
 """How long a server may take to refuse the certificate that it was shown."""
 
 
-def why_no_link(endpoint: str, keys: HeldKeys | None) -> str:
-    """What is wrong with the line to `endpoint`, as `tls/10.1.2.3:7447`; empty if nothing is to be seen."""
+def why_no_link(endpoints: str, keys: HeldKeys | None) -> str:
+    """What is wrong with the line to `tls/10.1.2.3:7447`, or several; empty if nothing is to be seen."""
+    found = [(endpoint, _why(endpoint, keys)) for endpoint in endpoints_in(endpoints)]
+    if len(found) == 1:
+        return found[0][1]
+    return ", ".join(f"{endpoint}: {why}" for endpoint, why in found if why)
+
+
+def _why(endpoint: str, keys: HeldKeys | None) -> str:
     protocol, _, rest = endpoint.partition("/")
     host, _, port = rest.partition("?")[0].partition("#")[0].rpartition(":")
     if protocol not in ("tcp", "tls"):
         return ""
     try:
         with socket.create_connection((host.strip("[]"), int(port)), timeout=PROBE_S) as line:
-            return "" if keys is None else _handshake(line, host.strip("[]"), keys)
+            if keys is None:
+                return f"it speaks TLS: write tls/{host}:{port}, and --keys DIR" if _speaks_tls(line) else ""
+            return _handshake(line, host.strip("[]"), keys)
     except ConnectionRefusedError:
         return "nothing listens there"
     except OSError as error:
         return f"it cannot be reached ({error.strerror or error})"
+
+
+def _speaks_tls(line: socket.socket) -> bool:
+    """Whether the other end answers a greeting of TLS in kind, which nobody else does."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    line.settimeout(ALERT_S)
+    try:
+        with context.wrap_socket(line):
+            return True
+    except ssl.SSLError as error:
+        return "ALERT" in (error.reason or "")
+    except OSError:
+        return False
 
 
 def _handshake(line: socket.socket, host: str, keys: HeldKeys) -> str:

@@ -11,6 +11,7 @@ import ipaddress
 import json
 import re
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,13 +22,16 @@ from typing import Any
 import zenoh
 
 from bridge.link.keys import HeldKeys, now_utc
-from bridge.link.link import Answering, Hearing, Presence, Publish, Request, Unanswered
+from bridge.link.link import Answering, Hearing, Presence, Publish, Request, Unanswered, endpoints_in
 from bridge.link.seals import NO_SEALS, KeySeals, Seals
 from mission.errors import InputError
 
 LEASE_MS = 2000
 OPEN_S = 5.0
 LEAST_OPEN_S = 0.5
+ALL_LINKED_S = 1.0
+"""How long a station with several endpoints waits for all of them."""
+LOOK_S = 0.02
 BATCH_BYTES = 8192
 """Of what zenoh sends in one piece: one that takes longer than the lease to arrive closes the link."""
 SEND_BUFFER_BYTES = 32 * 1024
@@ -107,16 +111,22 @@ def joining(endpoint: str, guard: Guard = UNGUARDED) -> Iterator[ZenohLink]:
 def connecting(endpoint: str, guard: Guard = UNGUARDED, *, open_s: float = OPEN_S) -> Iterator[ZenohLink]:
     """A station's link to `endpoint`; returned at once, it connects, again and again, in the background.
 
-    Each attempt takes at most `open_s`; closing waits for the one under way.
+    Each attempt takes at most `open_s`; closing waits for the one under way. There may be several endpoints,
+    with commas between them: whoever listens there has a moment to be linked first, so that two of one name
+    are both heard.
     """
-    check_endpoint(endpoint, guard, option="--connect")
+    endpoints = endpoints_in(endpoint)
+    for one in endpoints:
+        check_endpoint(one, guard, option="--connect")
     opening = {"transport/unicast/open_timeout": round(max(LEAST_OPEN_S, open_s) * 1e3)}
-    with _opened({"mode": "peer", **_reaching(endpoint), **opening}, endpoint, guard) as link:
+    with _opened({"mode": "peer", **_reaching(*endpoints), **opening}, endpoint, guard) as link:
+        if len(endpoints) > 1:
+            link.await_others(len(endpoints), ALL_LINKED_S)
         yield link
 
 
-def _reaching(endpoint: str) -> dict[str, Any]:
-    return {"connect/endpoints": [endpoint], "listen/endpoints": [], "connect/retry": RETRY,
+def _reaching(*endpoints: str) -> dict[str, Any]:
+    return {"connect/endpoints": list(endpoints), "listen/endpoints": [], "connect/retry": RETRY,
             "connect/exit_on_failure": False}  # fmt: skip
 
 
@@ -187,6 +197,13 @@ class ZenohLink:
     @property
     def distrusted(self) -> str:
         return self._seals.distrusted
+
+    def await_others(self, count: int, within_s: float) -> None:
+        """Wait until so many others are linked, or until the time is up."""
+        deadline = time.monotonic() + within_s
+        info = self._session.info
+        while len([*info.routers_zid(), *info.peers_zid()]) < count and time.monotonic() < deadline:
+            time.sleep(LOOK_S)
 
     def fall_silent(self) -> None:
         """Be gone for the others, while the session stays open."""
@@ -304,7 +321,8 @@ def check_endpoint(endpoint: str, guard: Guard, *, option: str) -> None:
     protocol, _, rest = endpoint.partition("/")
     address = rest.partition("?")[0].partition("#")[0]
     host, _, port = address.rpartition(":")
-    if protocol not in (*OPEN, *ENCRYPTED) or not host or not re.fullmatch("[0-9]+", port):
+    known = protocol in (*OPEN, *ENCRYPTED) and "," not in endpoint
+    if not known or not host or not re.fullmatch("[0-9]+", port):
         raise InputError(f"{option} {endpoint}: not an endpoint; write it like tcp/127.0.0.1:7447")
     if not 1 <= int(port) <= 65535:
         raise InputError(f"{option} {endpoint}: {port} is no port (1 to 65535)")

@@ -17,7 +17,7 @@ from bridge.link.access import router_access_control
 from bridge.link.authority import init_site, issue, listed, revoke, rotate
 from bridge.link.keys import Certificates, Holder, KeyFiles, Untrusted, common_name, now_utc, read_keys
 from bridge.link.protocol import KeyExpressions
-from bridge.link.zenoh_link import Guard, connecting, joining
+from bridge.link.zenoh_link import Guard, connecting, joining, listening
 from bridge.station.station import connect
 from mission.__main__ import main
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
@@ -224,6 +224,13 @@ def test_a_wrong_authority_and_a_wrong_address_are_told_from_a_robot_that_is_off
             unreached = connect(where, robot="r1", keys=keys, timeout_s=0.5)
             with pytest.raises(RobotUnreachable, match=why), unreached:
                 pass
+        plain = connect(f"tcp/127.0.0.1:{port}", robot="r1", timeout_s=0.5)
+        with pytest.raises(RobotUnreachable, match=rf"it speaks TLS: write tls/127\.0\.0\.1:{port}"), plain:
+            pass
+    with listening(f"tcp/127.0.0.1:{port}"):
+        unreached = connect(f"tcp/127.0.0.1:{port}", robot="r1", timeout_s=0.5)
+        with pytest.raises(RobotUnreachable, match="is it running, under this name"), unreached:
+            pass
     rotate(site, "r1", now=now_utc(), addresses=("127.0.0.2",))
     reached = connect(there, robot="r1", keys=site / "alice")
     with robot_with(site, tmp_path, listen), reached as station:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from bridge.link.clock import SimulatedClock
 from bridge.link.protocol import Booted, KeyExpressions, encode
+from bridge.link.zenoh_link import listening
 from bridge.robot import program
 from bridge.robot.agent import Agent
 from bridge.robot.program import check_name_is_free
-from bridge.station.station import Station
+from bridge.station.station import Station, connect
 from mission.errors import AnswerIsNo
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import Field, corridor
+from tests.ports import free_port
 
 
 def twins() -> tuple[Field, Field]:
@@ -91,3 +94,25 @@ def test_a_name_that_is_alive_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     field.link.announce(field.keys.alive)
     with pytest.raises(AnswerIsNo, match=r"r1: is alive behind the router already .* another --name"):
         check_name_is_free(link, KeyExpressions("r1"), "the router")
+
+
+def test_two_that_listen_apart_are_found_by_a_station_linked_to_both() -> None:
+    """Without a router between them neither can find the other."""
+    endpoints = [f"tcp/127.0.0.1:{free_port()}" for _ in range(2)]
+    fields = [Field(), Field()]
+    with ExitStack() as stack:
+        for endpoint, field in zip(endpoints, fields, strict=True):
+            field.station().push(corridor())
+            assert field.order("start").outcome == "ok"
+            link = stack.enter_context(listening(endpoint))
+            Agent(
+                keys=field.keys, link=link, journal=field.journal, runner=field.controller, clock=field.clock,
+                command_clock=field.clock,
+            ).serve()  # fmt: skip
+            link.announce(field.keys.alive)
+        with (
+            connect(",".join(endpoints), robot="r1") as station,
+            pytest.raises(AnswerIsNo, match=r"two robots answer to the name r1 .* both were told to pause"),
+        ):
+            station.status()
+    assert [field.controller.run.state for field in fields] == ["PAUSED", "PAUSED"]
