@@ -23,7 +23,7 @@ def test_a_plan_in_json(plan: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["review", str(plan), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["recording_id"] == told["mission_id"] == world.MISSION_ID
-    assert (told["plan"]["candidates"], told["plan"]["stops"], told["plan"]["route_m"]) == (5, 2, 2.2)
+    assert (told["plan"]["candidates"], told["plan"]["stops"], told["plan"]["route_m"]) == (4, 2, 2.2)
     assert told["runs"] == []
 
 
