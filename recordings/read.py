@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import warnings
 from collections import Counter
 from collections.abc import Iterator
@@ -73,19 +71,6 @@ def check(path: Path) -> Contents:
     )
 
 
-def check_apart(path: Path) -> Contents:
-    """`check` for files of unknown history: on some damage Rerun ends the process that reads it.
-
-    So another process reads the file first.
-    """
-    _must_look_like_one(path)
-    script = "import sys, pathlib, recordings.read as r; r.check(pathlib.Path(sys.argv[1]))"
-    reader = subprocess.run([sys.executable, "-c", script, str(path)], capture_output=True, check=False)
-    if reader.returncode < 0:
-        raise InputError(f"{path}: damaged (reading it ended with signal {-reader.returncode})")
-    return check(path)
-
-
 def chunks(path: Path, reader: RrdReader | None = None) -> Iterator[Chunk]:
     """Every chunk of the recording, to the end; damage is found only when its chunk is read."""
     reader = reader or _open(path)[0]
@@ -136,6 +121,15 @@ def _open(path: Path) -> tuple[RrdReader, list[StoreEntry]]:
             return reader, reader.recordings()
     except (RuntimeError, ValueError) as error:
         raise InputError(f"{path}: {_fault(path, error)}") from None
+
+
+def looks_like_one(path: Path) -> bool:
+    """Whether a file begins as a recording does."""
+    try:
+        _must_look_like_one(path)
+    except InputError:
+        return False
+    return True
 
 
 def _must_look_like_one(path: Path) -> None:

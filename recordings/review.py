@@ -16,7 +16,7 @@ from mission.errors import InputError
 from mission.sight import Sight
 from recordings import entities
 from recordings.carried.checking import problems_of
-from recordings.carried.reading import Recording, read_recording
+from recordings.carried.reading import Recording, read_each
 
 SUFFIX = ".rrd"
 
@@ -94,11 +94,11 @@ def review(paths: Iterable[Path]) -> Review:
     """Read recordings, and folders of recordings, to their ends."""
     read: list[Recording] = []
     faults: list[str] = []
-    for path in files_in(paths):
-        try:
-            read.append(read_recording(path))
-        except InputError as error:
-            faults.append(str(error))
+    for _, found in read_each(list(files_in(paths))):
+        if isinstance(found, InputError):
+            faults.append(str(found))
+        else:
+            read.append(found)
     return reviewed(read, faults)
 
 

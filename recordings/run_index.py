@@ -155,16 +155,17 @@ def _read(folder: Path, stale: dict[str, Stamp], kept: dict[str, IndexedFile]) -
 
 def _opened(folder: Path, names: Iterable[str]) -> tuple[dict[str, Recording], dict[str, str]]:
     """Recordings by name without their pictures, and why others cannot be read."""
-    from recordings.carried.reading import read_recording
+    from recordings.carried.reading import read_each
     from recordings.carried.values import Values
 
     read: dict[str, Recording] = {}
     faults: dict[str, str] = {}
-    for name in names:
-        try:
-            read[name] = replace(read_recording(folder / name), values=Values())
-        except InputError as error:
-            faults[name] = str(error)
+    wanted = list(names)
+    for name, (_, found) in zip(wanted, read_each([folder / name for name in wanted]), strict=True):
+        if isinstance(found, InputError):
+            faults[name] = str(found)
+        else:
+            read[name] = replace(found, values=Values())
     return read, faults
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +15,8 @@ from recordings.carried.missions import missions_in
 from recordings.carried.run_logs import logs_in
 from recordings.carried.sight import sights_in
 from recordings.carried.values import Values
-from recordings.read import Contents, check_apart, chunks
+from recordings.read import Contents, check, chunks
+from recordings.read_apart import fatal_faults
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,24 @@ def read_recording(path: Path) -> Recording:
     InputError
         When the file cannot be read, was not written by stopgo, or holds what contradicts itself.
     """
-    contents = check_apart(path)
+    ((_, found),) = read_each([path])
+    if isinstance(found, InputError):
+        raise found
+    return found
+
+
+def read_each(paths: Sequence[Path]) -> Iterator[tuple[Path, Recording | InputError]]:
+    """Each of several, or why it cannot be read; no file hides another, whatever its damage."""
+    fatal = fatal_faults(paths)
+    for path in paths:
+        try:
+            yield path, InputError(fatal[path]) if path in fatal else _read(path)
+        except InputError as error:
+            yield path, error
+
+
+def _read(path: Path) -> Recording:
+    contents = check(path)
     if contents.application != entities.APPLICATION:
         raise InputError(f"{path}: is a recording of {contents.application}, not of {entities.APPLICATION}")
     values = Values()

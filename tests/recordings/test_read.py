@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import signal
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -10,7 +10,8 @@ import pytest
 import rerun as rr
 
 from mission.errors import InputError
-from recordings.carried.reading import read_recording
+from recordings import read_apart
+from recordings.carried.reading import read_each, read_recording
 from recordings.read import check
 
 BROKEN = {
@@ -44,13 +45,32 @@ def test_a_damaged_byte_never_ends_the_process(plan: Path, tmp_path: Path, place
         assert "\n" not in str(refused)
 
 
-def test_a_reader_that_ends_by_a_signal_is_a_damaged_file(
-    plan: Path, monkeypatch: pytest.MonkeyPatch
+ENDING = """
+import json, os, sys
+for number, path in enumerate(json.load(sys.stdin)[1]):
+    print(number, flush=True)
+    if "fatal" in path:
+        os.abort()
+"""
+
+
+def test_a_file_that_ends_its_reader_hides_no_other(
+    plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    killed = subprocess.CompletedProcess([], returncode=-signal.SIGABRT)
-    monkeypatch.setattr(subprocess, "run", lambda *_, **__: killed)
-    with pytest.raises(InputError, match="ended with signal 6"):
-        read_recording(plan)
+    """One process reads them all; behind each that ends it, another one goes on."""
+    started = []
+    run = subprocess.run
+    monkeypatch.setattr(subprocess, "run", lambda *a, **k: started.append(a) or run(*a, **k))
+    monkeypatch.setattr(read_apart, "CHILD", ENDING)
+    names = ("a.rrd", "fatal-1.rrd", "b.rrd", "fatal-2.rrd", "c.rrd")
+    for name in names:
+        shutil.copy(plan, tmp_path / name)
+    (tmp_path / "junk.rrd").write_bytes(b"hello")
+    found = {path.name: item for path, item in read_each([tmp_path / name for name in (*names, "junk.rrd")])}
+    refused = {name: str(item) for name, item in found.items() if isinstance(item, InputError)}
+    assert sorted(refused) == ["fatal-1.rrd", "fatal-2.rrd", "junk.rrd"]
+    assert refused["fatal-2.rrd"].endswith("fatal-2.rrd: damaged (reading it ended with signal 6)")
+    assert len(started) == 3
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
