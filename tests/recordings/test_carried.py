@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,6 +74,16 @@ def test_what_stops_see_comes_back_whole(tmp_path: Path) -> None:
     assert back.planned == sight.planned
     assert back.shares(["S1"]) == sight.shares(["S1"])
     assert np.array_equal(back.targets.unit_xy, sight.targets.unit_xy)
+
+
+def test_how_many_views_are_asked_for_travels(tmp_path: Path) -> None:
+    _, sight = planned()
+    asked = np.ones(len(sight.ledger.weight), dtype=np.int64)
+    asked[::2] = 2
+    twice = replace(sight, ledger=replace(sight.ledger, asked=asked))
+    (back,) = sights_in(carried(twice, tmp_path / "sight.rrd"), "sight.rrd")
+    assert np.array_equal(back.ledger.asked, asked)
+    assert back.planned == twice.planned != sight.planned
 
 
 def test_sight_that_does_not_fit_is_told(tmp_path: Path) -> None:

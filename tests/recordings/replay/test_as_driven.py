@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import UNSET, UnsetType
 
 from mission.__main__ import main
 from mission.errors import InputError
-from mission.files.mission_json import read
+from mission.files.mission_json import read, write
 from mission.geometry import Polygon
 from planner.further import PlannedFloor, as_driven, planned_floor, top_up
 from tests.planner.test_command import drawn
@@ -93,6 +94,28 @@ def test_the_command_tells_coverage_and_writes_the_top_up(
     assert whole["as_driven"] == pytest.approx(seen.coverage, abs=0.005)
     assert whole["planned"] > whole["as_driven"]
     assert main(["check", str(folder / "next.json"), "--floor", str(folder / "floor.dxf")]) == 0
+
+
+def test_limits_on_views_hold_as_driven_and_for_the_top_up(tmp_path: Path) -> None:
+    """Each wall is to be seen from two stops: left by one, what only one other sees counts no more."""
+    limits = ["--views", "2", "--max-incidence", "65", "--near", "0.9"]
+    floor = drawn(tmp_path / "floor.dxf")
+    assert main(["plan", str(floor), "-o", str(tmp_path), *PLAN, *limits]) == 0
+    planned = planned_floor(floor, read(tmp_path / "mission.json"))
+    whole = as_driven(planned, places(planned))
+    assert whole.enough
+    assert (whole.driven == whole.planned).all()
+    left = places(planned, 1)
+    seen = as_driven(planned, left)
+    assert not seen.enough
+    further = top_up(planned, left)
+    assert further is not None
+    assert not isinstance(further.limits, UnsetType)
+    assert (further.limits.near, further.limits.views) == (0.9, UNSET)
+    more = np.array([(stop.x, stop.y, stop.heading) for stop in further.stops])
+    assert as_driven(planned, np.concatenate([left, more])).enough
+    write(further, tmp_path / "next.json")
+    assert main(["check", str(tmp_path / "next.json"), "--floor", str(floor)]) == 0
 
 
 def test_a_floor_of_another_mission_is_refused(
