@@ -76,6 +76,13 @@ class LimitCost:
     bound: int
     """Without this one there are never fewer."""
 
+    @property
+    def told(self) -> str:
+        """What it costs, in words."""
+        more = self.stops - self.without
+        cost = "costs no stop" if more <= 0 else f"costs about {more} stop{'s' * (more > 1)}"
+        return f"{cost} (about {self.without} without, at least {self.bound})"
+
 
 @dataclass(frozen=True)
 class Quality:
@@ -86,6 +93,11 @@ class Quality:
     """Of the targets, in the plan's unit, what some candidate has in sight at all."""
     possible: float
     """Of that, what enough candidates see well enough."""
+
+    def told(self, unit: str) -> str:
+        """What can be seen as asked, in words."""
+        share = percent(self.possible / self.in_sight if self.in_sight else None)
+        return f"{share} of the {self.in_sight:.0f} {unit} in sight can be seen as asked"
 
 
 @dataclass(frozen=True)

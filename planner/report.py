@@ -156,16 +156,8 @@ def quality_lines(figures: Figures) -> list[str]:
     quality = figures.quality
     if quality is None:
         return []
-    share = percent(quality.possible / quality.in_sight if quality.in_sight else None)
-    lines = [
-        f"  seen well   {share} of the {quality.in_sight:.0f} {figures.unit} in sight can be seen as asked"
-    ]
-    for item in quality.costs:
-        more = item.stops - item.without
-        cost = "costs no stop" if more <= 0 else f"costs about {more} stop{'s' * (more > 1)}"
-        told = f"{cost} (about {item.without} without, at least {item.bound})"
-        lines.append(f"    {item.words:<29} {told}")
-    return lines
+    lines = [f"  seen well   {quality.told(figures.unit)}"]
+    return lines + [f"    {item.words:<29} {item.told}" for item in quality.costs]
 
 
 MOST_ROOMS = 12
