@@ -8,8 +8,16 @@ import tempfile
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 
-from tests.faults.sizes import FULL
+from tests.faults.sizes import FULL, size
+
+# The same examples every time, and no deadline on a shared machine.
+settings.register_profile(
+    "tests", deadline=None, derandomize=True, max_examples=size(short=30, full=300), database=None
+)
+settings.register_profile("search", deadline=None, max_examples=20_000)
+settings.load_profile(os.environ.get("STOPGO_HYPOTHESIS", "tests"))
 
 
 def pytest_configure() -> None:

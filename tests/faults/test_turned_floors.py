@@ -13,7 +13,7 @@ from tests.planner.worlds import FLOORS, SHARED
 
 OFFICE = Path(__file__).parents[2] / "recordings" / "samples" / "office.dxf"
 DRAWINGS = {"office": OFFICE, **{Path(name).stem: SHARED / name for name in FLOORS}}
-ANGLES = size(short=4, full=360)
+ANGLES = size(short=2, full=360)
 FEW = size(short=1, full=360)
 """Angles of floors that take as long as all others together."""
 LARGE = {"office-l1"}

@@ -24,11 +24,8 @@ def test_every_view_is_drawn_to_a_file_of_its_own(plan: Path, field: Path, tmp_p
     assert names[:4] == ["Plan-and-run", "3D", "Report", "Plan-report"]
     assert names[-1] == "Log"
     assert len(names) == len(set(names)) == 16
-    colours = [
-        len(np.unique(np.asarray(Image.open(path).convert("RGB")).reshape(-1, 3), axis=0))
-        for path in pictures
-    ]
-    assert min(colours) > 10, "no picture is empty"
+    for path in pictures:
+        assert Image.open(path).convert("RGB").getcolors(10) is None, f"{path} has no more than 10 colours"
     sight = next(path for path in pictures if "What-a-candidate-sees" in path.name)
     pixels = np.asarray(Image.open(sight).convert("RGB")).astype(int)
     off = np.abs(pixels - palette.EYE[:3]).max(axis=2)

@@ -11,6 +11,7 @@ import rerun as rr
 
 from mission.errors import InputError
 from recordings import read_apart
+from recordings.carried import reading
 from recordings.carried.reading import read_each, read_recording
 from recordings.read import check
 
@@ -21,6 +22,11 @@ BROKEN = {
     "cut in the middle": lambda data: data[: len(data) // 2],
     "cut near the end": lambda data: data[:-100],
 }
+
+
+@pytest.fixture(autouse=True)
+def _another_process_reads_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reading, "fatal_faults", read_apart.fatal_faults)
 
 
 @pytest.mark.parametrize("how", BROKEN)

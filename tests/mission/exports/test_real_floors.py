@@ -31,9 +31,9 @@ from tests.mission.exports.test_dxf import opened, stops_in, unchanged
 from tests.mission.exports.worlds import laboratory
 
 LAYERED = Path(__file__).parents[4] / "shared" / "data" / "layered"
-LARGE = () if FULL else ("workshop-2018-11-08", "workshop-2019-10-29")
-"""They take longest; the short form reads one of them, in the tests of the readers."""
-WILD = [path for path in sorted((LAYERED.parent / "dxf").glob("*.dxf")) if path.stem not in LARGE]
+LARGE = ("workshop-2018-11-08", "workshop-2019-10-29", "house", "barcelona-plan", "barcelona-wrong-units")
+"""They take longest; the tests of the readers read one of each building, and another of Barcelona is here."""
+WILD = [path for path in sorted((LAYERED.parent / "dxf").glob("*.dxf")) if FULL or path.stem not in LARGE]
 FLOORS = ("office-l1", "duplex-l1", "fzk-haus-eg")
 
 pytestmark = pytest.mark.skipif(not LAYERED.is_dir(), reason=f"the real inputs are not in {LAYERED}")
@@ -43,7 +43,7 @@ pytestmark = pytest.mark.skipif(not LAYERED.is_dir(), reason=f"the real inputs a
 def planned(name: str) -> tuple[Mission, bytes]:
     """The mission of a floor and its coverage.json, planned once, in the quickest way."""
     floor = read_floor(LAYERED / f"{name}.dxf")
-    settings = Settings(origin=(47.3769, 8.5417, 408.0, 30.0), selector="greedy")
+    settings = Settings(origin=(47.3769, 8.5417, 408.0, 30.0), selector="greedy", d_dis=0.2)
     made = plan(floor, settings)
     return made.mission, coverage_json(made.route, made.mission)
 

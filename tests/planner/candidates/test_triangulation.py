@@ -29,6 +29,7 @@ from planner.candidates.triangulation import (
 )
 from planner.shapes import segments_of
 from planner.space.navigable import navigable
+from tests.faults.sizes import size
 from tests.planner.worlds import (
     SHARED,
     box,
@@ -196,7 +197,7 @@ def test_points_on_a_line_have_no_triangles(points: np.ndarray) -> None:
     assert voronoi_points(points).shape == (0, 2)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=size(short=20, full=60))
 @given(st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30)), min_size=0, max_size=25))
 def test_any_seeds_are_triangulated(points: list[tuple[int, int]]) -> None:
     """Many cocircular and collinear seeds: no crash, and every Voronoi point in the room."""

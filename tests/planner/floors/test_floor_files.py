@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from mission.errors import InputError
 from planner.floors import read_floor
+from tests.faults.sizes import size
 
 
 def small_floor() -> bytes:
@@ -124,7 +125,11 @@ def test_a_file_cut_off_anywhere_is_refused_or_read_with_a_finding(tmp_path: Pat
             assert "recovered" in codes(plan), length
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=size(short=50, full=150),
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(
     at=st.integers(0, len(WHOLE) - 1),
     span=st.integers(0, 40),

@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mission.floor import FloorPlan
+from tests.faults.sizes import size
 
 Step = Callable[[Modelspace], object]
 
@@ -62,7 +63,11 @@ def content(plan: FloorPlan) -> list[object]:
     ]
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=size(short=10, full=25),
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(seed=st.integers(0, 10_000))
 def test_the_order_of_entities_does_not_matter(read: Read, seed: int) -> None:
     first, shuffled = steps(), steps()

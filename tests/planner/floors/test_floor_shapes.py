@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from mission.floor import Element, FloorPlan
 from mission.geometry import FloatArray
 from planner.floors.curves import circle_count
+from tests.faults.sizes import size
 
 
 def only(plan: FloorPlan) -> Element:
@@ -79,7 +80,11 @@ def test_a_bulge_is_an_arc(read: Read) -> None:
     assert wall.solids[0].area == pytest.approx(math.pi, abs=1e-3)
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=size(short=10, full=30),
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(radius=st.floats(0.05, 30.0), start=st.floats(0, 360), sweep=st.floats(10, 300))
 def test_arcs_are_cut_no_farther_than_a_millimetre(
     read: Read, radius: float, start: float, sweep: float
@@ -138,8 +143,8 @@ def test_a_filled_quadrilateral_is_a_solid(read: Read, add: str) -> None:
 
 def test_old_polylines_read_as_new_ones(read: Read) -> None:
     def draw(model: Modelspace) -> None:
-        for layer, size in (("FLOOR", 8), ("WALLS", 2)):
-            corners = [(0, 0), (size, 0), (size, 1), (0, 1)]
+        for layer, long in (("FLOOR", 8), ("WALLS", 2)):
+            corners = [(0, 0), (long, 0), (long, 1), (0, 1)]
             model.add_polyline2d(corners, close=True, dxfattribs={"layer": layer})
 
     plan = read(draw, version="R12", floor=False)

@@ -111,7 +111,7 @@ def test_points_in_rooms_that_are_not_connected_have_no_way() -> None:
 
 def columned(across: int) -> NavigableSpace:
     """A hall with across × across round columns, one every 4 m."""
-    angles = np.arange(40) * (2 * np.pi / 40)
+    angles = np.arange(30) * (2 * np.pi / 30)
     ring = np.c_[np.cos(angles), np.sin(angles)] * 0.3
     places = [(4.0 * i + 2, 4.0 * k + 2) for i in range(across) for k in range(across)]
     columns = [element(f"c{k}", "columns", Polygon.of(ring + xy)) for k, xy in enumerate(places)]

@@ -37,8 +37,8 @@ def any_lengths(n: int, seed: int) -> np.ndarray:
 
 
 def shortest_of_all(cost: np.ndarray) -> int:
-    orders = (np.array((0, *rest)) for rest in permutations(range(1, len(cost))))
-    return min(length_of(cost, order) for order in orders)
+    orders = np.array([(0, *rest) for rest in permutations(range(1, len(cost)))])
+    return int(cost[orders, np.roll(orders, -1, axis=1)].sum(axis=1).min())
 
 
 # ---- the search ----

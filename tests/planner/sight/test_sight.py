@@ -14,6 +14,7 @@ from planner.sight.mesh import containing, mesh_of
 from planner.sight.sight import Runs, Scene, scene_of, sight
 from planner.sight.sightlines import Midpoints
 from planner.space.targets import face_segments, units_on
+from tests.faults.sizes import size
 from tests.planner.oracle import visible_pairs
 
 
@@ -105,7 +106,7 @@ def lattice_world(seed: int) -> World:
 
 @pytest.mark.parametrize("reach", [None, 2.5, 5.0])
 def test_the_kernel_agrees_with_brute_force_on_lattice_floors(reach: float | None) -> None:
-    for seed in range(80):
+    for seed in range(size(short=30, full=80)):
         world = lattice_world(seed)
         wrong = (world.by_kernel(reach) != world.by_force(reach)) & world.comparable()
         assert not wrong.any(), f"seed {seed}: {np.argwhere(wrong)[:3].tolist()} (viewpoint, unit)"
@@ -132,7 +133,7 @@ def point_sight(world: World, reach: float | None) -> np.ndarray:
 
 @pytest.mark.parametrize("reach", [None, 3.0])
 def test_sight_between_free_points_is_symmetric(reach: float | None) -> None:
-    for seed in range(40):
+    for seed in range(size(short=15, full=40)):
         world = lattice_world(2000 + seed)
         seen = point_sight(world, reach)
         assert np.array_equal(seen, seen.T), seed

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from mission.settings import Settings
 from planner.routing.roadmap import ways_between
 from planner.space.gaps import Site
 from planner.space.navigable import navigable
+from tests.faults.sizes import some
 from tests.planner.worlds import (
     box,
     column,
@@ -51,9 +53,11 @@ def state(floor: FloorPlan, settings: Settings | None = None) -> OpeningState:
     return found
 
 
-@pytest.mark.parametrize("degrees", [0.0, 17.0, 30.0, 45.0, 90.0])
-@pytest.mark.parametrize("at", [0.6, 2.0, 3.213])
-@pytest.mark.parametrize("thick", [0.02, 0.1, 0.24, 0.6])
+WALLS = list(product((0.02, 0.1, 0.24, 0.6), (0.6, 2.0, 3.213), (0.0, 17.0, 30.0, 45.0, 90.0)))
+"""How thick a wall is, where its opening is, and how it is turned."""
+
+
+@pytest.mark.parametrize(("thick", "at", "degrees"), some(WALLS, every=4))
 def test_an_opening_as_wide_as_the_robot_is_passed(thick: float, at: float, degrees: float) -> None:
     floor = two_rooms(0.700, thick=thick, at=at)
     assert 5.999 <= way(floor, degrees=degrees) < 9.0
