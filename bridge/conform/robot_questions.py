@@ -8,7 +8,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
-from bridge.conform.requirements import Nonconforming, Requirement, must
+from bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
 from bridge.conform.robot_bench import RobotBench, manifest_of, read
 from bridge.conform.trial_mission import trial_mission
 from bridge.link.protocol import (
@@ -46,6 +46,8 @@ def info_names_the_robot(bench: RobotBench) -> None:
 
 
 def boot_is_the_one_of_info(bench: RobotBench) -> None:
+    if bench.ask_raw(bench.keys.boot) is None:
+        raise NotTried("not answered; a router's rules let nobody but robots ask it: try it without a router")
     booted = bench.ask_for(Booted, bench.keys.boot)
     must(booted.boot_id == bench.info().boot_id, "boot and info tell different boots")
 
