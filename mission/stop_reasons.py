@@ -32,7 +32,7 @@ class RunnerUp:
     x: float
     y: float
     new: float
-    """What it would have seen that no stop saw yet, metres or units."""
+    """What it would have seen that still lacked views, metres or units."""
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,10 @@ class StopReason:
     """Units that it sees, as the mission tells them."""
     sees: float
     new: float
-    """Seen by no stop chosen before it."""
+    """What of it still lacked views when it was chosen: seen by no stop before it, where one is enough."""
     alone_units: int
     alone: float
-    """Seen by no other stop of the plan: what is lost without it."""
+    """Seen from too few other stops of the plan, none where one is enough: what is lost without it."""
     visible: float
     """All that is visible, from any candidate."""
     coverage: float
@@ -79,7 +79,7 @@ class StopReason:
         return (self._seen(), self._offered(), self._lost())
 
     def _seen(self) -> str:
-        new = f"choice {self.step}, when {self.new:.1f} {self.unit} of that were new"
+        new = f"choice {self.step}, when {self.new:.1f} {self.unit} of that were still to be seen"
         reached = f"coverage came to {percent(self.coverage)}"
         return f"{self.stop} sees {self.units} units, {self.sees:.1f} {self.unit}; {new} and {reached}."
 
@@ -119,13 +119,13 @@ def stop_reasons(route: Route, stops: Sequence[str]) -> tuple[StopReason, ...]:
     often = np.bincount(np.concatenate(sights), minlength=len(ledger.weight))
     offers = _Offers(visibility, ledger)
     steps = [offers.choose(int(row)) for row in selection.chosen]
-    rooms = _Rooms(ledger, often > 0)
+    rooms = _Rooms(ledger, ledger.enough(often))
     visible = ledger.amount(ledger.visible)
     found = []
     for name, choice in zip(stops, route.order.tolist(), strict=True):
         sight = sights[choice]
         counted = sight[ledger.visible[sight]]
-        alone = counted[often[counted] == 1]
+        alone = counted[often[counted] == visibility.asked[counted]]
         new, runners = steps[choice]
         losing, lost = rooms.without(alone)
         found.append(
@@ -153,13 +153,13 @@ def driven_coverage(route: Route) -> FloatArray:
     """Share of what is visible that is seen once each stop has been scanned, in the order of driving (k,)."""
     visibility = route.selection.visibility
     weight = weights_of(visibility.targets, visibility.candidates.space.settings)
-    left = np.where(visibility.visible, weight, 0)
-    visible, gained = int(left.sum()), []
+    counts = np.where(visibility.visible, weight, 0)
+    lacking, gained = visibility.asked.copy(), []
     for row in route.selection.chosen[route.order].tolist():
         sight = visibility.seen_by(row)
-        gained.append(int(left[sight].sum()))
-        left[sight] = 0
-    return np.asarray(np.cumsum(gained) / max(visible, 1), dtype=np.float64)
+        lacking[sight] -= 1
+        gained.append(int(counts[sight[lacking[sight] == 0]].sum()))
+    return np.asarray(np.cumsum(gained) / max(int(counts.sum()), 1), dtype=np.float64)
 
 
 def _amount(ledger: Ledger, units: IntArray) -> float:
@@ -178,31 +178,34 @@ class _Offers:
         np.add.at(self.gain, self._row, gain)
         self._by_segment = np.argsort(segment, kind="stable")
         self._segment = segment[self._by_segment]
-        self._seen: BoolArray = ~ledger.visible
+        self._lacking: IntArray = np.where(ledger.visible, visibility.asked, 0)
+        """How many more stops must see each unit until it counts."""
+        self._chosen: BoolArray = np.zeros(visibility.rows, dtype=np.bool_)
 
     def choose(self, row: int) -> tuple[float, tuple[RunnerUp, ...]]:
-        """What the candidate newly sees, and who would have seen nearly as much; it is chosen then."""
+        """What the candidate sees that lacks views, and who would have seen nearly as much; it is chosen."""
         new = int(self.gain[row])
         sight = self._visibility.seen_by(row)
-        fresh = sight[~self._seen[sight]]
-        self._seen[fresh] = True
+        fresh = sight[self._lacking[sight] > 0]
+        self._chosen[row] = True
         if not len(fresh):
             return 0.0, ()
         shared = self._shared(fresh)
         runners = self._runners(row, shared)
-        self.gain -= shared
+        self._lacking[fresh] -= 1
+        done = fresh[self._lacking[fresh] == 0]
+        self.gain -= shared if len(done) == len(fresh) else self._shared(done)
         return new * self._ledger.scale, runners
 
     def _runners(self, row: int, shared: IntArray) -> tuple[RunnerUp, ...]:
         candidates, gain = self._visibility.candidates, self.gain
-        rows = np.flatnonzero((gain >= NEARLY * gain[row]) & (shared >= SAME * gain[row]))
-        rows = rows[rows != row]
+        alike = (gain >= NEARLY * gain[row]) & (shared >= SAME * gain[row])
+        rows = np.flatnonzero(alike & ~self._chosen)
         best = rows[np.argsort(-gain[rows], kind="stable")][:MOST_RUNNERS]
         places = candidates.xy[candidates.kept[best]].tolist()
         amounts = (gain[best] * self._ledger.scale).tolist()
-        return tuple(
-            RunnerUp(int(k), x, y, new) for k, (x, y), new in zip(best, places, amounts, strict=True)
-        )
+        told = zip(best.tolist(), places, amounts, strict=True)
+        return tuple(RunnerUp(row, x, y, new) for row, (x, y), new in told)
 
     def _shared(self, fresh: IntArray) -> IntArray:
         """What each candidate sees of some units, ascending."""

@@ -100,11 +100,11 @@ def _draw_outlines(
 
 
 def _alone(visibility: Visibility, rows: Sequence[int]) -> list[FloatArray]:
-    """What each of these rows sees that no other of them does, of what is visible, as lines."""
+    """What of each row's sight is seen from too few others of them, of what is visible, as lines."""
     targets = visibility.targets
     sights = [visibility.seen_by(row) for row in rows]
     often: IntArray = np.bincount(np.concatenate(sights), minlength=targets.total)
-    lonely: BoolArray = (often == 1) & visibility.visible
+    lonely: BoolArray = (often == visibility.asked) & visibility.visible
     return [_lines(visibility, sight[lonely[sight]]) for sight in sights]
 
 

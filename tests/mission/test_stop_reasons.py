@@ -66,6 +66,19 @@ def test_units_seen_twice_from_one_candidate_count_once() -> None:
     assert twice.seen_by(0).tolist() == seen.seen_by(0).tolist()
 
 
+def test_where_two_views_are_asked_both_stops_are_needed() -> None:
+    """Four units are seen by both; all others have but one candidate, and ask for one."""
+    nouns = world.nouns_at()
+    asking = replace(nouns[1].settings, views=2)
+    space = replace(nouns[1], settings=asking)
+    seen = replace(nouns[3], candidates=replace(nouns[2], space=space))
+    made = replace(route(), selection=replace(route().selection, visibility=seen))
+    first, second = stop_reasons(made, ("S1", "S2"))
+    assert (first.alone_units, second.alone_units) == (8, 7)
+    assert second.new == pytest.approx(0.7)
+    assert driven_coverage(made) == pytest.approx([4 / 14, 11 / 14])
+
+
 def test_reasons_survive_their_document() -> None:
     reasons = stop_reasons(route(), ("S1", "S2"))
     assert msgspec.json.decode(msgspec.json.encode(reasons), type=tuple[StopReason, ...]) == reasons
