@@ -150,14 +150,19 @@ def await_robot(link: Link, keys: KeyExpressions, timeout_s: float) -> None:
 
 def restarting(command: str) -> Any:
     """What runs the command that starts the robot's program anew, and waits for its end."""
-    words = shlex.split(command)
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise InputError(f"--restart {command}: {error}") from None
 
     def restart() -> None:
         try:
             subprocess.run(
                 words, check=True, timeout=RESTART_S, stdin=subprocess.DEVNULL, capture_output=True
             )
-        except (OSError, subprocess.SubprocessError) as error:
+        except OSError as error:
+            raise InputError(f"--restart {command}: {error.strerror}") from None
+        except subprocess.SubprocessError as error:
             raise InputError(f"--restart {command}: {error}") from None
 
     return restart

@@ -114,7 +114,9 @@ def by_command(options: StationOptions, path: Path) -> Doing:
             ).returncode
         except subprocess.TimeoutExpired:
             raise NotTried(f"the command did not end within {COMMAND_S:g} s: {what}") from None
-        except (OSError, ValueError) as error:
+        except OSError as error:
+            raise InputError(f"--command {command}: {error.strerror}") from None
+        except ValueError as error:
             raise InputError(f"--command {command}: {error}") from None
 
     return do

@@ -43,7 +43,11 @@ class StationBench:
     def does(self, what: str, mission: Mission | None = None) -> int | None:
         """Let the station do something; what it asks is noted from now on."""
         self.link.asked.clear()
-        return self._do(what, mission)
+        code = self._do(what, mission)
+        if not self.link.asked:
+            told = "" if code is None else f" (exit code {code})"
+            raise NotTried(f"the station was to {what} and asked nothing{told}; does it find the robot?")
+        return code
 
     @contextmanager
     def meddling(self, meddle: Meddling = plainly, withhold: Withholding = everything) -> Iterator[None]:

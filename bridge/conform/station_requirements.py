@@ -112,6 +112,7 @@ def the_lease_is_not_taken_unasked(bench: StationBench) -> None:
     bench.ready()
     bench.leased_to("somebody-else")
     tells(bench.does("start"), NO, "a start under another's lease is not told as refused")
+    must(bench.orders("start"), "no start came")
     must(not any(order.take_over for order in bench.orders("start")), "it takes over though nobody said so")
     lease = bench.robot.controller.lease
     must(lease is not None and lease.commander == "somebody-else", "it has taken the lease")
@@ -192,7 +193,9 @@ def a_rejection_is_told(bench: StationBench) -> None:
     bench.at_rest()
     no = encode(Rejected(reason="later_reason", messages=("for a reason that nobody knows yet",)))
     with bench.meddling(_on("/commit", lambda request, answer: no)):
-        tells(bench.does("push", bench.mission()), NO, "a push that was rejected is not told as rejected")
+        code = bench.does("push", bench.mission())
+    must(bench.commits(), "no commit came")
+    tells(code, NO, "a push that was rejected is not told as rejected")
 
 
 def acceptance_is_not_believed_blindly(bench: StationBench) -> None:

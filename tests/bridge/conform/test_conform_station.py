@@ -19,6 +19,7 @@ from bridge.link.link import Link
 from bridge.link.protocol import Info, encode
 from bridge.link.seals import KeySeals, Question
 from bridge.station.station import Station
+from mission.document import Mission
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
 from mission.files.mission_json import read
 from mission.run.orders import Answer, Order, Verb
@@ -205,3 +206,13 @@ def test_a_person_who_lets_the_station_do_nothing_is_waited_for_in_vain() -> Non
         threading.Thread(target=station.does, args=("start", None)).start()
         assert do("start", None) is None
     assert said == ["now let the station start r1"] * 2
+
+
+def test_a_station_that_does_nothing_passes_nothing() -> None:
+    class Idle(StationUnderTest):
+        def does(self, what: str, mission: Mission | None) -> int:
+            return 1
+
+    found = verdicts(Idle())
+    assert {one.outcome for one in found.values()} == {"not tried"}
+    assert "the station was to start and asked nothing (exit code 1)" in str(found.values())
