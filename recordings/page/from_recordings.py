@@ -8,10 +8,12 @@ from typing import Any
 
 from mission.errors import InputError
 from mission.run_log import LogSource
+from mission.stop_reasons import StopReason
 from recordings.carried.findings import CarriedFindings, findings_in
 from recordings.carried.floor_lines import FloorLines, floor_lines
 from recordings.carried.plan import origin_in
 from recordings.carried.reading import Recording
+from recordings.carried.reasons import reasons_in
 from recordings.page.subject import ReportSubject
 from recordings.review import RecordingReview, Review, missions_of, sights_of
 
@@ -40,6 +42,7 @@ def subject_of(review: Review) -> ReportSubject:
         sight=sights[-1] if sights else None,
         floor=_first(read, _floor),
         results=_results(items),
+        reasons=_first(read, _reasons) or (),
         found=_first(read, _found) or CarriedFindings(),
         sources=tuple(_source(item) for item in read),
         problems=tuple(f"{item.recording.path.name}: {text}" for item in items for text in item.problems),
@@ -53,6 +56,10 @@ def _first(read: Sequence[Recording], of: Any) -> Any:
 
 def _floor(recording: Recording) -> FloorLines | None:
     return floor_lines(recording.values, origin_in(recording))
+
+
+def _reasons(recording: Recording) -> tuple[StopReason, ...] | None:
+    return reasons_in(recording.values, str(recording.path)) or None
 
 
 def _found(recording: Recording) -> CarriedFindings | None:

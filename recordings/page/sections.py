@@ -15,6 +15,7 @@ from mission.schedule import schedule
 from mission.table import duration
 from recordings.page.floor_picture import legend, line_sample, plan_picture
 from recordings.page.plots import plots
+from recordings.page.stop_table import stop_table
 from recordings.page.style import ANSWERS, BLUE, GREY, PURPLE, STATES, VERMILION, YELLOW
 from recordings.page.subject import ReportSubject
 from recordings.page.words import grid, number, row, section, shown, tag
@@ -29,6 +30,7 @@ def body(subject: ReportSubject) -> str:
     parts = [_title(subject), *_problems(subject)]
     if not runs:
         parts += [_plan_band(subject), _plan_tiles(subject), _pictured(subject, None), _plan_tables(subject)]
+        parts += [stop_table(subject.reasons)]
     if len(runs) > 1:
         parts += [_side_by_side(subject)]
     parts += [

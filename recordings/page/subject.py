@@ -11,6 +11,7 @@ from mission.comparison import Comparison
 from mission.document import Mission
 from mission.run_log import LogSource
 from mission.sight import Sight
+from mission.stop_reasons import StopReason
 from recordings.carried.findings import CarriedFindings
 from recordings.carried.floor_lines import FloorLines
 
@@ -28,6 +29,8 @@ class ReportSubject:
     floor: FloorLines | None = None
     results: dict[str, Any] = field(default_factory=dict)
     """What the stages of the plan came to, by name."""
+    reasons: tuple[StopReason, ...] = ()
+    """Why the stops of the newest plan are there."""
     found: CarriedFindings = field(default_factory=CarriedFindings)
     sources: tuple[LogSource, ...] = ()
     """The files that it was made from."""
