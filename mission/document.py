@@ -79,7 +79,9 @@ class LimitsSpec(Document, frozen=True):
     near: float | UnsetType = UNSET
     """Distance from the scanner, of a wall down to its foot."""
     density_mm: float | UnsetType = UNSET
-    """Between neighbouring points, at the scanner's height."""
+    """Between neighbouring points."""
+    wall_height: float | UnsetType = UNSET
+    """Incidence and spacing hold from the floor up to it; absent where only at the scanner's height."""
     views: int | UnsetType = UNSET
     """Stops that must see it."""
 

@@ -16,10 +16,10 @@ SCANNER_HEIGHT_M = 1.3
 
 @dataclass(frozen=True, kw_only=True)
 class ViewLimits:
-    """What a line of sight must be, besides within range and free, in the plane of the scanner.
+    """What a line of sight must be, besides within range and free.
 
     The spacing at a target, at distance d and incidence i, is d · step / cos i: how far two neighbouring
-    points lie apart along a wall at the scanner's height.
+    points lie apart on a wall.
     """
 
     max_incidence: float | None = None
@@ -30,6 +30,8 @@ class ViewLimits:
     """Metres between neighbouring points; None where any will do."""
     step: float | None = None
     """Radians between neighbouring rays; known where `spacing` is."""
+    rise: float = 0.0
+    """Metres above and below the scanner up to which incidence and spacing must hold."""
 
     @property
     def none(self) -> bool:
@@ -56,7 +58,16 @@ def limits_of(settings: Settings) -> ViewLimits:
         near=blind_range(settings),
         spacing=None if density is None else density / 1000,
         step=None if step is None else math.radians(step),
+        rise=rise_of(settings),
     )
+
+
+def rise_of(settings: Settings) -> float:
+    """Metres from the scanner up to the height asked for, or down to the floor if that is more."""
+    if settings.wall_height is None:
+        return 0.0
+    height = scanner_height(settings)
+    return max(height, settings.wall_height - height)
 
 
 def blind_range(settings: Settings) -> float:
@@ -78,6 +89,7 @@ def limits_in_words(limits: LimitsSpec | UnsetType, *, brief: bool = False) -> d
         "max_incidence": (limits.max_incidence_deg, "up to {:g}°", "≤ {:g}°"),
         "near": (limits.near, "from {:.3g} m on", "≥ {:.3g} m"),
         "density": (limits.density_mm, "points at most {:g} mm apart", "≤ {:g} mm"),
+        "wall_height": (limits.wall_height, "over walls of {:g} m", "walls {:g} m"),
         "views": (limits.views, "from {:g} stops", "{:g} stops"),
     }
     known = {key: item for key, item in told.items() if item[0] is not UNSET}

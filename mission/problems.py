@@ -70,7 +70,7 @@ def _machine(mission: Mission) -> Iterator[Problem]:
     if not 0 < scanner.fov_deg <= 360:
         yield Problem("$.scanner.fov_deg", f"is {scanner.fov_deg}; it must be above 0 and at most 360")
     known = {f"$.scanner.{key}": getattr(scanner, key) for key in ("step_deg", "height")}
-    limits = ("max_incidence_deg", "density_mm", "views")
+    limits = ("max_incidence_deg", "density_mm", "wall_height", "views")
     known |= {f"$.limits.{key}": getattr(mission.limits, key, UNSET) for key in limits}
     for path, value in known.items():
         if value is not UNSET:

@@ -114,6 +114,16 @@ class Settings:
     density: Annotated[
         float | None, _limit("Widest spacing of points on a target, by angular_step", "mm", above=0)
     ] = None
+    wall_height: Annotated[
+        float | None,
+        _limit(
+            "Height up to which targets are to be seen so",
+            "m",
+            above=0,
+            below=50,
+            undecided="scanner_height only",
+        ),
+    ] = None
     coverage_rule: Annotated[
         Literal["length", "paper"],
         _plan("Count metres; or, as the paper does, units of the whole"),
@@ -400,6 +410,10 @@ def _check_together(settings: Settings) -> None:
         raise InputError(
             f"density = {settings.density:g}: needs the scanner's angular_step; give it, or a scanner: "
             f"{', '.join(SCANNERS)}"
+        )
+    if settings.wall_height is not None and settings.max_incidence is None and settings.density is None:
+        raise InputError(
+            f"wall_height = {settings.wall_height:g}: says nothing without max_incidence or density; give one"
         )
     if settings.least_views > 1 and settings.fov < 360:
         raise InputError(

@@ -49,6 +49,7 @@ def limits_spec_of(settings: Settings) -> LimitsSpec | UnsetType:
         "max_incidence_deg": settings.max_incidence,
         "near": blind_range(settings) or None,
         "density_mm": settings.density,
+        "wall_height": settings.wall_height,
         "views": settings.least_views if settings.least_views > 1 else None,
     }
     known: dict[str, Any] = {key: value for key, value in limits.items() if value is not None}

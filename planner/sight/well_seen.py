@@ -101,7 +101,7 @@ def _without_near(
 
     nearest = _first_that(near, nearest, np.maximum(nearest - 1, low), np.minimum(nearest + 1, high))
     hole = near(nearest)
-    half = _units_within(stretches, limits.near / GRID)
+    half = _units_within(stretches, (limits.near / GRID) ** 2)
     begin, end = high + 1, high.copy()
     some = np.flatnonzero(hole)
     within = stretches.among(some)
@@ -121,10 +121,10 @@ def _foot(stretches: SeenSegments) -> FloatArray:
     return -(a * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1.0) * stretches.units - 0.5
 
 
-def _units_within(stretches: SeenSegments, reach: FloatArray | float) -> FloatArray:
+def _units_within(stretches: SeenSegments, squared_reach: FloatArray | float) -> FloatArray:
     """Units on either side of the foot up to which the line lies within reach; negative where none does."""
     length, away = _length_and_distance(stretches)
-    square = np.square(reach) - away**2
+    square = squared_reach - away**2
     return np.where(square < 0, -1.0, np.sqrt(np.maximum(square, 0.0)) / length * stretches.units)
 
 
@@ -142,12 +142,12 @@ def _area(stretches: SeenSegments) -> IntArray:
 def _round_the_foot(stretches: SeenSegments, limits: ViewLimits) -> tuple[FloatArray, FloatArray]:
     """The foot, and how many units on either side of it are neither too flat nor too sparse."""
     length, away = _length_and_distance(stretches)
+    rise = limits.rise / GRID
     half = np.full(len(length), np.inf)
     if limits.max_incidence is not None:
-        half = away * math.tan(limits.max_incidence) / length * stretches.units
+        half = _units_within(stretches, (away / math.cos(limits.max_incidence)) ** 2 - rise**2)
     if limits.farthest_per_height is not None:
-        reach = np.sqrt(limits.farthest_per_height / GRID * away)
-        half = np.minimum(half, _units_within(stretches, reach))
+        half = np.minimum(half, _units_within(stretches, limits.farthest_per_height / GRID * away - rise**2))
     return _foot(stretches), np.minimum(half, 1e15)
 
 
@@ -161,16 +161,18 @@ class _Measures:
     """The segment's length, squared."""
     squared: Any
     """The distance of the midpoint times `pieces`, squared."""
+    slant: Any
+    """The same of the point straight above or below it that is farthest off."""
     pieces: Any
 
 
 def _square_on(stretches: SeenSegments, unit: IntArray, limits: ViewLimits) -> BoolArray:
     """Whether units are seen neither too flat nor too sparsely."""
-    found = np.ones(len(unit), dtype=bool)
+    found, rise = np.ones(len(unit), dtype=bool), round(limits.rise / GRID)
     if limits.max_incidence is not None:
-        found &= _at_most(stretches, unit, _incidence, math.cos(limits.max_incidence))
+        found &= _at_most(stretches, unit, _incidence, math.cos(limits.max_incidence), rise)
     if limits.farthest_per_height is not None:
-        found &= _at_most(stretches, unit, _spacing, limits.farthest_per_height / GRID)
+        found &= _at_most(stretches, unit, _spacing, limits.farthest_per_height / GRID, rise)
     return found
 
 
@@ -179,13 +181,13 @@ def _too_near(stretches: SeenSegments, unit: IntArray, limits: ViewLimits) -> Bo
 
 
 def _incidence(m: _Measures, cosine: Any) -> tuple[Any, Any]:
-    """cos i = h / d at least: cos² d² <= h², h being area / length."""
-    return cosine**2 * m.along * m.squared, m.area**2 * m.pieces**2
+    """cos i = h / d at least: cos² d² <= h², h being area / length, and d the slant distance."""
+    return cosine**2 * m.along * m.slant, m.area**2 * m.pieces**2
 
 
 def _spacing(m: _Measures, most: Any) -> tuple[Any, Any]:
     """d² <= k h, squared."""
-    return m.squared**2 * m.along, most**2 * m.area**2 * m.pieces**4
+    return m.slant**2 * m.along, most**2 * m.area**2 * m.pieces**4
 
 
 def _blind(m: _Measures, near: Any) -> tuple[Any, Any]:
@@ -197,22 +199,26 @@ def _at_most(
     unit: IntArray,
     sides: Callable[[_Measures, Any], tuple[Any, Any]],
     limit: float,
+    rise: int = 0,
 ) -> BoolArray:
     """Whether the left side is at most the right one, for each midpoint; exact where they are close."""
     odd, pieces = 2 * unit + 1, 2 * stretches.units
     way = (pieces - odd)[:, None] * stretches.a + odd[:, None] * stretches.b
     area, along = _area(stretches), stretches.b - stretches.a
+    squared = (way.astype(float) ** 2).sum(axis=1)
     rough = _Measures(
         area.astype(float),
         (along.astype(float) ** 2).sum(axis=1),
-        (way.astype(float) ** 2).sum(axis=1),
+        squared,
+        squared + (float(rise) * pieces) ** 2,
         pieces.astype(float),
     )
     left, right = sides(rough, limit)
     found: BoolArray = left < right
     for k in np.flatnonzero(np.abs(left - right) <= CLOSE * right):
-        (x, y), (dx, dy) = way[k].tolist(), along[k].tolist()
-        exact = _Measures(int(area[k]), dx * dx + dy * dy, x * x + y * y, int(pieces[k]))
+        (x, y), (dx, dy), p = way[k].tolist(), along[k].tolist(), int(pieces[k])
+        slant = x * x + y * y + (rise * p) ** 2
+        exact = _Measures(int(area[k]), dx * dx + dy * dy, x * x + y * y, slant, p)
         least, most = sides(exact, Fraction(limit))
         found[k] = least <= most
     return found

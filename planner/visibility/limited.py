@@ -56,7 +56,7 @@ def _clipped(in_sight: Visibility, limits: ViewLimits) -> Visibility:
     )
 
 
-LIMITS = ("max_incidence", "near", "density", "views")
+LIMITS = ("max_incidence", "near", "density", "wall_height", "views")
 """The parameters that set limits."""
 
 
@@ -68,7 +68,11 @@ def without(settings: Settings, key: str) -> Settings:
 
 def _why_nothing(in_sight: Visibility, settings: Settings) -> str:
     """Which limits leave nothing alone, else all of them together, and what to do."""
-    told = {key: words for key, words in limits_in_words(limits_spec_of(settings)).items() if key != "views"}
+    told = {
+        key: words
+        for key, words in limits_in_words(limits_spec_of(settings)).items()
+        if key not in ("views", "wall_height")
+    }
     alone = {key: words for key, words in told.items() if not _shows(in_sight, settings, key)}
     better = {"max_incidence": "raise --max-incidence", "near": "lower --near or --blind-cone"}
     step, away = settings.angular_step or 0.0, max(settings.d_sec, settings.radius)

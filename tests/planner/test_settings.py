@@ -50,8 +50,13 @@ OTHER: dict[str, Any] = {
     "angular_step": 0.036,
     "blind_cone": 60.0,
     "scanner_height": 1.8,
+    "wall_height": 2.7,
 }
-NEEDS = {**dict.fromkeys(("since", "schedule", "in_progress"), "date"), "density": "angular_step"}
+NEEDS = {
+    **dict.fromkeys(("since", "schedule", "in_progress"), "date"),
+    "density": "angular_step",
+    "wall_height": "max_incidence",
+}
 """What says nothing without another parameter."""
 
 

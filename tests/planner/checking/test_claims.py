@@ -48,7 +48,7 @@ WORLDS: dict[str, tuple[FloorPlan, Settings]] = {
     ),
     "limits past closed doors": (
         two_rooms(0.9),
-        Settings(doors="closed", door_scan=True, max_incidence=70, near=0.8, views=2),
+        Settings(doors="closed", door_scan=True, max_incidence=70, wall_height=2.6, near=0.8, views=2),
     ),
     "limits and a field of view": (HALL, Settings(fov=120.0, max_incidence=65, blind_cone=60, grid=2)),
     "triangulation": (HALL, Settings(candidates="triangulation")),

@@ -23,6 +23,7 @@ def random_limits(random: np.random.Generator) -> ViewLimits:
         near=float(random.uniform(0.1, 3.0)) if which & 2 else 0.0,
         spacing=float(random.uniform(0.0003, 0.01)) if which & 4 else None,
         step=STEP,
+        rise=float(random.choice([0.0, 1.4])),
     )
 
 
@@ -76,9 +77,10 @@ def test_what_is_seen_well_is_what_trigonometry_says() -> None:
         at = a + ((unit + 0.5) / stretches.units)[:, None] * (b - a)
         normal = np.stack([a[:, 1] - b[:, 1], b[:, 0] - a[:, 0]], axis=1)
         distance = np.hypot(*at.T)
-        cosine = np.abs((at * normal).sum(axis=1)) / np.maximum(distance * np.hypot(*normal.T), 1e-12)
+        slant = np.hypot(distance, limits.rise)
+        cosine = np.abs((at * normal).sum(axis=1)) / np.maximum(slant * np.hypot(*normal.T), 1e-12)
         flat = np.degrees(np.arccos(np.clip(cosine, 0, 1)))
-        spacing = distance * STEP / np.maximum(cosine, 1e-12)
+        spacing = slant * STEP / np.maximum(cosine, 1e-12)
         margins = [distance - limits.near]
         if limits.max_incidence is not None:
             margins.append(math.degrees(limits.max_incidence) - flat)
