@@ -9,9 +9,10 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo docs test lint types faults benchmarks wheels clean
 
+# pip would compile all packages one after another; what is imported is compiled then, by as many as import it.
 $(STAMP): pyproject.toml setup.py constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	PIP_CONSTRAINT="$(CURDIR)/constraints.txt" $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
+	PIP_CONSTRAINT="$(CURDIR)/constraints.txt" $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -e '.[test]'
 	touch $(STAMP)
 
 demo: $(STAMP)
@@ -25,9 +26,13 @@ types: $(STAMP)
 	$(BIN)/mypy
 
 # Most tests of links wait for something, so four files at a time are run even on two processors; in the order of their
-# names, for the longest have the fewest tests and would come last.
-test: lint types
-	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
+# names, for the longest have the fewest tests and would come last. mypy, which uses one processor, runs beside them and
+# speaks last.
+test: lint
+	@$(BIN)/mypy >$(VENV)/types.txt 2>&1 & types=$$!; \
+	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder; tests=$$?; \
+	wait $$types; typed=$$?; cat $(VENV)/types.txt; \
+	[ $$tests -eq 0 ] && [ $$typed -eq 0 ]
 
 # The long forms (docs/contributing.md): every fault and every sweep at full size, and every table of figures.
 faults: $(STAMP)
