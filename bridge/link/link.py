@@ -50,7 +50,7 @@ class Link(Protocol):
     def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
         """Answer every question on `key` (which may hold wildcards), one at a time.
 
-        Answers that are `bulk` give way to others on a full line.
+        `bulk` says that the answers are large; on a full line they give way if they were asked for so.
         """
 
     def publisher(self, key: str, *, bulk: bool = False) -> Publish:
@@ -68,7 +68,10 @@ class Link(Protocol):
         parameters: Mapping[str, str] | None = None,
         bulk: bool = False,
     ) -> bytes | None:
-        """The answer of the one who serves `key`, or `None` if none came in time."""
+        """The answer of the one who serves `key`, or `None` if none came in time.
+
+        A question that is `bulk`, and its answer, give way to others on a full line.
+        """
 
     def ask_all(self, key: str, payload: bytes = b"", *, timeout_s: float) -> list[bytes]:
         """The answers of all who serve `key`: more than one if two robots have one name."""

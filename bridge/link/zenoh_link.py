@@ -212,7 +212,6 @@ class ZenohLink:
             _undeclare(self._declared)
 
     def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
-        priority = BULK if bulk else PROMPT
         sealed = self._seals.answering(answer)
 
         def answered(query: zenoh.Query) -> None:
@@ -223,10 +222,8 @@ class ZenohLink:
                     reply, seal = sealed(Request(str(query.key_expr), payload, parameters, _seal_of(query)))
                 except Unanswered:
                     return
-                query.reply(
-                    query.key_expr, reply, encoding=JSON, attachment=seal or None,
-                    priority=priority, congestion_control=zenoh.CongestionControl.BLOCK,
-                )  # fmt: skip
+                # With the priority of the question: zenoh gives an answer no other.
+                query.reply(query.key_expr, reply, encoding=JSON, attachment=seal or None)
 
         self._declared.append(self._session.declare_queryable(key, answered, complete=True))
 

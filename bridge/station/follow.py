@@ -110,7 +110,7 @@ class PoseHistory:
 
     def _page(self) -> PosePage | None:
         parameters = {"since": str(self.told)} | ({"run": self.run_id} if self.run_id else {})
-        reply = self._link.ask(self._keys.poses, timeout_s=PAGE_S, parameters=parameters)
+        reply = self._link.ask(self._keys.poses, timeout_s=PAGE_S, parameters=parameters, bulk=True)
         return None if reply is None else decode(reply, PosePage)
 
 

@@ -394,7 +394,7 @@ class Station:
 
     def _part(self, mission_id: str, revision: int, number: int) -> MissionPart:
         key = self.keys.mission(mission_id, f"part/{number}")
-        reply = self._insist(key, b"", self.patience_s, try_s=BULK_TRY_S, revision=str(revision))
+        reply = self._insist(key, b"", self.patience_s, try_s=BULK_TRY_S, bulk=True, revision=str(revision))
         return self._answered(reply, MissionPart, "reading the mission back")
 
     def _step(self, manifest: Manifest, step: str, payload: bytes, kind: type[Any], **parameters: str) -> Any:

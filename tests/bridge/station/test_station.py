@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import pytest
 
 from bridge.link.memory_link import MemoryLink, Switchboard
 from bridge.link.protocol import KeyExpressions, encode
 from bridge.station import station as stations
+from bridge.station.follow import PoseHistory
 from bridge.station.station import LEAST_S, PATIENCE_S, Station
 from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from tests.bridge.world import Field, corridor
@@ -149,3 +151,27 @@ def test_a_mission_that_a_newer_robot_rejects_is_rejected() -> None:
     station = Station(board.link(), keys, commander="test", timeout_s=5.0)
     with pytest.raises(AnswerIsNo, match="rejected pause: too_dark: m"):
         station.give(station.stop_order("pause"))
+
+
+class PriorityLink(MemoryLink):
+    """Notes which questions, and so their answers, give way to others."""
+
+    def __init__(self, board: Switchboard) -> None:
+        super().__init__(board)
+        self.bulky: dict[str, bool] = {}
+
+    def ask(self, key: str, payload: bytes = b"", *, bulk: bool = False, **details: Any) -> bytes | None:
+        self.bulky[key.split("/")[3]] = bulk
+        return super().ask(key, payload, **details)
+
+
+def test_what_is_large_is_asked_for_so_that_it_gives_way() -> None:
+    """zenoh answers with the priority of the question, whatever the robot would say."""
+    field = Field()
+    field.station().push(corridor())
+    link = PriorityLink(field.board)
+    station = Station(link, field.keys, commander="test", timeout_s=0.3)
+    station.mission(corridor().id, 1)
+    station.command("start")
+    list(PoseHistory(link, field.keys).catch_up())
+    assert link.bulky == {"mission": True, "cmd": False, "poses": True}
