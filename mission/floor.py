@@ -141,6 +141,8 @@ class FloorPlan:
     """Elements on this floor by construction status, on the day in `source`; empty without one."""
     on_robots_map: bool = False
     """Whether the coordinates are those of the robot's own map."""
+    ceiling_m: float | None = None
+    """Height of the next storey's floor above this one, where the model tells."""
     ignored: tuple[IgnoredLine, ...] = ()
     """Lines that no plan may cross unsaid: nobody knows what they stand for."""
 

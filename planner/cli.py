@@ -25,10 +25,12 @@ if TYPE_CHECKING:
     from mission.floor import FloorPlan
     from mission.heard_run import HeardRun
     from mission.plan import PartPlan
+    from mission.plan_proof import PlanProof
     from mission.settings import Settings
     from planner.report import PlanReport
     from recordings.plan import PlanRecording
 
+EXAMPLE_PROOF = "Example: stopgo prove plan/mission.json --floor floor.dxf"
 EXAMPLE = "Example: stopgo plan floor.dxf -o plan --range 8 --start 2.5,3.0,90"
 
 
@@ -38,6 +40,7 @@ def add_commands(app: typer.Typer) -> None:
 
     app.command(name="plan", epilog=EXAMPLE)(with_options(plan_command))
     add_floor_commands(app)
+    app.command(name="prove", epilog=EXAMPLE_PROOF)(prove_command)
     app.command(name="demo", epilog="Example: stopgo demo -o recordings/demo")(demo_command)
 
 
@@ -235,9 +238,7 @@ def _recording(recording_id: str) -> PlanRecording | None:
     try:
         from recordings.plan import PlanRecording
     except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] != "rerun":
-            raise
-        typer.echo('no plan.rrd: rerun is not installed; pip install "stopgo[record]" brings it', err=True)
+        _told_without_rerun(error, "plan.rrd")
         return None
     return PlanRecording(recording_id)
 
@@ -308,6 +309,104 @@ class Stopwatch:
     def times(self) -> dict[str, float]:
         """Seconds per stage and in all."""
         return {**self._laps, "total": time.perf_counter() - self._begin}
+
+
+def prove_command(
+    mission: Annotated[Path, typer.Argument(metavar="MISSION", help="A mission.json.")],
+    floor: Annotated[Path, typer.Option(help="The floor that it was planned on.")],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for the results; else beside the mission.")
+    ] = None,
+    coverage: Annotated[
+        Path | None, typer.Option(help="The mission's coverage.json; else the one beside it, if there is.")
+    ] = None,
+    *,
+    step: Annotated[
+        float, typer.Option(min=0.005, max=2.0, help="Between neighbouring rays, degrees.")
+    ] = 0.1,
+    noise: Annotated[float, typer.Option(min=0.0, max=100.0, help="Of a distance, mm rms.")] = 2.0,
+    height: Annotated[
+        float | None, typer.Option(min=0.1, max=10.0, help="Scanner above the floor, m.", show_default="1.3")
+    ] = None,
+    ceiling: Annotated[
+        float | None,
+        typer.Option(min=0.5, max=50.0, help="Height of the walls, m.", show_default="the model's, else 2.7"),
+    ] = None,
+    slant: Annotated[
+        bool, typer.Option("--slant", help="The range counts along the rays, not along the floor.")
+    ] = False,
+    without_poses: Annotated[
+        bool, typer.Option("--without-poses", help="Register without the robot's poses to start from.")
+    ] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Of noise and pose errors.")] = 1,
+    strict: Annotated[bool, typer.Option(help="Exit 1 also where the scans do not all join.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+) -> int:
+    """Prove by simulation what a mission promises: scan the floor from its stops, measure, and register.
+
+    Casts the scanner's rays at the floor raised to its walls' height, counts the points on every target, and
+    registers the scans pair by pair. Writes proof.json, proof.rrd and proof.html.
+
+    Exit code 1: the plan promises more than the simulated scans show; with --strict also where these do not
+    all join.
+    """
+    from mission.files.atomic import must_be_writable
+    from mission.proof_text import proof_json, proof_text
+    from mission.table import printable
+    from planner.proving.proof_files import proof_files, prove_file
+
+    folder = mission.parent if out is None else _folder(out)
+    files = proof_files(folder, mission)
+    for path in files.values():
+        must_be_writable(path)
+    assumed = {"step_deg": step, "noise_m": noise / 1000, "slant": slant}
+    assumed |= {"poses": not without_poses, "seed": seed}
+    given = {"height_m": height, "ceiling_m": ceiling}
+    heights = {key: value for key, value in given.items() if value is not None}
+    proof, planned = prove_file(mission, floor, coverage, {**assumed, **heights}, say=_progress)
+    _progress("")
+    written = _write_proof(proof, planned.floor, files)
+    if as_json:
+        told = {**proof_json(proof), "files": {key: str(path) for key, path in written.items()}}
+        typer.echo(json.dumps(told, ensure_ascii=False))
+    else:
+        typer.echo(proof_text(proof))
+        for key, path in written.items():
+            typer.echo(f"{key:12}{printable(str(path))}")
+    return 0 if proof.met and (proof.network.closed or not strict) else 1
+
+
+def _write_proof(proof: PlanProof, floor: FloorPlan, files: dict[str, Path]) -> dict[str, Path]:
+    """Write a proof; its files appear together, proof.json last. Those that were written."""
+    from mission.files.atomic import replacing
+    from mission.page import json_text
+    from mission.proof_text import proof_json
+
+    try:
+        from recordings.page.proof_page import proof_html
+        from recordings.proof_recording import proof_recording
+    except ModuleNotFoundError as error:
+        _told_without_rerun(error, "proof.rrd and no proof.html")
+        files = {"proof": files["proof"]}
+    with replacing(*files.values()) as (*pictures, document):
+        if pictures:
+            pictures[0].write_bytes(proof_recording(proof, floor))
+            pictures[1].write_bytes(proof_html(proof, floor))
+        document.write_text(f"{json_text(proof_json(proof))}\n", encoding="utf-8")
+    return files
+
+
+def _told_without_rerun(error: ModuleNotFoundError, name: str) -> None:
+    """Say that a recording is left out for want of Rerun; anything else that is missing is an error."""
+    if (error.name or "").partition(".")[0] != "rerun":
+        raise error
+    typer.echo(f'no {name}: rerun is not installed; pip install "stopgo[record]" brings it', err=True)
+
+
+def _progress(line: str) -> None:
+    """One line that changes, on a terminal's stderr."""
+    if sys.stderr.isatty():
+        typer.echo(f"\r\033[K{line}", err=True, nl=False)
 
 
 def demo_command(

@@ -69,6 +69,12 @@ POLES = "/world/stops/poles"
 WORLD_PLANNED_ROBOT = "/world/robot"
 WORLD_FIELD = "/world/field"
 
+PROVED = "/plan/proof"
+PROVED_PAIRS = "/plan/proof/pairs"
+PROVED_TARGETS = "/plan/proof/targets"
+PROVED_CLOUDS = "/world/proof/clouds"
+WORLD_PROVED_PAIRS = "/world/proof/pairs"
+
 FIELD = "/field"
 
 METRICS = "/metrics"
@@ -102,6 +108,7 @@ PROPERTIES = "/__properties"
 PROPERTY_PLAN = "plan"
 PROPERTY_PARAMETERS = "parameters"
 PROPERTY_RUN = "run"
+PROPERTY_PROOF = "proof"
 PROPERTY_END = "end"
 
 

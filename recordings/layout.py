@@ -57,7 +57,7 @@ def _mission(bounds: Bounds | None, runs: Sequence[str]) -> rrb.Horizontal:
     plan = _flat(
         "Plan and run",
         _visible(bounds),
-        *(at.FLOOR, at.COVERAGE, at.ROUTE, at.STOPS, at.PLANNED_ROBOT, at.FIELD),
+        *(at.FLOOR, at.COVERAGE, at.ROUTE, at.STOPS, at.PLANNED_ROBOT, at.PROVED, at.FIELD),
         time_ranges=_so_far(),
         overrides=_run_colours(runs),
     )

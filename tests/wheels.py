@@ -21,6 +21,7 @@ ROOT = Path(__file__).parents[1]
 OFFICE = ROOT / "recordings" / "samples" / "office.dxf"
 PLAN = ("plan", str(OFFICE), "-o", "out")
 CHECK = ("check", "out/mission.json", "--floor", str(OFFICE))
+PROVE = ("prove", "out/mission.json", "--floor", str(OFFICE))
 FINISHED = ("demo", "-o", "demo", "--speed-up", "1000")
 
 EXTRAS: dict[str, Sequence[tuple[int, str, tuple[str, ...]]]] = {
@@ -32,7 +33,9 @@ EXTRAS: dict[str, Sequence[tuple[int, str, tuple[str, ...]]]] = {
     "plan": (
         (0, "mission.json", PLAN),
         (0, "in order", ("check", "out/mission.json", "--floor", str(OFFICE))),
+        (2, 'pip install "stopgo[prove]"', PROVE),
     ),
+    "prove": ((0, "mission.json", PLAN), (0, "promise is met", PROVE)),
     "record": ((2, 'pip install "stopgo[plan]"', PLAN), (2, "none.rrd", ("review", "none.rrd"))),
     "all": ((0, "plan.rrd", PLAN), (0, "FINISHED", FINISHED)),
 }

@@ -47,6 +47,13 @@ class CoverageElement(CoverageCounts, frozen=True):
     """Of the element in the building's model."""
 
 
+class CoverageRoom(msgspec.Struct, frozen=True):
+    """A room by name, and the share that the stops see of what is visible there."""
+
+    room: str
+    coverage: float | None
+
+
 class CoverageOf(msgspec.Struct, frozen=True):
     id: str
     digest: str
@@ -60,6 +67,8 @@ class Coverage(msgspec.Struct, frozen=True):
     mission: CoverageOf
     total: CoverageCounts
     elements: tuple[CoverageElement, ...]
+    kinds: dict[str, CoverageCounts] = {}
+    rooms: tuple[CoverageRoom, ...] = ()
 
 
 def read_coverage(path: Path, mission: Mission) -> Coverage:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from mission.document import Mission, Stop
 from mission.events import Held, LinkLost, Paused
 from mission.files.svg import text_width
 from mission.geometry import BoolArray, FloatArray, bounds
+from mission.planning import Targets
 from mission.run.way import legs_of
 from mission.seen import runs_of
 from recordings.page.style import BLUE, GREY, INK, PALE, PURPLE, VERMILION, YELLOW
@@ -29,21 +30,27 @@ STOOD = (Held, Paused, LinkLost)
 """Events whose place is marked."""
 
 
-def plan_picture(subject: ReportSubject, comparison: Comparison | None) -> str:
-    """The plan, and one of its runs if there is any."""
+Beneath = Callable[["PictureFrame"], Iterable[str]]
+
+
+def plan_picture(
+    subject: ReportSubject, comparison: Comparison | None, *, beneath: Beneath = lambda frame: ()
+) -> str:
+    """The plan, and one of its runs if there is any; `beneath` draws above the floor, below the stops."""
     mission = subject.mission if comparison is None else comparison.mission
-    frame = _Frame.of(subject, mission)
+    frame = PictureFrame.of(subject, mission)
     layers = [
         *_floor(subject, frame),
         *_coverage(subject, comparison, frame),
         *_ways(mission, comparison, frame),
+        *beneath(frame),
         *_marks(mission, comparison, frame),
     ]
     return tag("svg", *layers, class_="plan", viewBox=frame.view, role="img", aria_label="plan of the floor")
 
 
 @dataclass(frozen=True)
-class _Frame:
+class PictureFrame:
     """Where metres of the drawing lie in the picture, whose y goes down."""
 
     left: float
@@ -54,7 +61,7 @@ class _Frame:
     """Radius of a stop, metres."""
 
     @classmethod
-    def of(cls, subject: ReportSubject, mission: Mission) -> _Frame:
+    def of(cls, subject: ReportSubject, mission: Mission) -> PictureFrame:
         lines = [] if subject.floor is None else list(subject.floor.outline)
         ways = [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs_of(mission)]
         start = np.array([(mission.start.x, mission.start.y)])
@@ -99,21 +106,22 @@ def _spacing(mission: Mission) -> float:
     return float(max(np.median(apart.min(axis=1)), 0.5))
 
 
-def _stroke(d: str, colour: str, width: float, **style: Any) -> str:
+def stroke(d: str, colour: str, width: float, **style: Any) -> str:
+    """A path as a line whose width, in points, does not grow with the picture; nothing for no path."""
     if not d:
         return ""
     look = {"fill": "none", "stroke": colour, "stroke_width": width, "vector_effect": "non-scaling-stroke"}
     return tag("path", d=d, **{**look, **style})
 
 
-def _floor(subject: ReportSubject, frame: _Frame) -> Iterator[str]:
+def _floor(subject: ReportSubject, frame: PictureFrame) -> Iterator[str]:
     floor = subject.floor
     if floor is None:
         return
-    yield _stroke(frame.path(floor.outline, close=True), GREY, 1)
+    yield stroke(frame.path(floor.outline, close=True), GREY, 1)
     for kind, lines in floor.kinds.items():
         fill = {"fill": FILLED[kind], "fill_rule": "evenodd"} if kind in FILLED else {}
-        yield _stroke(frame.path(lines, close=True), "#9a9da5", 0.6, **fill)
+        yield stroke(frame.path(lines, close=True), "#9a9da5", 0.6, **fill)
     for name, x, y in floor.names:
         px, py = frame.place(x, y)
         fitting = _room_width(floor.rooms, x, y) / max(text_width(name, 1.0), 1.0)
@@ -133,7 +141,7 @@ def _room_width(rooms: Sequence[FloatArray], x: float, y: float) -> float:
     return min((box[2] - box[0] for box in about), default=np.inf)
 
 
-def _coverage(subject: ReportSubject, comparison: Comparison | None, frame: _Frame) -> Iterator[str]:
+def _coverage(subject: ReportSubject, comparison: Comparison | None, frame: PictureFrame) -> Iterator[str]:
     """What nobody planned to see dashed, what was seen, and thick what was planned and not seen."""
     acquired = None if comparison is None else comparison.acquired
     sight = subject.sight if acquired is None else acquired.sight
@@ -142,23 +150,26 @@ def _coverage(subject: ReportSubject, comparison: Comparison | None, frame: _Fra
     planned = sight.all_seen
     seen = planned if acquired is None else acquired.seen
 
-    def along(units: BoolArray) -> str:
-        runs = runs_of(sight.targets, units)
-        a, b = sight.targets.a[runs.segment], sight.targets.b[runs.segment]
-        ends = (a + (b - a) * runs.t0[:, None], a + (b - a) * runs.t1[:, None])
-        return frame.path(np.stack(ends, axis=1))
-
-    yield _stroke(along(~planned & ~seen), GREY, 1.2, stroke_dasharray="4 3")
-    yield _stroke(along(planned & ~seen), VERMILION, 5)
-    yield _stroke(along(seen), BLUE, 2.4)
+    targets = sight.targets
+    yield stroke(along(targets, ~planned & ~seen, frame), GREY, 1.2, stroke_dasharray="4 3")
+    yield stroke(along(targets, planned & ~seen, frame), VERMILION, 5)
+    yield stroke(along(targets, seen, frame), BLUE, 2.4)
 
 
-def _ways(mission: Mission, comparison: Comparison | None, frame: _Frame) -> Iterator[str]:
+def along(targets: Targets, units: BoolArray, frame: PictureFrame) -> str:
+    """The path of the stretches of targets where a mask of units (n,) holds."""
+    runs = runs_of(targets, units)
+    a, b = targets.a[runs.segment], targets.b[runs.segment]
+    ends = (a + (b - a) * runs.t0[:, None], a + (b - a) * runs.t1[:, None])
+    return frame.path(np.stack(ends, axis=1))
+
+
+def _ways(mission: Mission, comparison: Comparison | None, frame: PictureFrame) -> Iterator[str]:
     legs = [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs_of(mission)]
-    yield _stroke(frame.path(legs), "#444", 1.1, stroke_dasharray="6 4")
+    yield stroke(frame.path(legs), "#444", 1.1, stroke_dasharray="6 4")
     if comparison is not None and len(comparison.log.poses):
         driven = _thinned(comparison.log.poses.xy, max(frame.width, frame.height) / 1500)
-        yield _stroke(frame.path([driven]), PURPLE, 2, stroke_linejoin="round", stroke_opacity=0.9)
+        yield stroke(frame.path([driven]), PURPLE, 2, stroke_linejoin="round", stroke_opacity=0.9)
 
 
 def _thinned(xy: FloatArray, least: float) -> FloatArray:
@@ -168,7 +179,7 @@ def _thinned(xy: FloatArray, least: float) -> FloatArray:
     return xy[kept]
 
 
-def _marks(mission: Mission, comparison: Comparison | None, frame: _Frame) -> Iterator[str]:
+def _marks(mission: Mission, comparison: Comparison | None, frame: PictureFrame) -> Iterator[str]:
     missing = {} if comparison is None else {item.stop: item for item in comparison.missing}
     named = len(mission.stops) <= MOST_LABELS
     over = comparison is not None and comparison.log.ended
@@ -191,14 +202,14 @@ def _marks(mission: Mission, comparison: Comparison | None, frame: _Frame) -> It
 OUTLINE: dict[str, Any] = {"stroke": INK, "stroke_width": 1.5, "vector_effect": "non-scaling-stroke"}
 
 
-def _stop(stop: Stop, label: str, frame: _Frame) -> str:
+def _stop(stop: Stop, label: str, frame: PictureFrame) -> str:
     x, y = frame.place(stop.x, stop.y)
     at = {"cx": f"{x:.3f}", "cy": f"{y:.3f}", "r": f"{frame.mark:.3f}", "fill": "#fff"}
     circle = tag("circle", tag("title", shown(stop.id)), **at, **OUTLINE)
     return circle + (_letter(x, y, label, frame) if label else "")
 
 
-def _cross(stop: Stop, label: str, frame: _Frame, *, over: bool) -> str:
+def _cross(stop: Stop, label: str, frame: PictureFrame, *, over: bool) -> str:
     """A stop that was not scanned: a square with a cross; hollow while the run may still come there."""
     x, y = frame.place(stop.x, stop.y)
     r = frame.mark * 1.1
@@ -209,16 +220,16 @@ def _cross(stop: Stop, label: str, frame: _Frame, *, over: bool) -> str:
     beside = {"x": f"{x + 1.5 * r:.3f}", "y": f"{y + 0.4 * r:.3f}", "font_size": f"{1.3 * r:.3f}"}
     halo = {"stroke": "#fff", "stroke_width": f"{0.25 * r:.3f}", "paint_order": "stroke"}
     text = tag("text", shown(label), font_weight="bold", fill="#8a3000", **beside, **halo)
-    return square + _stroke("".join(strokes), "#fff" if over else INK, 2) + text
+    return square + stroke("".join(strokes), "#fff" if over else INK, 2) + text
 
 
-def _letter(x: float, y: float, content: str, frame: _Frame) -> str:
+def _letter(x: float, y: float, content: str, frame: PictureFrame) -> str:
     size = frame.mark * (1.15 if len(content) < 3 else 0.85)
     return tag("text", shown(content), x=f"{x:.3f}", y=f"{y + 0.36 * size:.3f}", font_size=f"{size:.3f}",
                font_weight="bold", text_anchor="middle")  # fmt: skip
 
 
-def _stood(comparison: Comparison, frame: _Frame) -> Iterator[str]:
+def _stood(comparison: Comparison, frame: PictureFrame) -> Iterator[str]:
     """A diamond where the run was paused or held, or its link was lost."""
     poses = comparison.log.poses
     for event in comparison.log.events:
@@ -229,7 +240,7 @@ def _stood(comparison: Comparison, frame: _Frame) -> Iterator[str]:
             d = f"M{x:.3f} {y - r:.3f}L{x + r:.3f} {y:.3f}L{x:.3f} {y + r:.3f}L{x - r:.3f} {y:.3f}Z"
             why = f"{type(event).__name__}: {getattr(event, 'reason', '')}"
             yield tag(
-                "g", tag("title", shown(why)), _stroke(d, INK, 1.2, fill=YELLOW), _letter(x, y, "!", frame)
+                "g", tag("title", shown(why)), stroke(d, INK, 1.2, fill=YELLOW), _letter(x, y, "!", frame)
             )
 
 
@@ -244,4 +255,4 @@ def _sample(mark: str) -> str:
 
 def line_sample(colour: str, width: float, dash: str = "") -> str:
     style = {"stroke_dasharray": dash} if dash else {}
-    return _stroke("M0 6L26 6", colour, width, **style)
+    return stroke("M0 6L26 6", colour, width, **style)

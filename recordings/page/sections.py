@@ -18,7 +18,7 @@ from recordings.page.plots import plots
 from recordings.page.stop_table import stop_table
 from recordings.page.style import ANSWERS, BLUE, GREY, PURPLE, STATES, VERMILION, YELLOW
 from recordings.page.subject import ReportSubject
-from recordings.page.words import grid, number, row, section, shown, tag
+from recordings.page.words import grid, number, row, section, shown, tag, tile
 
 MOST_ELEMENTS = 40
 """Elements that are listed: the ones least seen."""
@@ -72,10 +72,10 @@ def _plan_tiles(subject: ReportSubject) -> str:
     share = None if subject.sight is None else subject.sight.planned.whole
     visible = "" if share is None else f"{percent(share.visible_share)} of all can be seen"
     tiles = [
-        _tile("stops", str(len(mission.stops)), _bound(subject)),
-        _tile("coverage", percent(None if share is None else share.coverage), visible),
-        _tile("route", f"{route_length(mission):.1f} m", "back to the start" if mission.return_ else "open"),
-        _tile("run time", duration(times.total_s), f"of which scanning {duration(times.scan_s)}"),
+        tile("stops", str(len(mission.stops)), _bound(subject)),
+        tile("coverage", percent(None if share is None else share.coverage), visible),
+        tile("route", f"{route_length(mission):.1f} m", "back to the start" if mission.return_ else "open"),
+        tile("run time", duration(times.total_s), f"of which scanning {duration(times.scan_s)}"),
     ]
     return tag("div", *tiles, class_="tiles")
 
@@ -135,29 +135,25 @@ def _tiles(comparison: Comparison) -> Iterator[str]:
     driven = "not ended" if comparison.driven_s is None else duration(comparison.driven_s)
     tolerance = max((stop.tolerance_m for stop in comparison.mission.stops), default=0.0)
     paused, held = (sum(span.state == state for span in comparison.spans) for state in ("PAUSED", "HELD"))
-    yield _tile(
+    yield tile(
         "stops scanned", f"{comparison.scanned} / {len(comparison.asked)}", f"robot {comparison.log.robot}"
     )
     if comparison.acquired is not None:
         shares, planned = comparison.acquired.shares, comparison.acquired.planned
         asked = percent(shares.whole.required)
         planned_text = f"asked {asked}, planned {percent(planned.whole.coverage)}"
-        yield _tile("coverage acquired", percent(shares.whole.coverage), planned_text)
-    yield _tile("run time", driven, f"planned {duration(comparison.planned_s)}")
-    yield _tile("greatest offset at a stop", _millimetres(away), f"tolerance {1000 * tolerance:.0f} mm")
+        yield tile("coverage acquired", percent(shares.whole.coverage), planned_text)
+    yield tile("run time", driven, f"planned {duration(comparison.planned_s)}")
+    yield tile("greatest offset at a stop", _millimetres(away), f"tolerance {1000 * tolerance:.0f} mm")
     poses = comparison.log.poses
     driven_m = f"{poses.length_m:.1f} m driven" if len(poses) else "the way is not in the log"
-    yield _tile("off the route, worst", _millimetres(beside), driven_m)
+    yield tile("off the route, worst", _millimetres(beside), driven_m)
     stood = comparison.stood_s("PAUSED", "HELD")
-    yield _tile("stood still", duration(stood), f"paused {paused}, held {held}")
+    yield tile("stood still", duration(stood), f"paused {paused}, held {held}")
 
 
 def _millimetres(metres: float | None) -> str:
     return "–" if metres is None else f"{1000 * metres:.1f} mm"
-
-
-def _tile(name: str, value: str, note: str = "") -> str:
-    return tag("div", shown(name), tag("b", shown(value)), tag("small", shown(note)), class_="tile")
 
 
 def _states(comparison: Comparison) -> str:

@@ -52,3 +52,8 @@ def section(title: str, *content: str, **attributes: Any) -> str:
     """A headed part of the page; nothing where there is nothing to head."""
     inside = "".join(content)
     return tag("section", tag("h2", shown(title)), inside, **attributes) if inside else ""
+
+
+def tile(name: str, value: str, note: str = "") -> str:
+    """One number of a page, with its name and a note."""
+    return tag("div", shown(name), tag("b", shown(value)), tag("small", shown(note)), class_="tile")

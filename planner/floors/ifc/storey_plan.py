@@ -55,6 +55,7 @@ def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions)
         level=level.name,
         georeference=georeference,
         status=status,
+        ceiling_m=level.ceiling - level.z,
         ignored=parts.ignored,
         findings=in_order((*odd_products(model), *odd, *odd_place, *worked_out, *known)),
     )

@@ -1,0 +1,199 @@
+"""A proof as one HTML page of the family of reports: the answer, the numbers, the picture, the tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from mission.figures import percent
+from mission.floor import FloorPlan
+from mission.geometry import FloatArray
+from mission.plan_proof import CloudQuality, PlanProof, PromisedShare, ScanPair
+from mission.proof_text import (
+    assumed_words,
+    coverage_words,
+    missed_words,
+    network_words,
+    verdict,
+)
+from recordings.carried.floor_lines import FloorLines
+from recordings.page.floor_picture import PictureFrame, along, legend, line_sample, plan_picture, stroke
+from recordings.page import whole_page
+from recordings.page.style import ANSWERS, BLUE, GREEN, GREY, VERMILION
+from recordings.page.subject import ReportSubject
+from recordings.page.words import grid, number, row, section, shown, tag, tile
+from recordings.strokes import name_point, outlines
+
+UNMET_SHOWN = 12
+"""Sentences of what is not met that stand in the band; the tables have all."""
+
+
+def proof_html(proof: PlanProof, floor: FloorPlan) -> bytes:
+    """The page; the same proof gives the same bytes."""
+    parts = [_title(proof), _band(proof), _tiles(proof), _picture(proof, floor), *_tables(proof)]
+    return whole_page(f"{proof.mission.name}: proof", "\n".join(parts))
+
+
+def _title(proof: PlanProof) -> str:
+    mission = proof.mission
+    about = f"mission {mission.id[:12]}, revision {mission.revision}, floor {mission.origin.floor}"
+    return tag("h1", shown(f"{mission.name}: proof by simulation"), " ", tag("small", shown(about)))
+
+
+def _band(proof: PlanProof) -> str:
+    """The answer; where something is not met, what."""
+    lines = "".join(tag("li", shown(line)) for line in proof.unmet[:UNMET_SHOWN])
+    more = len(proof.unmet) - UNMET_SHOWN
+    lines += tag("li", shown(f"and {more} more")) if more > 0 else ""
+    inside = tag("b", shown(verdict(proof))) + (tag("ul", lines) if lines else "")
+    return tag("div", inside, class_="band", style=f"background:{ANSWERS['yes' if proof.met else 'no']}")
+
+
+def _tiles(proof: PlanProof) -> str:
+    network, quality, whole = proof.network, proof.quality, proof.whole
+    acquired = f"{whole.kept:.0f} {proof.unit}" if whole.simulated is None else percent(whole.simulated)
+    drift = f"worst stop {1000 * network.adrift_m:.1f} mm off" if network.registered else "none registers"
+    scans = "one network" if network.closed else f"{len(network.pieces)} pieces"
+    tiles = [
+        tile("coverage acquired", acquired, coverage_words(whole, proof.unit)),
+        tile("surface with points", f"{quality.seen_m2:.0f} m²", f"of {quality.total_m2:.0f} m² of targets"),
+        tile("at 10 mm or closer", percent(quality.by_spacing_mm.get(10)), "of the surface with points"),
+        tile("at 70° or steeper", percent(quality.by_incidence_deg.get(70)), "of the surface with points"),
+        tile("from two stops", percent(quality.by_stops.get(2)), "of the surface with points"),
+        tile("scans", scans, drift),
+    ]
+    return tag("div", *tiles, class_="tiles")
+
+
+def _picture(proof: PlanProof, floor: FloorPlan) -> str:
+    subject = ReportSubject((proof.mission,), floor=_lines_of(floor))
+    picture = plan_picture(subject, None, beneath=lambda frame: _layers(proof, frame))
+    marks = [
+        (line_sample(BLUE, 2.4), "points lie on it"),
+        (line_sample(VERMILION, 5), "promised, and missed"),
+        (line_sample(GREY, 1.2, "4 3"), "target without points"),
+        (line_sample(GREEN, 3), "scans that register"),
+        (line_sample(VERMILION, 1.5, "2 4"), "scans that share surfaces and do not register"),
+    ]
+    return section("The floor", picture, legend(marks))
+
+
+def _layers(proof: PlanProof, frame: PictureFrame) -> Iterator[str]:
+    """Targets by what became of them, and the pairs."""
+    promised = proof.seen if proof.promised is None else proof.promised
+    missed = promised & ~proof.seen
+    yield stroke(along(proof.targets, ~proof.seen & ~missed, frame), GREY, 1.2, stroke_dasharray="4 3")
+    yield stroke(along(proof.targets, missed, frame), VERMILION, 5)
+    yield stroke(along(proof.targets, proof.seen, frame), BLUE, 2.4)
+    place = {stop.id: (stop.x, stop.y) for stop in proof.mission.stops}
+
+    def lines(wanted: bool) -> str:
+        pairs = (pair for pair in proof.network.pairs if pair.registered == wanted)
+        return frame.path([np.array([place[pair.a], place[pair.b]]) for pair in pairs])
+
+    yield stroke(lines(False), VERMILION, 1.5, stroke_dasharray="2 4")
+    yield stroke(lines(True), GREEN, 3)
+
+
+def _lines_of(floor: FloorPlan) -> FloorLines:
+    """The floor as the pictures of reports have it."""
+    kinds: dict[str, list[FloatArray]] = {}
+    for item in floor.elements:
+        kinds.setdefault(item.kind, []).extend([*outlines(item.solids), *item.lines])
+    named = [room for room in floor.rooms if room.polygons]
+    places = (name_point(max(room.polygons, key=lambda polygon: polygon.area)) for room in named)
+    return FloorLines(
+        outline=tuple(outlines(floor.outline)),
+        rooms=tuple(line for room in floor.rooms for line in outlines(room.polygons)),
+        kinds={kind: tuple(lines) for kind, lines in kinds.items()},
+        openings=tuple(item.line for item in floor.openings),
+        names=tuple((room.label, float(x), float(y)) for room, (x, y) in zip(named, places, strict=True)),
+    )
+
+
+def _tables(proof: PlanProof) -> Iterator[str]:
+    yield section("Acquired", _listed([coverage_words(proof.whole, proof.unit), *missed_words(proof)]))
+    columns = [
+        section("Rooms", _shares(proof.rooms, "room", proof.unit)),
+        tag("div", section("Kinds", _shares(proof.kinds, "kind", proof.unit)), _quality(proof.quality)),
+        section("Stops", _stops(proof)),
+    ]
+    yield tag("div", *columns, class_="columns")
+    yield section("The network", _listed(network_words(proof)), _pairs(proof.network.pairs))
+    yield section("Taken for granted", _listed(assumed_words(proof.simulation)))
+    digests = (("mission", proof.mission.digest), ("floor", proof.mission.origin.floor_digest))
+    lines = (tag("li", shown(f"{name} "), tag("code", shown(digest))) for name, digest in digests)
+    yield section("Digests (sha256)", tag("ul", *lines))
+
+
+def _listed(lines: Sequence[str]) -> str:
+    return tag("ul", *(tag("li", shown(line)) for line in lines))
+
+
+def _shares(shares: Sequence[PromisedShare], what: str, unit: str) -> str:
+    rows = [
+        row(
+            [
+                shown(item.name),
+                number(item.promised),
+                number(item.kept),
+                percent(item.coverage),
+                percent(item.simulated),
+            ]
+        )
+        for item in shares
+    ]
+    return grid((what, f"promised {unit}", f"acquired {unit}", "coverage", "simulated"), rows)
+
+
+def _stops(proof: PlanProof) -> str:
+    rows = [
+        row(
+            [
+                shown(item.stop),
+                str(item.claimed),
+                str(item.sighted),
+                str(item.units),
+                f"{item.points / 1e6:.2f}",
+            ],
+            **({"class_": "missing"} if item.short else {}),
+        )
+        for item in proof.stops
+    ]
+    return grid(("stop", "claims units", "in sight", "got", "million points"), rows)
+
+
+def _quality(quality: CloudQuality) -> str:
+    rows = [
+        *(
+            row([f"spacing up to {limit} mm", percent(share)])
+            for limit, share in quality.by_spacing_mm.items()
+        ),
+        *(
+            row([f"incidence up to {limit}°", percent(share)])
+            for limit, share in quality.by_incidence_deg.items()
+        ),
+        *(row([f"from {least} stops or more", percent(share)]) for least, share in quality.by_stops.items()),
+    ]
+    return section("Surface with points", grid(("", "share"), rows))
+
+
+def _pairs(pairs: Sequence[ScanPair]) -> str:
+    if not pairs:
+        return ""
+    rows = [
+        row(
+            [
+                shown(f"{pair.a} – {pair.b}"),
+                percent(pair.shared),
+                number(pair.error_m, 1000),
+                number(pair.error_deg, digits=3),
+                "" if pair.free_deg is None else f"along {pair.free_deg:.0f}°",
+                "yes" if pair.registered else "no",
+            ],
+            **({} if pair.registered else {"class_": "missing"}),
+        )
+        for pair in pairs
+    ]
+    return grid(("pair", "shared", "off, mm", "off, °", "free", "registers"), rows)

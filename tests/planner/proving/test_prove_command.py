@@ -1,0 +1,96 @@
+"""`stopgo prove` as a user calls it: its files, its answers, and what it refuses in one line."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import ezdxf
+import pytest
+
+from recordings.read import check
+from tests.called import stopgo
+from tests.disk import small_disk
+
+COARSE = ("--step", "1")
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a floor of one room, and its plan."""
+    folder = tmp_path_factory.mktemp("proof")
+    drawing = ezdxf.new(units=6)
+    inside, outside = [(0, 0), (4, 0), (4, 3), (0, 3)], [(-0.2, -0.2), (4.2, -0.2), (4.2, 3.2), (-0.2, 3.2)]
+    space = drawing.modelspace()
+    for layer, ring in (("FLOOR", inside), ("ROOMS", inside), ("WALLS", outside), ("WALLS", inside[::-1])):
+        space.add_lwpolyline(ring, close=True, dxfattribs={"layer": layer})
+    drawing.saveas(folder / "floor.dxf")
+    assert stopgo("plan", str(folder / "floor.dxf"), "-o", str(folder)).returncode == 0
+    return folder
+
+
+def prove(folder: Path, *more: str):
+    return stopgo("prove", str(folder / "mission.json"), "--floor", str(folder / "floor.dxf"), *COARSE, *more)
+
+
+def test_a_proof_is_written_read_back_and_told(planned: Path) -> None:
+    told = prove(planned, "--json")
+    assert told.stderr == ""
+    answer = json.loads(told.stdout)
+    assert told.returncode == (0 if answer["met"] else 1)
+    assert answer["network"]["closed"]
+    assert {Path(path).name for path in answer["files"].values()} == {"proof.json", "proof.rrd", "proof.html"}
+    written = json.loads((planned / "proof.json").read_text(encoding="utf-8"))
+    assert written == {key: value for key, value in answer.items() if key != "files"}
+    mission = json.loads((planned / "mission.json").read_text(encoding="utf-8"))
+    held = check(planned / "proof.rrd")
+    assert (held.complete, held.recording_id) == (True, mission["id"])
+    assert "/world/proof/clouds/s01" in held.rows
+    page = (planned / "proof.html").read_text(encoding="utf-8")
+    assert "proof by simulation" in page and mission["digest"] in page
+
+
+def test_another_floor_is_refused(planned: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.dxf"
+    other.write_bytes((planned / "floor.dxf").read_bytes() + b"999\nanother\n")
+    told = stopgo("prove", str(planned / "mission.json"), "--floor", str(other), "-o", str(tmp_path))
+    assert (told.returncode, told.stdout) == (2, "")
+    assert "is not the floor" in told.stderr and told.stderr.count("\n") == 1
+    assert not (tmp_path / "proof.json").exists()
+
+
+@pytest.mark.parametrize("library", ["embreex", "small_gicp"])
+def test_a_missing_library_is_told_with_its_extra(
+    planned: Path, library: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, library, None)
+    told = prove(planned)
+    assert (told.returncode, told.stdout) == (2, "")
+    assert (
+        told.stderr == f'stopgo: {library} is not installed; install it with: pip install "stopgo[prove]"\n'
+    )
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--step", "0.0001"), ("--height", "3"), ("--coverage", "none.json")]
+)
+def test_what_cannot_be_is_one_line(planned: Path, option: str, value: str) -> None:
+    told = prove(planned, option, value)
+    assert (told.returncode, told.stdout) == (2, "")
+    assert told.stderr.count("\n") == 1
+    assert option in told.stderr or value in told.stderr
+
+
+def test_on_a_full_disk_nothing_is_left(planned: Path, tmp_path: Path) -> None:
+    with small_disk(2000):
+        told = prove(planned, "-o", str(tmp_path))
+    assert told.returncode == 2
+    assert told.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_anything_is_done(planned: Path) -> None:
+    told = prove(planned, "-o", str(planned / "floor.dxf"))
+    assert told.returncode == 2
+    assert "floor.dxf" in told.stderr

@@ -1,0 +1,207 @@
+"""Proof by simulation: what is counted on small floors, what is caught, and what of it registers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from msgspec.structs import replace as changed
+
+from mission.errors import AnswerIsNo
+from mission.files.coverage_json import Coverage, coverage_json
+from mission.floor import FloorPlan
+from mission.geometry import FloatArray, frozen
+from mission.plan_proof import PlanProof, Simulation
+from mission.planning import NavigableSpace
+from mission.settings import Settings
+from planner import plan
+from planner.proving.casting import RayFan, SolidScene
+from planner.proving.extrusion import NONE, extruded
+from planner.proving.proving import prove
+from planner.proving.registering import off, registered
+from planner.proving.scanning import Stand, scanned
+from planner.proving.strips import strips_of
+from planner.space.navigable import navigable
+from tests.planner.worlds import box, column, element, hall, two_rooms
+
+COARSE = Simulation(range_m=10.0, step_deg=0.2)
+COARSEST = Simulation(range_m=10.0, step_deg=0.5)
+
+
+def proved(floor: FloorPlan, settings: Settings, simulation: Simulation = COARSE) -> PlanProof:
+    """The proof of a floor's own plan."""
+    import msgspec
+
+    made = plan(floor, settings)
+    told = msgspec.json.decode(coverage_json(made.route, made.mission, made.figures), type=Coverage)
+    return prove(made.mission, made.space, replace(simulation, range_m=settings.range), told)
+
+
+def test_rays_meet_what_they_must_where_it_is() -> None:
+    solids = extruded(hall(6, 4), [], 2.5)
+    place = np.array([3.0, 2.0, 1.0]) - [*solids.origin, 0.0]
+    scene = SolidScene(solids, place, see_through=False, open_door=NONE)
+    corners = np.array([(3, 0, 0.2), (-3, 0, 0.2), (0, 2, -0.2), (0, -2, 0.2), (0, 0.5, 1.5), (0.5, 0, -1)])
+    inward = corners * (1 - 1e-3)
+    assert scene.in_sight(inward).all()
+    assert not scene.in_sight(corners * 1.05).any(), "nothing beyond walls, floor and ceiling"
+
+
+def test_points_on_a_wall_are_as_many_as_its_angle_has_rays() -> None:
+    """A wall 6 m long, 2 m before the scanner: 2 atan(3 / 2) of the turn falls on it."""
+    space = space_of(hall(6, 4))
+    simulation = replace(COARSE, step_deg=0.25)
+    solids = extruded(space.floor, [], simulation.ceiling_m)
+    strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
+    place = np.array([3.0, 2.0, 1.3]) - [*solids.origin, 0.0]
+    found = scanned(solids, strips, Stand(place, 0.0), simulation)
+    cell = strips.middle[found.cell]
+    level = np.abs(cell[:, 2] - 1.25) < 0.06
+    south = level & (np.abs(cell[:, 1] - place[1] + 2.0) < 1e-6)
+    azimuths = math.degrees(2 * math.atan(3 / 2)) / simulation.step_deg
+    widest = math.degrees(2 * math.atan(0.1 / 2)) / simulation.step_deg
+    assert azimuths * 1 < found.points[south].sum() < azimuths * (widest + 1)
+    assert found.incidence[south].max() == pytest.approx(math.atan(3 / 2), abs=0.02)
+    flat = np.hypot(found.cloud[:, 0], found.cloud[:, 1])
+    assert flat.max() <= math.hypot(3, 2) + 0.02, "nothing is met beyond the corners"
+
+
+def test_every_target_of_a_hall_is_acquired_from_its_middle() -> None:
+    proof = proved(hall(3, 2), Settings(range=10.0))
+    assert proof.met
+    assert proof.whole.kept == pytest.approx(10.0)
+    assert proof.quality.seen_m2 == pytest.approx(10.0 * 2.7)
+    assert proof.quality.by_stops[1] == 1.0
+
+
+def test_what_stops_claim_is_in_sight_one_by_one() -> None:
+    """By another program's rays: the plan's own sight has no part in it."""
+    floor = two_rooms(0.9, more=[column("c1", 2.2, 1.0), column("c2", 6.1, 2.9)])
+    proof = proved(floor, Settings(range=4.0), COARSEST)
+    for stop in proof.stops:
+        assert abs(stop.sighted - stop.claimed) <= 1, "at most one sight line that touches a corner"
+
+
+def test_a_stop_that_was_moved_is_caught() -> None:
+    made = plan(two_rooms(0.9), Settings(range=3.0))
+    first, *others = made.mission.stops
+    lying = changed(made.mission, stops=(changed(first, x=0.8, y=0.8), *others))
+    proof = prove(lying, made.space, replace(COARSEST, range_m=3.0), None)
+    assert not proof.met
+    assert any(first.id in line for line in proof.unmet)
+
+
+def test_a_stop_that_was_removed_is_caught() -> None:
+    floor = two_rooms(0.9)
+    made = plan(floor, Settings(range=4.0))
+    told = coverage_of(made)
+    lying = changed(made.mission, stops=made.mission.stops[:-1])
+    proof = prove(lying, made.space, replace(COARSEST, range_m=4.0), told)
+    assert not proof.met
+    assert "coverage" in proof.unmet[0]
+    assert sum(proof.missed.values()) > 1.0
+
+
+def test_a_mission_without_stops_is_no() -> None:
+    made = plan(hall(), Settings())
+    with pytest.raises(AnswerIsNo, match="no stops"):
+        prove(changed(made.mission, stops=()), made.space, COARSE, None)
+
+
+def test_beams_are_seen_from_below_and_windows_seen_through() -> None:
+    beam = element("beam", "beams", box(2.0, 0.0, 2.3, 4.0))
+    pane = element("pane", "windows", box(4.0, 1.0, 4.05, 3.0))
+    proof = proved(
+        hall(6, 4, beam, pane), Settings(range=10.0, targets=("walls", "beams", "windows")), COARSE
+    )
+    by_kind = {share.name: share for share in proof.kinds}
+    assert by_kind["beams"].simulated == pytest.approx(1.0, abs=0.05)
+    assert by_kind["windows"].kept > 0
+    assert by_kind["walls"].kept > 0.95 * by_kind["walls"].promised, "behind the pane too"
+
+
+def test_closed_doors_stop_rays_except_from_the_doorway() -> None:
+    settings = Settings(range=10.0, doors="closed", door_scan=True)
+    proof = proved(two_rooms(0.9), settings, COARSEST)
+    assert not [stop for stop in proof.stops if stop.short]
+    shut = {stop.stop: stop for stop in proof.stops}
+    doorway = next(stop.id for stop in proof.mission.stops if stop.doorway)
+    assert shut[doorway].sighted >= 0.98 * shut[doorway].claimed
+
+
+def test_the_same_seed_gives_the_same_proof() -> None:
+    one, other = (proved(hall(6, 4, column("c", 2, 2)), Settings(range=3.0), COARSEST) for _ in range(2))
+    assert one.network == other.network
+    assert all(np.array_equal(a.xyz, b.xyz) for a, b in zip(one.clouds, other.clouds, strict=True))
+
+
+# ---- registration ----
+
+
+def clouds_of(
+    floor: FloorPlan, places: list[tuple[float, float]], simulation: Simulation
+) -> list[FloatArray]:
+    space = space_of(floor)
+    solids = extruded(space.floor, [], simulation.ceiling_m)
+    strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
+    stands = [
+        Stand(frozen([x, y, 1.3] - np.array([*solids.origin, 0.0])), 0.0, number=k)
+        for k, (x, y) in enumerate(places)
+    ]
+    return [scanned(solids, strips, stand, simulation).cloud for stand in stands]
+
+
+def pair_of(floor: FloorPlan, a: tuple[float, float], b: tuple[float, float], simulation: Simulation):
+    found = registered(
+        ("a", "b"), np.array([(*a, 1.3), (*b, 1.3)]), clouds_of(floor, [a, b], simulation), simulation
+    )
+    return [item.pair for item in found]
+
+
+def test_two_scans_of_one_room_register_from_a_given_error() -> None:
+    (pair,) = pair_of(hall(6, 4, column("c", 2, 2)), (1.5, 1.0), (4.5, 3.0), COARSEST)
+    assert pair.registered
+    assert pair.free_deg is None
+    assert pair.error_m < 0.003
+
+
+def test_scans_along_a_corridor_are_free_along_it_and_told_so() -> None:
+    """Its ends are out of range: nothing holds the pair along x."""
+    simulation = replace(COARSEST, range_m=4.0)
+    (pair,) = pair_of(hall(30, 2), (13.0, 1.0), (15.0, 1.0), simulation)
+    assert not pair.registered
+    assert pair.free_deg is not None
+    assert min(pair.free_deg, 180 - pair.free_deg) < 5
+
+
+def test_the_two_sides_of_a_wall_are_no_pair() -> None:
+    floor = two_rooms(0.9, thick=0.1, at=0.5)
+    assert pair_of(floor, (2.0, 3.0), (6.0, 3.0), replace(COARSEST, range_m=3.0)) == []
+
+
+def test_how_far_off_a_pose_is() -> None:
+    turned = np.eye(4)
+    angle = math.radians(3)
+    turned[:2, :2] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    turned[:3, 3] = (0.03, 0.04, 0.0)
+    assert off(turned) == pytest.approx((0.05, 3.0))
+
+
+def test_rays_are_told_by_the_step() -> None:
+    fan = RayFan.of(replace(COARSE, fov_deg=90.0, step_deg=1.0), heading=0.0)
+    assert len(fan.azimuth) == 90
+    assert math.degrees(fan.azimuth[0]) == pytest.approx(-44.5)
+    assert math.degrees(fan.elevation[0]) == pytest.approx(-59.5)
+    assert math.degrees(fan.elevation[-1]) == pytest.approx(89.5)
+
+
+def space_of(floor: FloorPlan) -> NavigableSpace:
+    return navigable(floor, Settings())
+
+
+def coverage_of(made) -> Coverage:
+    import msgspec
+
+    return msgspec.json.decode(coverage_json(made.route, made.mission, made.figures), type=Coverage)
