@@ -240,5 +240,38 @@ class PoseReport(msgspec.Struct, frozen=True, kw_only=True):
     speed: float
 
 
+class Health(msgspec.Struct, frozen=True, kw_only=True):
+    """How a robot's base is, as far as it tells; each thing is `None` where it does not."""
+
+    robot_ns: int
+    run_id: str | None
+    battery: float
+    """0 to 1."""
+    localisation: float | None = None
+    """How well it knows where it is, 0 to 1."""
+    emergency_stop: bool | None = None
+    """Whether an emergency stop is pressed."""
+    safety_field: bool | None = None
+    """Whether something stands in the field that its safety scanners watch."""
+
+
+class PosesMissing(msgspec.Struct, frozen=True, kw_only=True):
+    """Where the robot was between two times of a run is not known, and why not."""
+
+    run_id: str
+    robot_ns: int
+    """From this time on."""
+    until_ns: int
+    mission_time_s: float
+    """Of `robot_ns`."""
+    reason: str
+
+    @property
+    def words(self) -> str:
+        """As a person reads it."""
+        seconds = (self.until_ns - self.robot_ns) / 1e9
+        return f"no poses for {seconds:.1f} s: {self.reason}" if seconds > 0 else f"no poses: {self.reason}"
+
+
 Report = StateReport | PoseReport | AnyEvent
 """What a robot tells of itself and its run."""

@@ -11,7 +11,7 @@ import numpy as np
 from mission.comparing.compare import compare
 from mission.comparison import Comparison
 from mission.document import Mission
-from mission.events import AnyEvent, PoseReport, StateReport
+from mission.events import AnyEvent, Health, PoseReport, PosesMissing, StateReport
 from mission.run_log import LogSource, RunLog, Track
 from mission.sight import Sight
 
@@ -28,6 +28,10 @@ class RunTaker(Protocol):
     def pose(self, report: PoseReport) -> None: ...
 
     def event(self, event: AnyEvent) -> None: ...
+
+    def health(self, told: Health) -> None: ...
+
+    def missing(self, gap: PosesMissing) -> None: ...
 
 
 class HeardRun:
@@ -68,6 +72,16 @@ class HeardRun:
             self._events[event.number] = event
         if self._onward is not None:
             self._onward.event(event)
+
+    def health(self, told: Health) -> None:
+        """Hand on how the robot's base was."""
+        if self._onward is not None:
+            self._onward.health(told)
+
+    def missing(self, gap: PosesMissing) -> None:
+        """Hand on that nobody knows where the robot was for a time."""
+        if self._onward is not None:
+            self._onward.missing(gap)
 
     def log(self) -> RunLog | None:
         """What was heard of the newest run; None if it told nothing yet."""

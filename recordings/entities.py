@@ -172,6 +172,11 @@ class RunEntities:
         """Events as values."""
         return self.flat(EVENTS)
 
+    @property
+    def health(self) -> str:
+        """How the base was, as values."""
+        return self.flat(HEALTH)
+
 
 @dataclass(frozen=True)
 class Revision:
@@ -190,6 +195,7 @@ class Revision:
 
 
 EVENTS = "events"
+HEALTH = "health"
 ROBOT = "robot"
 DRIVEN = "driven"
 STATE = "state"

@@ -10,7 +10,16 @@ from typing import Any
 
 from mission.document import Mission
 from mission.errors import InputError
-from mission.events import Aborted, AnyEvent, Finished, PoseReport, Report, StateReport
+from mission.events import (
+    Aborted,
+    AnyEvent,
+    Finished,
+    Health,
+    PoseReport,
+    PosesMissing,
+    Report,
+    StateReport,
+)
 from mission.files.atomic import must_be_writable
 from mission.heard_run import track_of
 from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
@@ -23,6 +32,8 @@ from recordings.pieces import Pieces
 from recordings.runs.drawing import RunDrawing
 from recordings.stages.mission import draw_mission, mission_extent
 
+Taken = Report | Health | PosesMissing
+"""What is drawn of a run."""
 MOST_POSES = 1000
 """Poses that wait to be drawn together; a state comes each second and lets them be drawn."""
 
@@ -50,7 +61,7 @@ class FieldRecording:
     ) -> None:
         self.path = path
         self._say = say
-        self._waiting: list[Report] = []
+        self._waiting: list[Taken] = []
         self._poses: list[PoseReport] = []
         self._told_end = False
         self._runs: dict[str, RunDrawing] = {}
@@ -97,6 +108,14 @@ class FieldRecording:
     def pose(self, report: PoseReport) -> None:
         """Take a pose of the robot."""
         self._take(report)
+
+    def health(self, told: Health) -> None:
+        """Take how the robot's base was."""
+        self._take(told)
+
+    def missing(self, gap: PosesMissing) -> None:
+        """Take that nobody knows where the robot was for a time: no path is drawn through it."""
+        self._take(gap)
 
     def event(self, event: AnyEvent) -> None:
         """Take a line of the robot's journal; what was told before it is on disk then."""
@@ -164,14 +183,14 @@ class FieldRecording:
             carry_plan(self._canvas, self._plan, mission)
         self._save()
 
-    def _take(self, report: Report) -> None:
+    def _take(self, report: Taken) -> None:
         """Draw the report, or let it and all after it wait for the mission it is told of."""
         if self._newest is None or self._waiting or _revision(report) > self._newest.revision:
             self._waiting.append(report)
         else:
             self._draw(report)
 
-    def _draw(self, report: Report) -> None:
+    def _draw(self, report: Taken) -> None:
         """Draw a report; poses wait for others, and are drawn before what is told after them."""
         assert self._newest is not None
         if report.run_id is None:
@@ -203,19 +222,19 @@ class FieldRecording:
         return self._runs[run_id]
 
 
-def _revision(report: Report) -> int:
+def _revision(report: Taken) -> int:
     """The revision that a report is told of; poses are of any."""
     return getattr(report, "revision", None) or 0
 
 
 class _Draw(dict[type, Callable[[RunDrawing, Any], None]]):
-    """How each report is drawn; every report that is no state is an event; poses are drawn together."""
+    """How each report is drawn; what has no line here is an event; poses are drawn together."""
 
     def __missing__(self, kind: type) -> Callable[[RunDrawing, Any], None]:
         return RunDrawing.event
 
 
-_DRAW = _Draw({StateReport: RunDrawing.state})
+_DRAW = _Draw({StateReport: RunDrawing.state, Health: RunDrawing.health, PosesMissing: RunDrawing.missing})
 
 
 def _free_name(path: Path) -> Path:

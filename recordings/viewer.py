@@ -14,7 +14,7 @@ from pathlib import Path
 
 from mission.document import Mission
 from mission.errors import InputError
-from mission.events import AnyEvent, PoseReport, StateReport
+from mission.events import AnyEvent, Health, PoseReport, PosesMissing, StateReport
 from mission.ports import free_port
 from recordings.compact import VIEWER
 from recordings.field import FieldRecording
@@ -88,3 +88,9 @@ class Viewed:
 
     def event(self, event: AnyEvent) -> None:
         self._record.event(event)
+
+    def health(self, told: Health) -> None:
+        self._record.health(told)
+
+    def missing(self, gap: PosesMissing) -> None:
+        self._record.missing(gap)

@@ -46,6 +46,9 @@ def robot(
     revision: Annotated[
         str, typer.Option(metavar="next-stop|refuse", help="What becomes of a revision pushed during a run.")
     ] = "next-stop",
+    record: Annotated[
+        float, typer.Option(metavar="MB", min=1, help="How much of its disk the record of its runs may take.")
+    ] = 512,
     controller: Annotated[
         str,
         typer.Option(
@@ -114,7 +117,7 @@ def robot(
     options = RobotOptions(
         name=name, listen=listen, connect=connect, state=state, body=body, site=site, speed_up=speed_up,
         to_map=to_map, insecure=insecure, revisions=read_revisions(revision), keys=keys, faults=faults,
-        say=say,
+        say=say, record_bytes=round(record * 1e6),
     )  # fmt: skip
     where = f"listens on {listen}" if connect is None else f"connects to {connect}"
     run_robot(options, ready=lambda: say(f"ready {name} {where}"))

@@ -88,6 +88,7 @@ def _watching(keys: KeyExpressions, name: str) -> Flow:
             keys.keep,
             keys.log,
             keys.poses,
+            keys.record,
             keys.mission("*", "part/*"),
             keys.mavlink("hello"),
         ),

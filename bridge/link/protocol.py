@@ -14,7 +14,7 @@ import msgspec
 
 from mission.document import Transform
 from mission.errors import InputError
-from mission.events import AnyEvent, PoseReport, StateReport, event_of
+from mission.events import AnyEvent, Health, PoseReport, PosesMissing, StateReport, event_of
 from mission.run.lease import Lease
 from mission.run.orders import Answer, Count, ShortText
 
@@ -27,6 +27,10 @@ LOG_PAGE: Final = 100
 """Events in one answer of the log: some 30 kB, a second on a slow line."""
 POSE_PAGE: Final = 50
 """Poses in one answer: some 12 kB."""
+RECORD_PAGE: Final = 20
+"""Entries of a record in one answer: ten seconds of a run, some 25 kB."""
+RECORD: Final = "record"
+"""The capability of a robot that keeps a record of its runs."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _SITE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}(/[A-Za-z0-9][A-Za-z0-9_.-]{0,63})*")
@@ -74,6 +78,10 @@ class KeyExpressions:
     @property
     def poses(self) -> str:
         return f"{self.root}/poses"
+
+    @property
+    def record(self) -> str:
+        return f"{self.root}/record"
 
     @property
     def state(self) -> str:
@@ -255,6 +263,62 @@ class PosePage(Tagged, frozen=True):
     poses: tuple[PoseReport, ...]
 
 
+class PoseRow(msgspec.Struct, frozen=True, array_like=True):
+    """A pose of a record, as an array: what a `PoseReport` tells, but for what all of an entry share."""
+
+    seq: int
+    robot_ns: int
+    x: float
+    y: float
+    heading: float
+    speed: float
+
+
+class RecordEntry(msgspec.Struct, frozen=True, kw_only=True):
+    """Half a second of a run, as the robot wrote it down; of one boot."""
+
+    number: int
+    """From 1 within the run, also over reboots."""
+    boot_id: str
+    began_ns: int
+    """When the run began."""
+    poses: tuple[PoseRow, ...] = ()
+    states: tuple[StateReport, ...] = ()
+    """Those that differ from the one before."""
+    health: tuple[Health, ...] = ()
+    missing: tuple[PosesMissing, ...] = ()
+    """What is not in the record before this."""
+
+
+class RecordPage(Tagged, frozen=True):
+    """Entries of one run's record, by number; `newest` tells whether there are more."""
+
+    run_id: str
+    since: int
+    """The number before the first entry's."""
+    entries: tuple[RecordEntry, ...]
+    newest: int
+    missing: tuple[PosesMissing, ...] = ()
+    """What finds no room at present; an entry tells of it when there is room again."""
+
+
+class RunKept(msgspec.Struct, frozen=True, kw_only=True):
+    """A run of which the robot keeps a record."""
+
+    run_id: str
+    entries: int
+    bytes: int
+    """On the robot's disk."""
+    retired: bool
+    """Whether only that it was is left, for want of room."""
+
+
+class RecordIndex(Tagged, frozen=True):
+    """The runs that the robot keeps records of, oldest first; the last may be under way."""
+
+    runs: tuple[RunKept, ...]
+
+
 Reply = (
     Info
     | Booted
@@ -265,6 +329,8 @@ Reply = (
     | Answer
     | LogPage
     | PosePage
+    | RecordPage
+    | RecordIndex
     | MissionPart
     | Malformed
 )
@@ -303,8 +369,8 @@ def parts_of(key: str) -> list[str]:
     return place_of(key)[2].split("/")
 
 
-def count_of(text: str) -> int:
+def count_of(text: str, *, digits: int = 15) -> int:
     """The number in a key or parameter; raises `ValueError` for anything but a plain, not too large one."""
-    if not text.isdecimal() or len(text) > 15:
+    if not text.isdecimal() or len(text) > digits:
         raise ValueError(f"{text[:20]!r} is not a number")
     return int(text)

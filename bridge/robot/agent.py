@@ -21,6 +21,7 @@ from bridge.link.link import Link, Request
 from bridge.link.protocol import (
     CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
+    RECORD,
     VERSION,
     Booted,
     Commit,
@@ -37,6 +38,7 @@ from bridge.link.protocol import (
 from bridge.robot.inbox import Inbox
 from bridge.robot.journal import Journal
 from bridge.robot.pages import POSES_KEPT, address_of, events_page, part_page, poses_page
+from bridge.robot.recorder import ENTRY_S, RunRecorder
 from bridge.robot.refusal_log import RefusalLog
 from bridge.robot.runner import Position, Runner, state_report
 from mission import __version__
@@ -44,6 +46,7 @@ from mission.document import Transform
 from mission.events import PoseReport, StateReport
 from mission.run.lease import Lease, kept
 from mission.run.orders import Order
+from mission.run.states import Run
 
 STATE_EVERY_S = 1.0
 POSE_EVERY_S = 0.05
@@ -117,6 +120,7 @@ class Agent:
         failed: Callable[[Exception], None] = lambda error: None,
         stand_still: Callable[[str], None] | None = None,
         refusals: RefusalLog | None = None,
+        recorder: RunRecorder | None = None,
     ) -> None:
         """`inbox` takes missions, if the robot does; `failed` is told what ended one of its works.
 
@@ -126,6 +130,7 @@ class Agent:
         self._stand_still = stand_still
         self._refusals = refusals or RefusalLog(lambda line: None, now_utc)
         self._looked_ns = command_clock.now_ns()
+        self._recorder = recorder
         self._link = link
         self._journal = journal
         self._runner = runner
@@ -157,6 +162,8 @@ class Agent:
         link.serve(keys.boot, lambda request: encode(Booted(boot_id=self._runner.boot_id)))
         link.serve(keys.log, self._log)
         link.serve(keys.poses, self._past_poses, bulk=True)
+        if self._recorder is not None:
+            link.serve(keys.record, self._record, bulk=True)
         link.serve(keys.mission("*", "**" if self._inbox else "part/*"), self._mission, bulk=True)
         link.serve(keys.command("*"), self._command)
         link.watch_presence(keys.watcher("*"), self._watcher)
@@ -169,7 +176,8 @@ class Agent:
         self._tell_event = link.publisher(keys.event)
         self._tell_pose = link.publisher(keys.pose, bulk=True)
         self._runner.changed = self._news.set
-        for work in (*self._runner.works, self._tell_news, self._tell_poses):
+        recording = () if self._recorder is None else (self._write_record,)
+        for work in (*self._runner.works, self._tell_news, self._tell_poses, *recording):
             thread = threading.Thread(target=self._watched, args=(work,), name=work.__name__, daemon=True)
             self._threads.append(thread)
             thread.start()
@@ -199,6 +207,8 @@ class Agent:
         self._news.set()
         for thread in self._threads:
             thread.join()
+        if self._recorder is not None:
+            self._recorder.close()
 
     def _watcher(self, key: str, alive: bool) -> None:
         (self._watchers.add if alive else self._watchers.discard)(key)
@@ -289,6 +299,7 @@ class Agent:
             document_bytes=MAX_DOCUMENT_BYTES,
             profiles=None if self._inbox is None else self._inbox.profiles,
             to_map=self._to_map,
+            capabilities=() if self._recorder is None else (RECORD,),
         )
         return encode(info)
 
@@ -310,6 +321,11 @@ class Agent:
         # A copy: meanwhile the robot goes on writing.
         return encode(poses_page(self._poses.copy(), self._poses_boot, request))
 
+    def _record(self, request: Request) -> bytes:
+        self._contact(request)
+        assert self._recorder is not None
+        return encode(self._recorder.answer(request))
+
     def _tell_news(self) -> None:
         """State on every change and every second; each event once, in order."""
         told = self._journal.newest
@@ -321,7 +337,10 @@ class Agent:
             for event in self._journal.events(since=told):
                 self._tell_event(encode(event))
                 told = event.number
-            self._tell_state(encode(self._state()))
+            state = self._state()
+            if self._recorder is not None:
+                self._recorder.state(state)
+            self._tell_state(encode(state))
 
     def _state(self) -> StateReport:
         with self._stating:
@@ -344,12 +363,21 @@ class Agent:
         while not self._closing.wait(self._pose_pause_s):
             position = self._runner.position()
             if position is not None:
-                report = self._pose_report(position)
+                run, _ = self._runner.snapshot()
+                report = self._pose_report(position, run)
                 self._poses.append(report)
+                if self._recorder is not None:
+                    self._recorder.pose(report, began_ns=run.started_ns, over=run.over)
                 self._tell_pose(encode(report))
 
-    def _pose_report(self, position: Position) -> PoseReport:
-        (run, _), boot_id = self._runner.snapshot(), self._runner.boot_id
+    def _write_record(self) -> None:
+        assert self._recorder is not None
+        while not self._closing.wait(ENTRY_S):
+            self._recorder.look(battery=self._runner.battery(), robot_ns=self._clock.now_ns())
+            self._recorder.write()
+
+    def _pose_report(self, position: Position, run: Run) -> PoseReport:
+        boot_id = self._runner.boot_id
         if boot_id != self._poses_boot:  # each boot counts its poses anew
             self._poses_boot, self._pose_seq = boot_id, 0
             self._poses.clear()

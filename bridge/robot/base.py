@@ -22,6 +22,16 @@ class Rest(msgspec.Struct, frozen=True, kw_only=True):
     radians: float = 0.002
 
 
+class BaseHealth(msgspec.Struct, frozen=True, kw_only=True):
+    """What a base tells of itself besides its battery; each thing is `None` where it does not."""
+
+    localisation: float | None = None
+    """How well it knows where it is, 0 to 1."""
+    emergency_stop: bool | None = None
+    safety_field: bool | None = None
+    """Whether something stands in the field that its safety scanners watch."""
+
+
 class Base(Protocol):
     """What carries the scanner. Poses are in the mission's frame."""
 
@@ -32,6 +42,9 @@ class Base(Protocol):
 
     def battery(self) -> float:
         """0 to 1."""
+
+    def health(self) -> BaseHealth:
+        """What else is known of it now."""
 
     def endurance_s(self) -> float | None:
         """Seconds that a full battery lasts at work; `None` if it cannot tell."""

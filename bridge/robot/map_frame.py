@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from threading import Event
 
-from bridge.robot.base import Base, Outcome, Rest
+from bridge.robot.base import Base, BaseHealth, Outcome, Rest
 from mission import turning
 from mission.document import Mission, Point, RobotSpec, Transform
 from mission.events import Pose
@@ -37,6 +37,9 @@ class OnMap:
 
     def battery(self) -> float:
         return self._base.battery()
+
+    def health(self) -> BaseHealth:
+        return self._base.health()
 
     def endurance_s(self) -> float | None:
         return self._base.endurance_s()

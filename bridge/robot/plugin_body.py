@@ -11,7 +11,7 @@ from threading import Event
 from typing import Any, TypeVar, get_args
 
 from bridge.link.clock import Clock
-from bridge.robot.base import Base, Outcome, Rest, Scanner
+from bridge.robot.base import Base, BaseHealth, Outcome, Rest, Scanner
 from bridge.robot.bodies import Body
 from bridge.robot.map_frame import OnMap
 from mission.document import Mission, Point, RobotSpec, Scan, Transform
@@ -24,6 +24,8 @@ T = TypeVar("T")
 
 OURS: dict[str, Any] = {"sim": None, "mavlink:URL": None}
 """What `--controller` takes besides."""
+NOT_EVERYONES = ("health", "what_became")
+"""What a base or a scanner need not tell."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class PluginBody:
         made = self.made
         base, scanner = made.several(made.called(self.state), "base, scanner")
         for given, protocol in ((base, Base), (scanner, Scanner)):
-            asked = [name for name in _asked_of(protocol) if name != "what_became"]  # not every scanner can
+            asked = [name for name in _asked_of(protocol) if name not in NOT_EVERYONES]
             missing = [name for name in asked if not hasattr(given, name)]
             if missing:
                 raise made.wrong(
@@ -94,6 +96,12 @@ class GuardedBase:
 
     def battery(self) -> float:
         return self._tried(self._base.battery, 0.0, lambda share: _is_number(share) and 0 <= share <= 1)
+
+    def health(self) -> BaseHealth:
+        """What it tells of itself; nothing, where it has no such word."""
+        if not hasattr(self._base, "health"):
+            return BaseHealth()
+        return self._tried(self._base.health, BaseHealth(), _is_health)
 
     def endurance_s(self) -> float | None:
         return self._tried(self._base.endurance_s, None, lambda told: told is None or _is_number(told))
@@ -167,6 +175,14 @@ class GuardedScanner:
 
 def _is_number(told: object) -> bool:
     return isinstance(told, int | float) and not isinstance(told, bool) and math.isfinite(told)
+
+
+def _is_health(told: object) -> bool:
+    if not isinstance(told, BaseHealth):
+        return False
+    share = told.localisation
+    flags = (told.emergency_stop, told.safety_field)
+    return (share is None or (_is_number(share) and 0 <= share <= 1)) and set(flags) <= {None, True, False}
 
 
 def _is_text(told: object) -> bool:

@@ -22,6 +22,7 @@ from bridge.robot.bodies import OpenBody
 from bridge.robot.controller import Controller, new_boot_id
 from bridge.robot.inbox import Inbox
 from bridge.robot.journal import Journal, open_journal
+from bridge.robot.recorder import LIMIT_BYTES, RunRecorder
 from bridge.robot.refusal_log import RefusalLog
 from bridge.robot.simulator import NO_FAULTS, Faults
 from mission.document import Transform
@@ -55,6 +56,8 @@ class RobotOptions:
     """Folder with the robot's keys; required beyond this machine."""
     revisions: RevisionPolicy = "next-stop"
     """What becomes of a new revision that is pushed during a run."""
+    record_bytes: int = LIMIT_BYTES
+    """How much of the disk the record of its runs may take."""
     say: Callable[[str], None] = lambda line: None
     """Tells the person there, or its service's log, what was refused."""
     faults: Faults = NO_FAULTS
@@ -120,9 +123,13 @@ def robot_on(
 ) -> Iterator[Agent]:
     """A robot on `link`, which is sealed with the robot's keys if it has any."""
     with open_journal(options.state, options.name) as journal:
-        clock, wall = clocks(journal, speed_up=options.speed_up)
+        recorder = RunRecorder(
+            options.state / "record", room=journal.room_for, limit_bytes=options.record_bytes
+        )
+        clock, wall = clocks(journal, speed_up=options.speed_up, newest_ns=recorder.newest_ns)
         journal.edge = crashing(options.faults)
         with options.body(clock) as body:
+            recorder.health = body.base.health
             controller = Controller(
                 robot=options.name, journal=journal, base=body.base, scanner=body.scanner, clock=clock,
                 command_clock=wall, mission_taken=body.take, revisions=options.revisions,
@@ -133,19 +140,22 @@ def robot_on(
                 inbox=Inbox(journal, controller, body.scanner.profiles), speed_up=options.speed_up,
                 to_map=options.to_map, stand_still=controller.hold if options.connect else None,
                 refusals=RefusalLog(options.say, key_files.now_utc),
+                recorder=recorder,
             )  # fmt: skip
             with on_link(agent):
                 yield agent
 
 
-def clocks(journal: Journal, *, speed_up: float, now_ns: int | None = None) -> tuple[Clock, Clock]:
+def clocks(
+    journal: Journal, *, speed_up: float, newest_ns: int = 0, now_ns: int | None = None
+) -> tuple[Clock, Clock]:
     """The run's clock and the one that orders count on.
 
     A sped-up clock runs ahead of the wall's, and a wall clock may have been set back: after a reboot the
-    run's goes on behind the newest event, so that events never go back in time.
+    run's goes on behind the newest event, and the newest pose of a record, so that neither goes back in time.
     """
     wall = WallClock(origin_ns=now_ns)
-    origin_ns = max(wall.now_ns(), journal.newest_ns + 1)
+    origin_ns = max(wall.now_ns(), journal.newest_ns + 1, newest_ns + 1)
     return WallClock(speed_up=speed_up, origin_ns=origin_ns), wall
 
 

@@ -16,7 +16,7 @@ from typing import Literal
 import msgspec
 
 from bridge.link.clock import Clock
-from bridge.robot.base import Outcome, Rest
+from bridge.robot.base import BaseHealth, Outcome, Rest
 from bridge.robot.motion import Brake, Motion, along
 from mission.document import Mission, Point, RobotSpec, Scan
 from mission.errors import InputError
@@ -134,6 +134,9 @@ class SimulatedBase:
 
     def battery(self) -> float:
         return self._world.battery
+
+    def health(self) -> BaseHealth:
+        return BaseHealth(localisation=1.0, emergency_stop=False, safety_field=False)
 
     def endurance_s(self) -> float | None:
         used = self._wear.battery_per_s

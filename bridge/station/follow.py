@@ -12,7 +12,17 @@ import msgspec
 
 from bridge.link.link import Link
 from bridge.link.protocol import POSE_PAGE, KeyExpressions, LogPage, PosePage, decode
-from mission.events import Aborted, AnyEvent, Finished, PoseReport, Report, StateReport, event_of
+from bridge.station.record import AGAIN_S, Past, RecordHistory
+from mission.events import (
+    Aborted,
+    AnyEvent,
+    Finished,
+    PoseReport,
+    PosesMissing,
+    Report,
+    StateReport,
+    event_of,
+)
 
 SILENCE_S = 1.0
 """After this long without a word the robot is asked."""
@@ -20,8 +30,6 @@ KEEP_S = 5.0
 """How often a robot is told that it is watched."""
 PAGE_S = 5.0
 """How long a page of events or poses is waited for: on a slow line it takes a second."""
-LAST_POSES_S = 1.0
-"""How long to wait, after the end, for poses that are still on their way."""
 
 
 class Silence(msgspec.Struct, frozen=True, kw_only=True):
@@ -30,19 +38,25 @@ class Silence(msgspec.Struct, frozen=True, kw_only=True):
     seconds: float
 
 
-Followed = Report | Silence
+Followed = Report | Silence | PosesMissing | Past
 """What is told of a run that is followed."""
 
 
-def reports(link: Link, keys: KeyExpressions, keep: Callable[[], StateReport | None]) -> Iterator[Followed]:
+def reports(
+    link: Link,
+    keys: KeyExpressions,
+    keep: Callable[[], StateReport | None],
+    recorded: Callable[[], bool] = lambda: False,
+) -> Iterator[Followed]:
     """Everything of the robot's run, until it is over; first what was, then what comes.
 
-    `keep` tells the robot, every few seconds, that it is watched, and gives its state.
+    `keep` tells the robot, every few seconds, that it is watched, and gives its state; `recorded` says
+    whether it keeps a record of its runs.
     """
     link.announce(keys.watcher(uuid.uuid4().hex[:12]))
     heard = _listen(link, keys, keep)
     kept = time.monotonic()
-    follower = RunFollower(link, keys)
+    follower = RunFollower(link, keys, recorded)
     last = time.monotonic()
     while not follower.ended:
         item = _next(heard, 0.0 if follower.poses.behind else SILENCE_S)
@@ -64,6 +78,9 @@ def reports(link: Link, keys: KeyExpressions, keep: Callable[[], StateReport | N
 
 class PoseHistory:
     """Which poses of a run have been told; those that were missed are asked for, page by page."""
+
+    patience_s = 1.0
+    """How long to wait, after the end of a run, for poses that are still on their way."""
 
     def __init__(self, link: Link, keys: KeyExpressions) -> None:
         self._link = link
@@ -117,10 +134,13 @@ class PoseHistory:
 class RunFollower:
     """Which run is followed, and up to which event it has been told."""
 
-    def __init__(self, link: Link, keys: KeyExpressions) -> None:
+    def __init__(
+        self, link: Link, keys: KeyExpressions, recorded: Callable[[], bool] = lambda: False
+    ) -> None:
         self._link = link
         self._keys = keys
-        self.poses = PoseHistory(link, keys)
+        self._recorded = recorded
+        self.poses: PoseHistory | RecordHistory = PoseHistory(link, keys)
         self.run_id: str | None = None
         self.told = -1
         self.end: Finished | Aborted | None = None
@@ -132,7 +152,7 @@ class RunFollower:
         state = self.last_state
         return self.end is not None and state is not None and state.last_event >= self.end.number
 
-    def take(self, item: Report) -> Iterator[Report]:
+    def take(self, item: Report) -> Iterator[Followed]:
         if isinstance(item, StateReport):
             self._settle_on(item)
             yield from self._missed(item.last_event)
@@ -150,6 +170,8 @@ class RunFollower:
             self.told = state.last_event
         if self.run_id is None and state.run_id is not None:
             self.run_id, self.told = state.run_id, 0
+            if self._recorded():
+                self.poses = RecordHistory(self._link, self._keys)
             self.poses.run_id = state.run_id
 
     def _missed(self, newest: int) -> Iterator[AnyEvent]:
@@ -207,14 +229,23 @@ _POSE = msgspec.json.Decoder(PoseReport).decode
 _STATE = msgspec.json.Decoder(StateReport).decode
 
 
-def _late_poses(heard: queue.SimpleQueue[Report], follower: RunFollower) -> Iterator[Report]:
+def _late_poses(heard: queue.SimpleQueue[Report], follower: RunFollower) -> Iterator[Followed]:
     """Poses of the run that have not come yet, up to the first after its end."""
     end_ns = follower.end.robot_ns if follower.end else 0
-    deadline = time.monotonic() + LAST_POSES_S
+    patience_s = follower.poses.patience_s
+    deadline = time.monotonic() + patience_s
     while (left := deadline - time.monotonic()) > 0:
-        for pose in follower.poses.catch_up():
-            yield pose
-            if pose.robot_ns > end_ns:
+        for told in _late(heard, follower, left):
+            yield told
+            if isinstance(told, PoseReport) and told.robot_ns > end_ns:
                 return
-            deadline = time.monotonic() + LAST_POSES_S
-        _next(heard, left)
+            deadline = time.monotonic() + patience_s
+
+
+def _late(heard: queue.SimpleQueue[Report], follower: RunFollower, wait_s: float) -> Iterator[Followed]:
+    """What has come, or what was missed."""
+    if follower.poses.behind:
+        yield from follower.poses.catch_up()
+    item = _next(heard, min(wait_s, AGAIN_S))
+    if isinstance(item, PoseReport):
+        yield from follower.poses.take(item)

@@ -24,6 +24,7 @@ from bridge.link.keys import HeldKeys, now_utc, read_keys
 from bridge.link.link import Link
 from bridge.link.protocol import (
     CHUNK_BYTES,
+    RECORD,
     VERSION,
     Accepted,
     ChunkHeld,
@@ -124,6 +125,8 @@ class Station:
     ) -> None:
         self.link = link
         self.held = held
+        self.capabilities: tuple[str, ...] = ()
+        """What the robot said last that it can."""
         self.keys = keys
         self.commander = commander
         self.timeout_s = timeout_s
@@ -177,7 +180,10 @@ class Station:
         infos = {info.boot_id: info for info in (self._answered(reply, Info, what) for reply in replies)}
         if len(infos) > 1:
             self._stop_twins(tuple(infos.values()))
-        return next(iter(infos.values()), None)
+        info = next(iter(infos.values()), None)
+        if info is not None:
+            self.capabilities = info.capabilities
+        return info
 
     def _stop_twins(self, infos: tuple[Info, ...]) -> NoReturn:
         """Let both stand still: an order would be carried out by one or the other."""
@@ -390,7 +396,7 @@ class Station:
 
         If the robot's mission has not been run yet, the next run is waited for.
         """
-        return follow.reports(self.link, self.keys, self.keep)
+        return follow.reports(self.link, self.keys, self.keep, lambda: RECORD in self.capabilities)
 
     def _part(self, mission_id: str, revision: int, number: int) -> MissionPart:
         key = self.keys.mission(mission_id, f"part/{number}")

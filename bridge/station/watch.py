@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import msgspec
 
 from bridge.station.follow import Followed, Silence
+from bridge.station.record import Past
 from bridge.station.station import Station
 from mission.comparing.spans import stood_s
 from mission.document import Mission
@@ -18,8 +19,10 @@ from mission.errors import OutcomeUnknown
 from mission.events import (
     AnyEvent,
     Arrived,
+    Health,
     Held,
     PoseReport,
+    PosesMissing,
     RevisionDropped,
     RevisionTaken,
     RevisionWaits,
@@ -81,7 +84,7 @@ def _plan_of(report: Followed) -> tuple[str | None, int | None] | None:
 
     Events tell of every revision in turn; a state may come when two have passed.
     """
-    if isinstance(report, PoseReport | Silence) or not report.run_id:
+    if isinstance(report, PoseReport | Silence | PosesMissing | Past) or not report.run_id:
         return None
     return report.run_id, report.revision
 
@@ -100,6 +103,11 @@ def hand_over(record: RunTaker, report: Followed) -> None:
         record.state(report)
     elif isinstance(report, PoseReport):
         record.pose(report)
+    elif isinstance(report, PosesMissing):
+        record.missing(report)
+    elif isinstance(report, Past):
+        past = report.report
+        record.health(past) if isinstance(past, Health) else record.state(past)
     elif not isinstance(report, Silence):
         record.event(report)
 
@@ -126,7 +134,9 @@ class Lines:
             if not self._greeted and report.run_id is None:
                 self._say(f"{report.robot} is {report.state}; waiting for a run")
             self._greeted = True
-        elif not isinstance(report, PoseReport):
+        elif isinstance(report, PosesMissing):
+            self._say(missing_line(report))
+        elif not isinstance(report, PoseReport | Past):
             self._say(event_line(report))
             if isinstance(report, Held):
                 self._say(HINT)
@@ -148,7 +158,9 @@ class EventObjects:
         """Nothing: events and the state name the mission they are of."""
 
     def show(self, report: Followed) -> None:
-        if not isinstance(report, StateReport | PoseReport | Silence):
+        if isinstance(report, PosesMissing):
+            self._write({"missing": msgspec.to_builtins(report)})
+        elif not isinstance(report, StateReport | PoseReport | Silence | Past):
             self._write(msgspec.to_builtins(report))
 
 
@@ -166,6 +178,7 @@ class Table:
         self._pose: PoseReport | None = None
         self._events: deque[AnyEvent] = deque(maxlen=LAST_EVENTS)
         self._silent_s = 0.0
+        self._missing = ""
         self._drawn = 0
         self._next = 0.0
 
@@ -178,7 +191,9 @@ class Table:
             self._state = report
         elif isinstance(report, PoseReport):
             self._pose = report
-        elif not isinstance(report, Silence):
+        elif isinstance(report, PosesMissing):
+            self._missing = missing_line(report)
+        elif not isinstance(report, Silence | Past):
             self._events.append(report)
         if time.monotonic() >= self._next or not isinstance(report, PoseReport):
             self._next = time.monotonic() + REDRAW_S
@@ -186,6 +201,7 @@ class Table:
 
     def _draw(self) -> None:
         lines = table_lines(self._mission, self._state, self._pose, tuple(self._events), self._silent_s)
+        lines += [self._missing] if self._missing else []
         up = f"\x1b[{self._drawn}A" if self._drawn else ""
         self._write(up + "".join(f"\x1b[2K{printable(line)}\n" for line in lines))
         # Lines of a longer table drawn before would stay below: the table never shrinks.
@@ -242,6 +258,11 @@ def clock(seconds: float) -> str:
     """Seconds as hours, minutes and seconds."""
     minutes, rest = divmod(int(max(0.0, seconds)), 60)
     return f"{minutes // 60}:{minutes % 60:02}:{rest:02}"
+
+
+def missing_line(gap: PosesMissing) -> str:
+    """That poses are missing, as one line."""
+    return f"{gap.mission_time_s:8.1f} s  {gap.words}"
 
 
 def event_line(event: AnyEvent) -> str:

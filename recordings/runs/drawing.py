@@ -17,9 +17,11 @@ from mission.events import (
     AnyEvent,
     Arrived,
     Failed,
+    Health,
     Held,
     LinkLost,
     PoseReport,
+    PosesMissing,
     RevisionDropped,
     RevisionTaken,
     RevisionWaits,
@@ -69,10 +71,13 @@ class RunDrawing:
         self._place: FloatArray | None = None
         self._growth = AcquiredDrawing(sights[-1]) if sights else None
         self._thinner, self._trail, self._way = Thinner(), Trail(), LateBeside(mission)
+        self._stops: dict[str, bool | None] = {}
         self._style()
         self._describe()
 
-    def follow(self, mission: Mission, report: StateReport | PoseReport | AnyEvent) -> None:
+    def follow(
+        self, mission: Mission, report: StateReport | PoseReport | AnyEvent | PosesMissing | Health
+    ) -> None:
         """Go on by another revision of the mission from `report` on, and draw what it changes."""
         self.tell_time(report)
         change, names = change_between(self.mission, mission), self.names.revision(mission.revision)
@@ -106,6 +111,26 @@ class RunDrawing:
         self._at(self.names.flat(entities.STOP), rr.StateChange(state=report.stop or ""), report.robot_ns)
         battery = rr.Scalars(report.battery * 100)
         self._at(self.names.metric(entities.METRIC_BATTERY), battery, report.robot_ns)
+
+    def missing(self, gap: PosesMissing) -> None:
+        """Say for how long nobody knows where the robot was; its path ends before that, and begins anew."""
+        self.tell_time(gap)
+        self._trail.end()
+        line = rr.TextLog(gap.words, level="WARN")
+        self._at(self.names.log, line, gap.robot_ns)
+
+    def health(self, told: Health) -> None:
+        """Keep how the base was, and say what of it stops a robot, when that changes."""
+        known = {name: value for name in HEALTH_FIELDS if (value := getattr(told, name)) is not None}
+        self._at(self.names.health, rr.DynamicArchetype("Health", components=known), told.robot_ns)
+        stops = {name: getattr(told, name) for name in HEALTH_FIELDS[2:]}
+        changed = {name for name, value in stops.items() if bool(value) != bool(self._stops.get(name))}
+        self._stops = stops
+        for name in sorted(changed):
+            words = f"{name.replace('_', ' ')}: {'yes' if stops[name] else 'no'}"
+            self._at(
+                self.names.log, rr.TextLog(words, level="WARN" if stops[name] else "INFO"), told.robot_ns
+            )
 
     def event(self, event: AnyEvent) -> None:
         """Write the event down whole, mark it on the plan, and bring the report up to date."""
@@ -230,7 +255,7 @@ class RunDrawing:
         for entity in (self.names.flat(entities.RUN_REPORT), entities.LATEST_REPORT):
             self._at(entity, document, event.robot_ns)
 
-    def tell_time(self, report: StateReport | PoseReport | AnyEvent) -> None:
+    def tell_time(self, report: StateReport | PoseReport | AnyEvent | PosesMissing | Health) -> None:
         """Learn when the mission began, from a report that tells."""
         seconds = getattr(report, "mission_time_s", None)
         if seconds is not None:
@@ -253,6 +278,7 @@ class RunDrawing:
         self.canvas.columns(entity, indexes, *groups)
 
 
+HEALTH_FIELDS = ("battery", "localisation", "emergency_stop", "safety_field")
 EVENT_FIELDS = (
     *("event", "number", "revision", "stop", "reason", "deviation_m", "commander"),
     *("file", "size", "sha256", "points"),

@@ -54,6 +54,10 @@ class Trail:
         """Where the path was drawn to."""
         self._heard_ns = 0
 
+    def end(self) -> None:
+        """Begin anew with the next pose: nobody knows the way to it."""
+        self._end = None
+
     def lengthened(self, track: Track) -> tuple[IntArray, list[FloatArray]]:
         """The strips that these poses add, and when each ends."""
         times: list[int] = []

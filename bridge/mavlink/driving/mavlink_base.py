@@ -13,7 +13,7 @@ from threading import Event
 from bridge.link.clock import Clock
 from bridge.mavlink.driving.onboard_autopilot import ORDER_S, OnboardAutopilot
 from bridge.mavlink.driving.straight_drive import NEAR_M, STALLED_S, Patience, StraightDrive
-from bridge.robot.base import Outcome, Rest
+from bridge.robot.base import BaseHealth, Outcome, Rest
 from mission.document import Mission, Point, RobotSpec, SiteOrigin
 from mission.events import Pose
 from mission.mavlink.local_frame import UNPLACED, LocalFrame, VehicleOrigin, apart, local_frame
@@ -74,6 +74,10 @@ class MavlinkBase:
         """What the autopilot tells; full if it tells nothing, so that its own failsafe is all there is."""
         told = self.autopilot.battery()
         return 1.0 if told is None else told
+
+    def health(self) -> BaseHealth:
+        """Nothing: autopilots tell of none of it in words that all of them share."""
+        return BaseHealth()
 
     def endurance_s(self) -> float | None:
         return None

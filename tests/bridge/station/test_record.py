@@ -1,0 +1,141 @@
+"""A station that was away reads from the robot's record what it missed: each pose once and in order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from bridge.link.link import Request
+from bridge.link.memory_link import Switchboard
+from bridge.link.protocol import RECORD_PAGE, KeyExpressions, encode
+from bridge.robot.recorder import RunRecorder
+from bridge.robot.run_record import ANEW
+from bridge.station import record
+from bridge.station.record import Recorded, RecordHistory
+from mission.events import PoseReport, PosesMissing
+from tests.bridge.robot.test_recorder import BEGAN_NS, idle, ns, pose
+
+FAR = 5000
+"""More poses than a robot keeps in memory."""
+
+
+class Robot:
+    """One that drives and writes down, and a station that follows it, in memory."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(record, "AGAIN_S", 0.0)
+        self.folder = folder
+        self.board = Switchboard()
+        self.keys = KeyExpressions("r1")
+        self.asked = 0
+        self.short = ""
+        self.boot()
+        idle(self.recorder)
+        self.board.link().serve(self.keys.record, self._answer)
+        self.history = RecordHistory(self.board.link(), self.keys)
+        self.history.run_id = "run"
+        self.told: list[Recorded] = []
+
+    def _answer(self, request: Request) -> bytes:
+        self.asked += 1
+        return encode(self.recorder.answer(request))
+
+    def boot(self) -> None:
+        self.recorder = RunRecorder(self.folder, room=lambda size: self.short)
+
+    def drive(self, numbers: range, *, heard: bool, boot_id: str = "b") -> None:
+        """Poses, an entry for each ten; the station hears them, if the line is not cut."""
+        for number in numbers:
+            report = pose(number, boot_id=boot_id)
+            self.recorder.pose(report, began_ns=BEGAN_NS, over=False)
+            if number % 10 == 0:
+                self.recorder.write()
+            if heard:
+                self.told += self.history.take(report)
+
+    def catch_up(self) -> None:
+        for _ in range(1000):
+            if not self.history.behind:
+                return
+            self.told += self.history.catch_up()
+        raise AssertionError("the station is still behind")
+
+    @property
+    def poses(self) -> list[PoseReport]:
+        return [item for item in self.told if isinstance(item, PoseReport)]
+
+    @property
+    def gaps(self) -> list[PosesMissing]:
+        return [item for item in self.told if isinstance(item, PosesMissing)]
+
+
+@pytest.fixture
+def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Robot]:
+    robot = Robot(tmp_path, monkeypatch)
+    yield robot
+    robot.recorder.close()
+
+
+def test_after_a_long_outage_every_pose_comes_once_and_in_order(robot: Robot) -> None:
+    robot.drive(range(1, 101), heard=True)
+    robot.catch_up()
+    robot.drive(range(101, FAR), heard=False)
+    robot.drive(range(FAR, FAR + 205), heard=True)
+    robot.catch_up()
+    assert robot.poses == [pose(seq) for seq in range(1, FAR + 205)]
+    assert not robot.gaps
+    assert robot.asked <= FAR / 10 / RECORD_PAGE + 5
+
+
+def test_a_pose_that_was_lost_late_in_a_run_does_not_bring_the_whole_record(robot: Robot) -> None:
+    robot.drive(range(1, FAR), heard=True)
+    robot.catch_up()
+    asked = robot.asked
+    robot.drive(range(FAR, FAR + 1), heard=False)
+    robot.drive(range(FAR + 1, FAR + 40), heard=True)
+    robot.catch_up()
+    assert robot.poses == [pose(seq) for seq in range(1, FAR + 40)]
+    assert robot.asked <= asked + 1
+
+
+def test_a_line_that_is_cut_again_while_it_catches_up_goes_on_where_it_was(robot: Robot) -> None:
+    robot.drive(range(1, FAR), heard=False)
+    robot.drive(range(FAR, FAR + 35), heard=True)
+    for cut in (True, False) * 5:
+        robot.board.cut = cut
+        for _ in range(3):
+            robot.told += robot.history.catch_up()
+    robot.board.cut = False
+    robot.catch_up()
+    assert robot.poses == [pose(seq) for seq in range(1, FAR + 35)]
+
+
+def test_what_a_killed_robot_had_not_written_is_told_as_missing(robot: Robot) -> None:
+    robot.drive(range(1, 106), heard=False)
+    robot.boot()
+    robot.drive(range(200, 300), heard=True, boot_id="c")
+    robot.recorder.write()
+    robot.catch_up()
+    assert [report.seq for report in robot.poses] == [*range(1, 101), *range(200, 300)]
+    assert [(gap.robot_ns, gap.until_ns, gap.reason) for gap in robot.gaps] == [(ns(100), ns(200), ANEW)]
+
+
+def test_what_a_full_disk_had_no_room_for_is_told_as_missing(robot: Robot) -> None:
+    robot.drive(range(1, 101), heard=True)
+    robot.catch_up()
+    robot.short = "make room"
+    robot.drive(range(101, 301), heard=False)
+    robot.drive(range(301, 336), heard=True)
+    robot.catch_up()
+    (gap,) = robot.gaps
+    assert (gap.robot_ns, gap.until_ns) == (ns(100), ns(301))
+    assert "no room" in gap.reason
+    robot.short = ""
+    robot.drive(range(336, 401), heard=True)
+    robot.catch_up()
+    assert [report.seq for report in robot.poses] == [*range(1, 101), *range(301, 401)]
+    times = [report.robot_ns for report in robot.poses]
+    assert all(before < after for before, after in pairwise(times))
