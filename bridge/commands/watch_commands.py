@@ -42,6 +42,10 @@ def watch_by(recording: Recorder) -> Callable[..., None]:
             Path | None,
             typer.Option("--plan", metavar="PLAN.rrd", help="Its plan: what the stops see, and the floor."),
         ] = None,
+        run: Annotated[
+            str | None,
+            typer.Option("--run", metavar="RUN_ID", help="One that is over, from the robot's own record."),
+        ] = None,
         view: Annotated[bool, typer.Option("--view", help="Open the viewer on what is recorded.")] = False,
         json_: Json = False,
     ) -> None:
@@ -58,6 +62,8 @@ def watch_by(recording: Recorder) -> Callable[..., None]:
 
         Example: stopgo watch --robot r1 --plan plan.rrd --rrd field.rrd
 
+        Example: stopgo watch --robot r1 --run 424b529f524b --rrd field.rrd
+
         Example: stopgo watch --mavlink udpout:127.0.0.1:14550 --rrd field.rrd
         """
         from bridge.station.watch import EventObjects, Lines, Table, watch_showing
@@ -71,7 +77,7 @@ def watch_by(recording: Recorder) -> Callable[..., None]:
             recording(rrd, plan, view=view) as heard,
             reached(connection.to_look(compares=True)) as station,
         ):
-            state = watch_showing(station, heard, showing)
+            state = watch_showing(station, heard, showing, run_id=run)
             code = tell_compared(heard, state, json_=json_)
             if code:  # which weighs more than what became of the recording
                 raise typer.Exit(code)

@@ -11,6 +11,7 @@ import msgspec
 from bridge.link.link import Link
 from bridge.link.protocol import RECORD_PAGE, KeyExpressions, RecordEntry, RecordIndex, RecordPage, decode
 from bridge.station.window import Window, windowed
+from mission.errors import OutcomeUnknown
 from mission.events import Health, Pose, PoseReport, PosesMissing, StateReport
 
 PAGE_S = 10.0
@@ -57,6 +58,33 @@ def pages(
         if page is None:
             return
         yield page
+
+
+def past_run(link: Link, keys: KeyExpressions, run_id: str, *, patience_s: float) -> Iterator[Recorded]:
+    """The whole record of a run, also over a line that is cut in between.
+
+    Raises
+    ------
+    OutcomeUnknown
+        If the robot did not answer for so long.
+    """
+    history = RecordHistory(link, keys)
+    history.run_id, since, newest = run_id, 0, 1
+    went_on_at = time.monotonic()
+    while since < newest:
+        began = time.monotonic()
+        first = read_page(link, keys, run_id, since=since)
+        if first is None:
+            if time.monotonic() - went_on_at > patience_s:
+                raise OutcomeUnknown(f"{keys.robot} stopped answering; the run was not read to its end")
+            time.sleep(AGAIN_S)
+            continue
+        newest, missing = first.newest, first.missing
+        for page in pages(link, keys, run_id, first, time.monotonic() - began):
+            for entry in page.entries:
+                yield from history.told(entry)
+            since, went_on_at = since + len(page.entries), time.monotonic()
+    yield from missing
 
 
 class RecordHistory:

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import msgspec
 
 from bridge.station.follow import Followed, Silence
+from bridge.station.past import past_reports
 from bridge.station.record import Past
 from bridge.station.station import Station
 from mission.comparing.spans import stood_s
@@ -54,8 +55,10 @@ def watch_run(station: Station, record: RunTaker | None, *, say: Callable[[str],
     return watch_showing(station, record, Lines(say))
 
 
-def watch_showing(station: Station, record: RunTaker | None, showing: Showing) -> StateReport:
-    """Follow the run to its end and return the last state.
+def watch_showing(
+    station: Station, record: RunTaker | None, showing: Showing, *, run_id: str | None = None
+) -> StateReport:
+    """Follow the run to its end, or tell one that is over once more, and return the last state.
 
     Raises
     ------
@@ -64,7 +67,7 @@ def watch_showing(station: Station, record: RunTaker | None, showing: Showing) -
     """
     state: StateReport | None = None
     known: tuple[str | None, int | None] = (None, None)
-    for report in station.reports():
+    for report in station.reports() if run_id is None else past_reports(station, run_id):
         plan = _plan_of(report)
         if plan is not None and plan != known:
             known = plan

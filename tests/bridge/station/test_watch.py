@@ -22,8 +22,10 @@ from bridge.robot.bodies import pose_of
 from bridge.robot.controller import Controller
 from bridge.robot.inbox import Inbox
 from bridge.robot.journal import memory_journal
+from bridge.robot.recorder import RunRecorder
 from bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from bridge.station.follow import Report, Silence
+from bridge.station.past import past_reports
 from bridge.station.station import Station
 from bridge.station.watch import (
     HINT,
@@ -37,8 +39,8 @@ from bridge.station.watch import (
 )
 from mission.__main__ import main
 from mission.document import Mission
-from mission.errors import OutcomeUnknown
-from mission.events import AnyEvent, Held, PoseReport, Scanned, StateReport
+from mission.errors import AnswerIsNo, OutcomeUnknown
+from mission.events import AnyEvent, Event, Health, Held, PoseReport, PosesMissing, Scanned, StateReport
 from mission.schedule import schedule
 from tests.bridge.world import Field, corridor
 from tests.disk import small_disk
@@ -174,7 +176,9 @@ def test_a_duration_reads_as_a_clock() -> None:
     assert clock(3725.9) == "1:02:05"
 
 
-def test_events_missed_while_the_link_was_cut_are_told_once_and_in_order() -> None:
+def test_what_was_missed_while_the_link_was_cut_is_told_once_and_in_order_and_again_of_the_past_run(
+    tmp_path: Path,
+) -> None:
     board = Switchboard()
     journal, wall = memory_journal(), WallClock(speed_up=200)
     base, scanner = SimulatedBase(clock=wall), SimulatedScanner(clock=wall)
@@ -185,7 +189,7 @@ def test_events_missed_while_the_link_was_cut_are_told_once_and_in_order() -> No
     agent = Agent(
         keys=KeyExpressions("r1"), link=board.link(), journal=journal, runner=controller,
         inbox=Inbox(journal, controller, scanner.profiles), clock=wall, command_clock=WallClock(),
-        speed_up=200,
+        speed_up=200, recorder=RunRecorder(tmp_path),
     )  # fmt: skip
     with agents.on_link(agent):
         station = Station(board.link(), KeyExpressions("r1"), commander="test")
@@ -194,16 +198,27 @@ def test_events_missed_while_the_link_was_cut_are_told_once_and_in_order() -> No
         watching = threading.Thread(target=lambda: [told.put(report) for report in station.reports()])
         watching.start()
         station.command("start")
-        while not isinstance(told.get(timeout=60), Scanned):
-            pass
+        heard: list[Report] = []
+        while not (heard and isinstance(heard[-1], Scanned)):
+            heard.append(told.get(timeout=60))
         board.cut = True
         while controller.run.state != "FINISHED":
             time.sleep(0.01)
         board.cut = False
         watching.join(20)
-    heard = [told.get() for _ in range(told.qsize())]
-    events = [report for report in heard if not isinstance(report, StateReport | PoseReport | Silence)]
+        past = list(past_reports(station, str(controller.run.run_id)))
+        with pytest.raises(AnswerIsNo, match=f"no run x; it has {controller.run.run_id}"):
+            next(past_reports(station, "x"))
+    heard += [told.get() for _ in range(told.qsize())]
+    events = [report for report in heard if isinstance(report, Event)]
     assert [event.number for event in events] == list(range(events[0].number, journal.newest + 1))
+    poses = [report for report in past if isinstance(report, PoseReport)]
+    assert [pose.seq for pose in poses] == list(range(poses[0].seq, poses[0].seq + len(poses)))
+    told_live = [report for report in heard if isinstance(report, PoseReport)]
+    assert told_live[: len(poses)] == poses  # and then, perhaps, how it stands there
+    assert [report for report in past if isinstance(report, Event)] == list(journal.events())
+    assert isinstance(past[-1], StateReport)
+    assert (past[-1].state, past[-1].done) == ("FINISHED", ("s1", "s2", "s3"))
     assert heard[-1] is not None
     assert [report.state for report in heard if isinstance(report, StateReport)][-1] == "FINISHED"
 
@@ -261,6 +276,10 @@ class Taken:
     def pose(self, report: PoseReport) -> None: ...
 
     def event(self, event: AnyEvent) -> None: ...
+
+    def health(self, told: Health) -> None: ...
+
+    def missing(self, gap: PosesMissing) -> None: ...
 
 
 def test_a_recording_is_handed_every_revision_in_turn_also_when_it_comes_late() -> None:
