@@ -6,6 +6,7 @@ import json
 import sys
 import threading
 import uuid
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from bridge.conform.station_requirements import STATION_REQUIREMENTS
 from bridge.link.link import Link
 from bridge.link.protocol import Info, encode
 from bridge.link.seals import KeySeals, Question
+from bridge.station.follow import Followed
 from bridge.station.station import Station
 from mission.document import Mission
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
@@ -116,6 +118,17 @@ class SeesOneOfTwo(Station):
         return super()._one_of(replies[-1:], what)
 
 
+class LeavesGaps(Station):
+    def reports(self) -> Iterator[Followed]:
+        asked = self.link.ask
+
+        def but_poses(key: str, *rest: Any, **details: Any) -> bytes | None:
+            return None if key.endswith("/poses") else asked(key, *rest, **details)
+
+        self.link.ask = but_poses  # type: ignore[method-assign]
+        return super().reports()
+
+
 def _parameters(details: dict[str, Any]) -> dict[str, str]:
     return {name: value for name, value in details.items() if name not in ("try_s", "bulk")}
 
@@ -133,6 +146,7 @@ def _parameters(details: dict[str, Any]) -> dict[str, str]:
         (NeverLooksBack, "done only when the state tells so", "of another mission"),
         (NewNonceEachTime, "a commit is repeated under its nonce", "under 2 nonces"),
         (ReadsInfoStrictly, "fields that are not known are passed over", "cannot be started"),
+        (LeavesGaps, "poses that were missed are asked for", "are not asked for"),
         (SeesOneOfTwo, "two boots: no order, both paused", "though two robots"),
     ],
 )
