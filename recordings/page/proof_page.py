@@ -18,8 +18,8 @@ from mission.proof_text import (
     verdict,
 )
 from recordings.carried.floor_lines import FloorLines
-from recordings.page.floor_picture import PictureFrame, along, legend, line_sample, plan_picture, stroke
 from recordings.page import whole_page
+from recordings.page.floor_picture import PictureFrame, along, legend, line_sample, plan_picture, stroke
 from recordings.page.style import ANSWERS, BLUE, GREEN, GREY, VERMILION
 from recordings.page.subject import ReportSubject
 from recordings.page.words import grid, number, row, section, shown, tag, tile
