@@ -98,8 +98,9 @@ def test_a_push_over_a_slow_line_that_is_cut_goes_on_where_it_was(tmp_path: Path
 
 
 def test_an_order_into_a_blackhole_is_unknown_and_comes_to_nothing_when_it_is_late(tmp_path: Path) -> None:
-    with line(tmp_path) as proxy, connect(proxy.endpoint, robot="r1", timeout_s=1.5) as station:
+    with line(tmp_path) as proxy, connect(proxy.endpoint, robot="r1", timeout_s=30.0) as station:
         station.push(corridor())
+        station.timeout_s = 1.5
         start = station.order("start")
         proxy.swallow(True)
         with pytest.raises(OutcomeUnknown, match="unknown"):
