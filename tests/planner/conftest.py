@@ -1,0 +1,19 @@
+"""The planner's small floors are looked over by the compiled kernel, which one process loads but once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+import planner.sight.sight
+from tests.faults.sizes import FULL
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _compiled() -> Iterator[None]:
+    """In the long form small floors are left to the interpreted one; that both agree has tests of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not FULL:
+            patch.setattr(planner.sight.sight, "COMPILE_ABOVE", -1)
+        yield
