@@ -32,6 +32,7 @@ from bridge.commands.connection import (
 )
 from bridge.commands.order_commands import Json, state_line
 from bridge.console import print_json, tell
+from bridge.link.capabilities import told_of_capabilities
 from bridge.profile import counting, files, read_profile
 from mission.errors import InputError, StopgoError
 
@@ -210,6 +211,7 @@ def _port(endpoint: str) -> Iterator[Check]:
 def robot_checks(info: Info, now_ns: int) -> Iterator[Check]:
     """What a robot tells of itself, and its clock beside this one."""
     yield Check("robot", True, f"{state_line(info.state)}; stopgo {info.stopgo}")
+    yield Check("can", True, told_of_capabilities(info.capabilities))
     apart = (info.clock_ns - now_ns) / 1e9
     ok = abs(apart) <= CLOCKS_APART_S
     todo = "" if ok else "set both clocks by NTP: orders are refused as too old or too early"

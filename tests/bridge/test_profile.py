@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from bridge.commands.connection import with_presets
@@ -145,6 +146,17 @@ def test_doctor_compares_the_clocks() -> None:
     late = {check.name: check for check in robot_checks(info, info.clock_ns + 3_000_000_000)}
     assert (late["clock"].ok, late["clock"].told) == (False, "the robot's clock is -3.0 s from this one")
     assert "NTP" in late["clock"].do
+
+
+def test_doctor_tells_what_a_robot_can_and_what_it_lacks() -> None:
+    info = Field().station().info()
+
+    def can(*capabilities: str) -> str:
+        told = msgspec.structs.replace(info, capabilities=capabilities)
+        return next(check.told for check in robot_checks(told, info.clock_ns) if check.name == "can")
+
+    assert can().startswith("nothing beyond version 1; lacks record: of a link lost")
+    assert can("record", "levitation") == "levitation, record"
 
 
 def test_status_can_ask_all_though_one_is_preset(capsys: pytest.CaptureFixture[str]) -> None:
