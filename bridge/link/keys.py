@@ -156,7 +156,7 @@ class Certificates:
         self._lock = threading.Lock()
         self._revoked = Revoked(number=0, serials=())
         if self._kept is not None and self._kept.exists():
-            self._revoked = read_revoked(self._kept, held.authority)
+            self._revoked = _read_kept(self._kept, held.authority)
         self._stamp: tuple[int, ...] = ()
 
     def holder(self, der: bytes) -> tuple[Holder, Ed25519PublicKey]:
@@ -226,6 +226,16 @@ def kept_list(state: Path, authority: x509.Certificate) -> Path:
     return state / f"revoked-{authority.fingerprint(SHA256()).hex()[:16]}.json"
 
 
+def _read_kept(path: Path, authority: x509.Certificate) -> Revoked:
+    try:
+        return read_revoked(path, authority)
+    except InputError:
+        raise InputError(
+            f"{path}: the newest list of revoked keys that was kept is damaged; copy the site's newest"
+            " revoked.json into the folder of keys, and remove this one"
+        ) from None
+
+
 def read_keys(folder: Path, *, now: datetime, state: Path | None = None) -> HeldKeys:
     """The keys in one holder's folder; a newer list of those revoked that is kept in `state` counts as well.
 
@@ -255,10 +265,10 @@ def read_keys(folder: Path, *, now: datetime, state: Path | None = None) -> Held
             f"{files.certificate}: valid from {holder.not_before:%Y-%m-%d %H:%M} to"
             f" {holder.not_after:%Y-%m-%d %H:%M} UTC; issue new keys for {holder.name}"
         )
-    lists = [files.revoked]
+    lists = [read_revoked(files.revoked, authority)]
     if state is not None and kept_list(state, authority).exists():
-        lists.append(kept_list(state, authority))
-    revoked = max((read_revoked(path, authority) for path in lists), key=lambda revoked: revoked.number)
+        lists.append(_read_kept(kept_list(state, authority), authority))
+    revoked = max(lists, key=lambda revoked: revoked.number)
     if holder.serial in revoked.serials:
         raise InputError(f"{files.certificate}: is revoked; issue new keys for {holder.name}")
     return HeldKeys(files, holder, authority, certificate, key)
