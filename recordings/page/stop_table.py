@@ -8,25 +8,35 @@ from mission.figures import percent
 from mission.stop_reasons import LEAST_TOLD, StopReason
 from recordings.page.words import grid, number, row, section, shown
 
-HEADER = ("stop", "choice", "sees", "alone", "lost without it", "where", "runners-up")
-
 
 def stop_table(reasons: Sequence[StopReason]) -> str:
     """A row for each stop, in the order of driving; nothing for plans that do not tell."""
-    return section("Why each stop", grid(HEADER, map(_row, reasons))) if reasons else ""
+    if not reasons:
+        return ""
+    unit = reasons[0].unit
+    header = (
+        "stop",
+        "choice",
+        f"sees {unit}",
+        f"alone {unit}",
+        "lost",
+        f"where {unit}",
+        f"runners-up {unit}",
+    )
+    return section("Why each stop", grid(header, map(_row, reasons)))
 
 
 def _row(reason: StopReason) -> str:
     where = [
-        f"{room.name} {number(lost)} {reason.unit}{'' if room.met else ', then below what is asked'}"
+        f"{room.name} {number(lost)}{'' if room.met else ', then below what is asked'}"
         for room, lost in zip(reason.rooms, reason.lost, strict=True)
         if lost >= LEAST_TOLD
     ]
-    runners = [f"{item.candidate} ({number(item.new)} {reason.unit})" for item in reason.runners]
+    runners = [f"{item.candidate} ({number(item.new)})" for item in reason.runners]
     return row(
         [
-            *(shown(reason.stop), str(reason.step), f"{number(reason.sees)} {reason.unit}"),
-            *(f"{number(reason.alone)} {reason.unit}", percent(reason.lost_share)),
+            *(shown(reason.stop), str(reason.step), number(reason.sees)),
+            *(number(reason.alone), percent(reason.lost_share)),
             *(shown("; ".join(where)), shown(", ".join(runners))),
         ]
     )
