@@ -45,6 +45,14 @@ def simulate_vehicle(
         list[str] | None,
         typer.Option("--fault", metavar="KIND@N[=AMOUNT]", help="Let something go wrong, as nack@3."),
     ] = None,
+    exact: Annotated[
+        bool, typer.Option("--exact", help="It stands at every place to the last digit, as no real one does.")
+    ] = False,
+    seed: Annotated[int, typer.Option(help="Of all that is left to chance.")] = 1,
+    param: Annotated[
+        list[str] | None,
+        typer.Option("--param", metavar="NAME=VALUE", help="Set one of its parameters, as WP_RADIUS=0.1."),
+    ] = None,
     speed_up: Annotated[
         float, typer.Option("--speed-up", min=0.01, max=1000, help="How much faster its own time runs.")
     ] = 1.0,
@@ -60,5 +68,6 @@ def simulate_vehicle(
     options = VehicleOptions(
         mavlink, profile=profile, state=state, speed_up=speed_up, signing_key=signing_key, insecure=insecure,
         origin=origin, at=None if at is None else read_pose("--at", at), faults=tuple(fault or ()),
+        seed=None if exact else seed, parameters=tuple(param or ()),
     )  # fmt: skip
     run_vehicle(options, ready=lambda url: say(f"ready vehicle ({profile}) at {url}"))

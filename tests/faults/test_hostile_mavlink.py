@@ -39,7 +39,7 @@ def test_messages_that_make_no_sense_are_survived(profile: str, seed: int) -> No
         if number % 20 == 0:
             bench.pass_time(hostile.chance.choice((0.1, 1.0, 5.0)), step_s=0.1)
         if number % 200 == 0:
-            pose, speed = bench.vehicle.motion()
+            pose, speed = bench.vehicle.rover.at(bench.vehicle.now_ns)
             assert all(map(math.isfinite, (pose.x, pose.y, pose.heading, speed)))
             bench.all.clear()
     assert driven > FRAMES / 50, "the vehicle was hardly ever in AUTO"

@@ -7,23 +7,38 @@ or a disarmed vehicle, ends the drive, and nothing is changed back before somebo
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
+from itertools import pairwise
 from threading import Event
 
 from bridge.link.clock import Clock
 from bridge.mavlink.driving.onboard_autopilot import ORDER_S, OnboardAutopilot
-from bridge.mavlink.driving.straight_drive import NEAR_M, STALLED_S, Patience, StraightDrive
+from bridge.mavlink.driving.straight_drive import NEAR_M, Ability, Patience, StraightDrive
 from bridge.robot.base import BaseHealth, Outcome, Rest
 from mission.document import Mission, Point, RobotSpec, SiteOrigin
 from mission.events import Pose
 from mission.mavlink.local_frame import UNPLACED, LocalFrame, VehicleOrigin, apart, local_frame
 from mission.run.scans import needs_heading, turned_away
+from mission.run.way import foot, legs_of
 
 TICK_S = 0.1
 AGAIN_S = 1.0
 """How often a place is told again to a vehicle that stands: the last time may have been lost."""
 STAND_S = 10.0
 """How long a drive that ended early waits for the vehicle to come to a stand."""
+COAST_S = 0.4
+"""How long a vehicle rolls on that is told to stop, until that was seen once."""
+NEAR_SHARE = 0.6
+"""Share of a stop's tolerance within which a drive ends: the estimate goes on wandering while it scans."""
+TRIES = 3
+"""So often the mode to drive is ordered: a line may lose both ways, and setpoints may not have come."""
+TAKE_UP_S = 60.0
+"""How long an autopilot that was started again may take until it can drive."""
+BEAT_S = 2.0
+"""A heartbeat comes within this, once a line is back."""
+MOVED_M = 0.5
+"""A vehicle whose autopilot was started again and that tells a place farther off was carried, or is lost."""
 WARM_UP_S = 1.2
 """Setpoints must have come for a second before an autopilot that lives on them lets itself be driven."""
 TURN_S = 20.0
@@ -54,7 +69,11 @@ class MavlinkBase:
         self._mission: Mission | None = None
         self._local = UNPLACED
         self._local_for: tuple[SiteOrigin | None, VehicleOrigin | None] = (None, None)
-        self._boots = autopilot.peer.boots
+        self._boots: int | None = None
+        """How often it had been started when we drove it last."""
+        self._stood: Point | None = None
+        self._late_until_s = -math.inf
+        self._coast_s = COAST_S
         self._blocked_by = ""
 
     def take(self, mission: Mission) -> None:
@@ -120,7 +139,7 @@ class MavlinkBase:
     ) -> Outcome:
         self._blocked_by = ""
         try:
-            self._engage(limits, interrupt)
+            self._engage(interrupt)
             for point in path:
                 self._drive(point, limits, interrupt)
             if heading is not None and self.autopilot.kind.driving.turns:
@@ -136,73 +155,84 @@ class MavlinkBase:
     def stop(self) -> None:
         self.autopilot.stop()
 
-    def _engage(self, limits: RobotSpec, interrupt: Event) -> None:
-        """Armed, in the mode in which we drive it, at the mission's speed, and still where it stands."""
+    def _engage(self, interrupt: Event) -> None:
+        """Heard, armed, in the mode in which we drive it, and still where it stands."""
+        self._await(interrupt)
         autopilot = self.autopilot
+        if self._boots not in (None, autopilot.peer.boots):
+            self._take_up(interrupt)
         _must(self.not_ready() or autopilot.changed_hands())
         self._boots = autopilot.peer.boots
         if not autopilot.peer.armed:
             _must(autopilot.arm())
-        here = autopilot.place()
-        if autopilot.kind.driving.streams:
-            self._aim_for(here, WARM_UP_S, interrupt)
-        _must(autopilot.guide())
-        began_s = self._now_s()
-        while not autopilot.is_guided():
-            if self._now_s() > began_s + ORDER_S:
-                _must("the autopilot took the order and did not change its mode")
-            self._aim_for(here, TICK_S, interrupt)
-        self._limit_speed(here, limits.speed, interrupt)
+        with autopilot.standing_at(autopilot.place()):
+            self._guide(interrupt)
 
-    def _aim_for(self, place: Point, seconds: float, interrupt: Event) -> None:
-        """Keep telling a place while nothing else counts yet."""
-        until_s = self._now_s() + seconds
-        while self._now_s() < until_s:
-            self.autopilot.aim(place)
-            if self._clock.wait(TICK_S, interrupt):
-                raise DriveEnded("interrupted")
-
-    def _limit_speed(self, here: Point, speed: float, interrupt: Event) -> None:
-        """A speed counts only for a vehicle that has a place to go to, so it is told where it stands."""
+    def _guide(self, interrupt: Event) -> None:
+        """Into the mode in which we drive it, seen by its heartbeat."""
         trouble = ""
-        for _ in range(3 if self.autopilot.kind.driving.takes_speed else 0):
-            self.autopilot.aim(here)
-            self._tick(interrupt)
-            trouble = self.autopilot.limit_speed(speed)
+        for _ in range(TRIES):
+            if self.autopilot.kind.driving.streams:
+                self._pause(WARM_UP_S, interrupt)
+            trouble = self.autopilot.guide() or self._not_guided(interrupt)
             if not trouble:
                 return
         _must(trouble)
 
+    def _not_guided(self, interrupt: Event) -> str:
+        """Why it is not in that mode, though it took the order; empty once it is."""
+        began_s = self._now_s()
+        while not self.autopilot.is_guided():
+            if self._now_s() > began_s + ORDER_S:
+                return "the autopilot took the order and did not change its mode"
+            self._pause(TICK_S, interrupt)
+        return ""
+
     def _drive(self, point: Point, limits: RobotSpec, interrupt: Event) -> None:
-        target = self._frame().north_east(point)
-        course = self._course(point, limits)
-        told_s = self._now_s()
-        self.autopilot.aim(target)
+        autopilot = self.autopilot
+        drive = self._straight(point, limits)
         while True:
-            self._tick(interrupt)
-            lost = self.autopilot.still() and self._now_s() - told_s >= AGAIN_S
-            if lost or self.autopilot.kind.driving.streams:
-                self.autopilot.aim(target)
-                told_s = self._now_s()
-            here = self.pose()
-            verdict = course.judge((here.x, here.y), still=self.autopilot.still(), now_s=self._now_s())
+            if self._tick(interrupt):
+                drive.paused(self._now_s())
+            verdict = drive.judge(
+                self.pose(), speed=autopilot.speed(), still=autopilot.still(), now_s=self._now_s()
+            )
+            self._coast_s = drive.coast_s
             if verdict == "arrived":
                 return
-            _must(course.why)
+            _must(drive.why)
+            if drive.steer.stand:
+                autopilot.halt()
+            else:
+                autopilot.keep_course(self._frame().yaw(drive.steer.heading), drive.steer.speed)
 
-    def _course(self, point: Point, limits: RobotSpec) -> StraightDrive:
+    def _straight(self, point: Point, limits: RobotSpec) -> StraightDrive:
         pose, stops = self.pose(), () if self._mission is None else self._mission.stops
-        near_m = min((NEAR_M, *(stop.tolerance_m for stop in stops)))
-        return StraightDrive(
-            (pose.x, pose.y), point, self._now_s(),
-            near_m=near_m, over_m=max(near_m, limits.radius), patience=self._patience,
+        driving = self.autopilot.kind.driving
+        near_m = min((NEAR_M, *(NEAR_SHARE * stop.tolerance_m for stop in stops)))
+        ability = Ability(
+            near_m=near_m, over_m=max(near_m, limits.radius), speed=limits.speed,
+            acceleration=limits.acceleration, gives_up_s=driving.gives_up_s,
+            reverses=driving.courses == "heading",
         )  # fmt: skip
+        start = self._laid_to(point, pose)
+        return StraightDrive(
+            start, point, self._now_s(), ability=ability, coast_s=self._coast_s, patience=self._patience
+        )
+
+    def _laid_to(self, point: Point, pose: Pose) -> Point:
+        """Where the straight of the mission begins that ends at `point`, if the vehicle is on one."""
+        here = (pose.x, pose.y)
+        legs = () if self._mission is None else legs_of(self._mission)
+        pairs = [pair for leg in legs for one in pairwise(leg) for pair in (one, one[::-1])]
+        beside = [(math.dist(foot(*pair, here), here), pair[0]) for pair in pairs if pair[1] == point]
+        return min(beside, default=(0.0, here))[1]
 
     def _turn(self, heading: float, interrupt: Event) -> None:
         """Turn where it stands, as far as the vehicle can: one that steers like a car cannot at all."""
         yaw, began_s = self._frame().yaw(heading), self._now_s()
         least, progress_s, told_s = math.inf, began_s, -math.inf
-        while self._now_s() < min(began_s + TURN_S, progress_s + STALLED_S):
+        while self._now_s() < min(began_s + TURN_S, progress_s + self._patience.turns_s):
             off = self._off(heading)
             if off <= TURNED_RAD and self.autopilot.still():
                 return
@@ -211,7 +241,8 @@ class MavlinkBase:
             if self._now_s() - told_s >= AGAIN_S:
                 self.autopilot.aim_yaw(yaw)
                 told_s = self._now_s()
-            self._tick(interrupt)
+            if self._tick(interrupt):
+                progress_s, told_s = self._now_s(), -math.inf
         self._check_heading(heading)
 
     def _check_heading(self, heading: float) -> None:
@@ -225,18 +256,70 @@ class MavlinkBase:
     def _off(self, heading: float) -> float:
         return abs(math.remainder(self.pose().heading - heading, math.tau))
 
-    def _tick(self, interrupt: Event) -> None:
-        """A moment later, if all is well."""
-        if self._clock.wait(TICK_S, interrupt):
-            raise DriveEnded("interrupted")
+    def _tick(self, interrupt: Event) -> bool:
+        """A moment later; whether something has interrupted the drive that is over."""
+        self._pause(TICK_S, interrupt)
         autopilot = self.autopilot
-        began_again = autopilot.peer.boots != self._boots
-        _must(
-            autopilot.out_of_reach()
-            or ("the autopilot was started again" if began_again else "")
-            or autopilot.changed_hands()
-            or ("" if autopilot.peer.armed else "the autopilot was disarmed")
-        )
+        rode_out = self._await(interrupt)
+        if autopilot.peer.boots != self._boots:
+            self._engage(interrupt)
+            return True
+        if self._left_by_itself():
+            autopilot.left = None
+            self._engage(interrupt)
+            return True
+        _must(autopilot.changed_hands() or ("" if autopilot.peer.armed else "the autopilot was disarmed"))
+        self._stood = autopilot.place()
+        return rode_out
+
+    def _left_by_itself(self) -> bool:
+        """Whether it holds because it did not hear us, as one does that wants a stream of setpoints.
+
+        Its heartbeat may tell of that a moment after the line is back.
+        """
+        autopilot = self.autopilot
+        just_back = self._now_s() - self._late_until_s < BEAT_S
+        return just_back and autopilot.kind.driving.streams and autopilot.mode() == autopilot.modes.hold
+
+    def _pause(self, seconds: float, interrupt: Event) -> None:
+        if self._clock.wait(seconds, interrupt):
+            raise DriveEnded("interrupted")
+
+    def _await(self, interrupt: Event) -> bool:
+        """Wait for a vehicle that is late, which is told to stand meanwhile; whether it was."""
+        autopilot, late = self.autopilot, False
+        while autopilot.is_late:
+            late, self._late_until_s = True, self._now_s()
+            if autopilot.is_gone:
+                _must(autopilot.out_of_reach())
+            autopilot.halt()
+            self._pause(TICK_S, interrupt)
+        return late
+
+    def _take_up(self, interrupt: Event) -> None:
+        """The autopilot was started again: go on if it stands where it stood, and nobody took it meanwhile.
+
+        It is left as it is if anything else is the case; the next order to drive does not ask again.
+        """
+        autopilot, began_s = self.autopilot, self._now_s()
+        self._boots = autopilot.peer.boots
+        again = "the autopilot was started again"
+        _must("" if self._arm else f"{again} and is disarmed; arm it, or start stopgo robot with --arm")
+        since_s = time.monotonic()
+        origin = autopilot.origin()
+        woke = None
+        while woke is None or autopilot.origin(since_s) is None:
+            if self._now_s() > began_s + TAKE_UP_S:
+                _must(f"{again} and tells no {'mode' if woke is None else 'origin; set it to the mission’s'}")
+            if origin is not None:
+                autopilot.ask_origin(origin)
+            self._pause(TICK_S, interrupt)
+            self._await(interrupt)
+            woke = woke or autopilot.mode_since(since_s)
+        moved = math.dist(autopilot.place(), self._stood or autopilot.place())
+        if moved > MOVED_M:
+            _must(f"{again} and tells a place {moved:.2f} m from where it was: see where it stands")
+        _must(autopilot.take(woke))
 
     def _leave_off(self) -> None:
         """After a drive that ended early: hold, unless somebody else has the vehicle, and stand."""

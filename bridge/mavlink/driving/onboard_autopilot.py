@@ -9,11 +9,20 @@ from __future__ import annotations
 import math
 import threading
 import time
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from bridge.mavlink.line.messages import aim_at, aim_yaw, command_long, interval, on_board_beat
+from bridge.mavlink.line.messages import (
+    aim_at,
+    aim_yaw,
+    command_long,
+    interval,
+    keep_course,
+    on_board_beat,
+    set_origin,
+)
 from bridge.mavlink.line.peer import Peer, found
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import MessageQueue, Who, wire
@@ -39,6 +48,18 @@ ASK_ORIGIN_S = 4.0
 ORIGIN_S = 15.0
 """An origin that was not confirmed for so long is gone: the vehicle was started again and has none."""
 POSE_HZ = 20
+ASK_S = 1.0
+"""How often it is looked at whether all comes that should be told."""
+RARE = 0.4
+"""What comes in less than this share of its wanted number is asked for again; a bad line loses the rest."""
+LATE_GAPS, LOST_GAPS = 4.0, 20.0
+"""What does not come in so many times the longest pause of late is late, is lost."""
+SOONEST_LATE_S, LATEST_S = 0.4, 2.0
+SOONEST_LOST_S = 20.0
+FORGETS = 0.998
+"""Share of the longest pause that is remembered from one place to the next."""
+TURNING_M_S = 0.05
+"""An autopilot that is told a velocity by its direction needs one to turn."""
 POSE = ("LOCAL_POSITION_NED", "ATTITUDE")
 STREAMS = {
     "LOCAL_POSITION_NED": (MessageId.LOCAL_POSITION_NED, POSE_HZ),
@@ -50,14 +71,40 @@ STREAMS = {
 
 
 class NewestMessages(MessageQueue):
-    """The newest message of each type from the vehicle, and when it came."""
+    """The newest message of each type from the vehicle, when it came, and how regularly its places come."""
 
     def __init__(self, of: Who) -> None:
         super().__init__(of=of)
         self._newest: dict[str, tuple[float, Message]] = {}
+        self._counts: Counter[str] = Counter()
+        self._longest_s = 1.0 / POSE_HZ
 
     def put(self, message: Message) -> None:
-        self._newest[message.get_type()] = (time.monotonic(), message)
+        now_s = time.monotonic()
+        self._counts[message.get_type()] += 1
+        if message.get_type() == POSE[0]:
+            gap_s = min(self.age_s(POSE[0]), LATEST_S)
+            self._longest_s = max(gap_s, self._longest_s * FORGETS)
+        self._newest[message.get_type()] = (now_s, message)
+
+    def counted(self) -> Counter[str]:
+        """How many messages of each type have come since it was asked last."""
+        counts, self._counts = self._counts, Counter()
+        return counts
+
+    def age_s(self, name: str) -> float:
+        """Seconds since the newest of a type came."""
+        return time.monotonic() - self._newest.get(name, (-math.inf, None))[0]
+
+    @property
+    def late_s(self) -> float:
+        """After so long without a place it is late, by this line's own measure."""
+        return max(SOONEST_LATE_S, min(LATEST_S, LATE_GAPS * self._longest_s))
+
+    @property
+    def lost_s(self) -> float:
+        """After so long it is not late but lost."""
+        return max(SOONEST_LOST_S, LOST_GAPS * self._longest_s)
 
     def newest(self, name: str, within_s: float = math.inf) -> Message | None:
         """The newest of a type, unless it is older than that."""
@@ -127,6 +174,7 @@ class OnboardAutopilot:
         self._turns = threading.Lock()
         """An order to hold and one to be guided are given one after the other, never crossed."""
         self._guide_asked_s = 0.0
+        self._stands: Point | None = None
         self._stop_owed = threading.Event()
         self._stop_asked_s = 0.0
         self._closing = threading.Event()
@@ -185,10 +233,26 @@ class OnboardAutopilot:
                 return charge
         return None
 
-    def origin(self) -> VehicleOrigin | None:
-        """What its metres count from; `None` if it has none, or not yet again since it was started."""
-        told = self._heard.newest("GPS_GLOBAL_ORIGIN", ORIGIN_S)
+    def origin(self, since_s: float | None = None) -> VehicleOrigin | None:
+        """What its metres count from; `None` if it has none, or has not told it since then (monotonic)."""
+        at_s = time.monotonic() - ORIGIN_S if since_s is None else since_s
+        told = self._heard.since("GPS_GLOBAL_ORIGIN", at_s)
         return None if told is None else origin_of(told)
+
+    def mode_since(self, at_s: float) -> Mode | None:
+        """The mode that a heartbeat has told since then (monotonic); `None` if none came."""
+        beat = self._heard.since("HEARTBEAT", at_s)
+        return None if beat is None else self.kind.mode_of(beat)
+
+    @property
+    def is_late(self) -> bool:
+        """Whether it should have told its place and heading again by now."""
+        return max(self._heard.age_s(name) for name in POSE) > self._heard.late_s
+
+    @property
+    def is_gone(self) -> bool:
+        """Whether it has been late for so long that nobody should wait for it any longer."""
+        return max(self._heard.age_s(name) for name in POSE) > self._heard.lost_s
 
     def mode(self) -> Mode:
         return self.kind.mode_of(self.peer.heartbeat)
@@ -235,6 +299,20 @@ class OnboardAutopilot:
         """Drive to a place, in a straight line."""
         self.peer.send(aim_at(self.peer.who, place, **self._setpoint))
 
+    def keep_course(self, yaw: float, speed: float) -> None:
+        """Turn to a yaw and drive along it, backwards if the speed is negative; for `gives_up_s` at most."""
+        by_vector = self.kind.driving.courses == "vector"
+        speed = max(speed, TURNING_M_S) if by_vector else speed
+        velocity = (speed * math.cos(yaw), speed * math.sin(yaw)) if by_vector else (speed, 0.0)
+        self.peer.send(keep_course(self.peer.who, velocity, yaw, **self._setpoint))
+
+    def halt(self) -> None:
+        """Stand where it is, and neither drive nor turn."""
+        if self.kind.driving.courses == "vector":
+            self.aim(self.place())
+        else:
+            self.keep_course(self.yaw(), 0.0)
+
     def aim_yaw(self, yaw: float) -> None:
         """Turn where it stands."""
         self.peer.send(aim_yaw(self.peer.who, yaw, **self._setpoint))
@@ -255,9 +333,24 @@ class OnboardAutopilot:
         """Why it cannot be armed; empty once it is."""
         return self.order(Command.COMPONENT_ARM_DISARM, 1.0, what="arming")
 
-    def limit_speed(self, speed: float) -> str:
-        """Why it does not keep to a speed (m/s); empty if it does."""
-        return self.order(Command.DO_CHANGE_SPEED, 1.0, speed, -1.0, what=f"a speed of {speed:g} m/s")
+    def ask_origin(self, origin: VehicleOrigin) -> None:
+        """Give it back the origin that it had; it says itself whether it has taken it."""
+        self.peer.send(set_origin(self.peer.who, origin))
+        self.peer.request(MessageId.GPS_GLOBAL_ORIGIN)
+
+    def take(self, woke: Mode) -> str:
+        """Put it on hold after it was started again in the mode `woke`; why not, if somebody else has it."""
+        if self.mode() not in (woke, self.modes.hold):
+            return f"somebody switched the autopilot to {self.modes.name(self.mode())}"
+        self.left = None
+        asked_s = time.monotonic()
+        why = self.order(Command.DO_SET_MODE, *self.modes.hold.params, what="the mode to hold")
+        while not why and self.mode_since(asked_s) != self.modes.hold:
+            self.peer.request(MessageId.HEARTBEAT)
+            self._closing.wait(KEEP_S)
+            if time.monotonic() > asked_s + ORDER_S:
+                why = "the autopilot took the order to hold and does not show it"
+        return why
 
     def guide(self) -> str:
         """Why it does not go into the mode in which we drive it; empty if it may (`is_guided`)."""
@@ -302,19 +395,34 @@ class OnboardAutopilot:
                 self.peer.send(command_long(self.peer.who, Command.DO_SET_MODE, *self.modes.hold.params))
         self.peer.request(MessageId.HEARTBEAT)
 
+    @contextmanager
+    def standing_at(self, place: Point) -> Iterator[None]:
+        """Keep telling it to stand there, whatever else is waited for; never more than that by itself."""
+        self._stands = place
+        try:
+            yield
+        finally:
+            self._stands = None
+
     def _keep(self) -> None:
         """Until closed: ask for what should be told and is not, and order the stop that is owed."""
         asked_s = -math.inf
         while not self._closing.wait(KEEP_S):
+            stands = self._stands
+            if stands is not None:
+                self.aim(stands)
             if self._stop_owed.is_set():
                 self._hold()
-            if time.monotonic() - asked_s >= 1.0:
+            if time.monotonic() - asked_s >= ASK_S:
                 asked_s = time.monotonic()
                 self._ask_for_streams()
 
     def _ask_for_streams(self) -> None:
+        """One that was started again tells its place as seldom as by default, and that is not enough."""
+        came = self._heard.counted()
         for name, (number, hertz) in STREAMS.items():
-            if self._heard.newest(name, 3.0 / hertz + 1.0) is None:
+            missing = self._heard.newest(name, 3.0 / hertz + 1.0) is None
+            if missing or came[name] < RARE * hertz * ASK_S - 1:
                 self.peer.send(interval(self.peer.who, number, hertz))
         if self._heard.newest("GPS_GLOBAL_ORIGIN", ASK_ORIGIN_S) is None:
             self.peer.request(MessageId.GPS_GLOBAL_ORIGIN)

@@ -18,6 +18,8 @@ MISSION = dialect.MAV_MISSION_TYPE_MISSION
 POSITION_ONLY = 0x0DF8
 """Type mask of a setpoint that is a place: speeds, accelerations and yaw are ignored."""
 YAW_ONLY = 0x09FF
+COURSE = 0x09C7
+"""A velocity and a yaw: the place, accelerations and the yaw's rate are ignored."""
 
 
 def heartbeat(kind: VehicleType) -> Message:
@@ -74,10 +76,17 @@ def aim_yaw(to: Who, yaw: float, *, down: float, now_ms: int) -> Message:
     return _setpoint(to, YAW_ONLY, (0.0, 0.0), down, yaw, now_ms)
 
 
-def _setpoint(to: Who, mask: int, place: Point, down: float, yaw: float, now_ms: int) -> Message:
+def keep_course(to: Who, velocity: Point, yaw: float, *, down: float, now_ms: int) -> Message:
+    """Drive on with a velocity (what its two numbers mean is the autopilot's) and a yaw."""
+    return _setpoint(to, COURSE, (0.0, 0.0), down, yaw, now_ms, velocity)
+
+
+def _setpoint(
+    to: Who, mask: int, place: Point, down: float, yaw: float, now_ms: int, velocity: Point = (0.0, 0.0)
+) -> Message:
     return dialect.MAVLink_set_position_target_local_ned_message(
         now_ms & 0xFFFFFFFF, to.system, to.component, dialect.MAV_FRAME_LOCAL_NED, mask,
-        *place, down, *(0.0,) * 6, yaw, 0.0,
+        *place, down, *velocity, *(0.0,) * 4, yaw, 0.0,
     )  # fmt: skip
 
 

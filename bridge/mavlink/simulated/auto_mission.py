@@ -114,6 +114,8 @@ class AutoMission:
         now_ns, self.due_ns = self.due_ns, None
         if self._phase == "rebooting":
             self._tells.reboot()
+        elif self._phase == "driving" and (again_ns := self._rover.arrival_ns(now_ns)) is not None:
+            self.due_ns = again_ns
         elif self._phase == "driving" and (hold_s := self._hold_s()) > 0:
             self._phase, self.due_ns = "holding", now_ns + _ns(hold_s)
         elif self._phase == "driving" and self._item and self._item.command == STAYS:
@@ -152,7 +154,9 @@ class AutoMission:
     def _begin(self, item: Item, now_ns: int) -> None:
         if item.command in PLACES or item.command == HOMES:
             self._drive(item, now_ns)
-        elif item.command == Command.NAV_DELAY:
+            return
+        self._rover.brake(now_ns)
+        if item.command == Command.NAV_DELAY:
             self._phase, self.due_ns = "waiting", now_ns + _ns(item.params[0])
         else:
             self._phase = "script"
@@ -168,10 +172,14 @@ class AutoMission:
             return self._tells.text(f"Item {self.current}: {why}")
         finish = self._mishaps.due("finish", self.current)
         to_spare, heading = (finish.amount or 1.0, None) if finish else (0.0, self._heading(item))
-        ends_ns = self._rover.drive(self._beside(to, now_ns), now_ns, heading=heading, to_spare=to_spare)
+        ends_ns = self._rover.drive(
+            self._beside(to, now_ns), now_ns, heading=heading, to_spare=to_spare, keeps=True
+        )
         self._phase, self.due_ns = "driving", ends_ns
         if self._mishaps.once("reboot-mission", self.current):
-            self._phase, self.due_ns = "rebooting", (now_ns + ends_ns) // 2
+            here = self._rover.at(now_ns)[0]
+            half_ns = round(math.dist(to, (here.x, here.y)) / self._rover.speed / 2 * 1e9)
+            self._phase, self.due_ns = "rebooting", max(now_ns + half_ns, (now_ns + ends_ns) // 2)
 
     def _beside(self, to: Point, now_ns: int) -> Point:
         fault = self._mishaps.due("beside", self.current)

@@ -10,6 +10,7 @@ from bridge.mavlink.line.wire import Who
 from bridge.mavlink.simulated import replies
 from bridge.mavlink.simulated import vehicle_telemetry as telemetry
 from bridge.mavlink.simulated.rover import FAR_M
+from bridge.mavlink.simulated.steering import Course
 from bridge.mavlink.simulated.vehicle import Handlers, Vehicle
 from mission.document import SiteOrigin
 from mission.geodesy import STEPS_PER_DEGREE
@@ -21,7 +22,7 @@ from mission.mavlink.telemetry import Message
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 REJECTED, UNSUPPORTED = CommandResult.TEMPORARILY_REJECTED, CommandResult.UNSUPPORTED
 FAILED = CommandResult.FAILED
-IGNORE_X_Y, IGNORE_YAW = 0b11, 1 << 10
+IGNORE_X_Y, IGNORE_VELOCITY, IGNORE_YAW = 0b11, 0b11000, 1 << 10
 LOCAL_NED, LOCAL_OFFSET_NED = MavFrame.LOCAL_NED, MavFrame.LOCAL_OFFSET_NED
 NORTHMOST = 89.0
 """Degrees; at the poles there is no east."""
@@ -284,7 +285,7 @@ def _target_local(vehicle: Vehicle, message: Message) -> None:
     if message.type_mask & IGNORE_X_Y == IGNORE_X_Y:
         return _turn(vehicle, message)
     east, north = message.y, message.x
-    here = vehicle.motion()[0]
+    here = vehicle.motion().pose
     if message.coordinate_frame == LOCAL_OFFSET_NED:
         east, north = east + here.x, north + here.y
     elif message.coordinate_frame != LOCAL_NED:
@@ -301,10 +302,30 @@ def _target_global(vehicle: Vehicle, message: Message) -> None:
 
 
 def _turn(vehicle: Vehicle, message: Message) -> None:
-    """To a yaw without a place. Speeds and accelerations, which may come instead, are not followed."""
-    leads = vehicle.mode == "guided" and vehicle.armed and vehicle.autopilot.driving.turns
-    if leads and not message.type_mask & IGNORE_YAW and math.isfinite(message.yaw) and abs(message.yaw) < 100:
-        vehicle.target.turn(math.pi / 2 - message.yaw, vehicle.now_ns)
+    """A course without a place: a yaw, a velocity, or both. Accelerations are not followed."""
+    if vehicle.mode != "guided" or not vehicle.armed:
+        return
+    course = COURSES[vehicle.autopilot.driving.courses](message)
+    if course is not None and math.isfinite(course.heading) and abs(course.heading) < 100:
+        vehicle.target.steer(course, vehicle.now_ns)
+
+
+def _by_heading(message: Message) -> Course | None:
+    """ArduPilot: the yaw is kept; the sign of vx says which way, in any frame (GCS_MAVLink_Rover)."""
+    speed = 0.0 if message.type_mask & IGNORE_VELOCITY else math.hypot(message.vx, message.vy)
+    if message.type_mask & IGNORE_YAW:
+        return None if speed == 0 else Course(math.atan2(message.vx, message.vy), speed)
+    return Course(math.pi / 2 - message.yaw, math.copysign(speed, message.vx) if speed else 0.0)
+
+
+def _by_vector(message: Message) -> Course | None:
+    """PX4: drives where the velocity points; a yaw is of no account (DifferentialOffboardMode)."""
+    if message.type_mask & IGNORE_VELOCITY:
+        return None
+    return Course(math.atan2(message.vx, message.vy), math.hypot(message.vx, message.vy))
+
+
+COURSES = {"heading": _by_heading, "vector": _by_vector}
 
 
 def _guide(vehicle: Vehicle, message: Message, point: tuple[float, float]) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from bridge.link.clock import Clock
 from bridge.mavlink.simulated.rover import Rover
+from bridge.mavlink.simulated.steering import Course
 from mission.document import Point
 
 PATIENCE_NS = 1_000_000_000
@@ -11,12 +14,19 @@ PATIENCE_NS = 1_000_000_000
 
 
 class GuidedTarget:
-    """Where a station wants the vehicle."""
+    """Where a station wants the vehicle, or how it wants it to drive.
 
-    def __init__(self, rover: Rover, wall: Clock) -> None:
-        self._rover, self._wall = rover, wall
-        self._heard_ns = -PATIENCE_NS
+    Parameters
+    ----------
+    patience_s
+        How long a course counts that is not told again, seconds.
+    """
+
+    def __init__(self, rover: Rover, wall: Clock, *, patience_s: Callable[[], float]) -> None:
+        self._rover, self._wall, self._patience_s = rover, wall, patience_s
+        self._heard_ns = self._course_ns = -PATIENCE_NS
         self._to: tuple[Point, float | None] | None = None
+        self._course: Course | None = None
 
     @property
     def goes_somewhere(self) -> bool:
@@ -27,21 +37,29 @@ class GuidedTarget:
         """Whether a setpoint came just now."""
         return self._wall.now_ns() - self._heard_ns <= PATIENCE_NS
 
+    @property
+    def overdue(self) -> bool:
+        """Whether a course is followed that should have been told again."""
+        waited_ns = self._wall.now_ns() - self._course_ns
+        return self._course is not None and waited_ns > self._patience_s() * 1e9
+
     def hear(self) -> None:
         """A setpoint has come, followed or not."""
         self._heard_ns = self._wall.now_ns()
 
     def go(self, point: Point, heading: float | None, now_ns: int) -> None:
         """Drive to a point; the same one again changes nothing."""
+        self._course = None
         if (point, heading) != self._to:
             self._to = (point, heading)
             self._rover.drive(point, now_ns, heading=heading)
 
-    def turn(self, heading: float, now_ns: int) -> None:
-        """Turn on the spot."""
-        here = self._rover.at(now_ns)[0]
-        if self._to is None or self._to[1] != heading:
-            self.go((here.x, here.y), heading, now_ns)
+    def steer(self, course: Course, now_ns: int) -> None:
+        """Keep a heading and a speed for a while."""
+        self._to, self._course_ns = None, self._wall.now_ns()
+        if course != self._course:
+            self._course = course
+            self._rover.course(course, now_ns)
 
     def again(self, now_ns: int) -> None:
         """Set out anew, for the speed has changed."""
@@ -49,4 +67,4 @@ class GuidedTarget:
             self._rover.drive(self._to[0], now_ns, heading=self._to[1])
 
     def forget(self) -> None:
-        self._to = None
+        self._to = self._course = None

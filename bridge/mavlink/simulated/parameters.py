@@ -1,12 +1,12 @@
-"""The few parameters a ground station can read and set."""
+"""The parameters a ground station can read and set: most of them are how it drives (`tuning`)."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 from bridge.mavlink.line.wire import Who
 from bridge.mavlink.simulated import replies
+from bridge.mavlink.simulated.tuning import Tuning
 from bridge.mavlink.simulated.vehicle_scanner import DEFAULT_S, LONGEST_S
 from mission.mavlink.autopilots.kind import Habits
 from mission.mavlink.telemetry import Message
@@ -18,12 +18,14 @@ SCAN_TIME = "SIM_SCAN_TIME"
 class Parameters:
     """Named numbers, float32 on the wire."""
 
-    def __init__(self, habits: Habits, *, speed: float, set_speed: Callable[[float], bool]) -> None:
-        self._speed, self._set_speed = habits.speed_parameter, set_speed
+    def __init__(
+        self, habits: Habits, tuning: Tuning, *, speed: float, set_speed: Callable[[float], bool]
+    ) -> None:
+        self._speed, self._set_speed, self._tuning = habits.speed_parameter, set_speed, tuning
         self._values = {
+            **tuning.values,
             habits.system_parameter: 1.0,
             self._speed: speed,
-            "WP_RADIUS": 0.1,
             SCAN_TIME: DEFAULT_S,
         }
 
@@ -52,10 +54,11 @@ class Parameters:
 
     def _allowed(self, name: str, value: float) -> bool:
         if name == self._speed:
+            self._tuning.set(name, value)
             return self._set_speed(value)
         if name == SCAN_TIME:
             return 0 < value <= LONGEST_S
-        return name == "WP_RADIUS" and math.isfinite(value) and 0 < value < 100
+        return self._tuning.set(name, value)
 
     def _value(self, name: str) -> Message:
         index = list(self._values).index(name)

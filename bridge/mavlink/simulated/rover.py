@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 
+from bridge.mavlink.simulated.estimator import Estimate
+from bridge.mavlink.simulated.exact_drive import ExactDrive
+from bridge.mavlink.simulated.real_drive import RealDrive
+from bridge.mavlink.simulated.steering import Course
 from bridge.mavlink.simulated.vehicle_store import Store
-from bridge.robot.motion import Brake, Motion, along
-from mission.document import Point, RobotSpec, SiteOrigin
+from mission.document import Point, SiteOrigin
 from mission.events import Pose
 from mission.geodesy import STEPS_PER_DEGREE, from_geodetic, from_steps, to_geodetic
 
-LIMITS = RobotSpec(radius=0.35, speed=0.5, turn_rate=1.0, acceleration=0.5)
+STANDING = Pose(x=0.0, y=0.0, heading=math.pi / 2)
+"""Where a vehicle is that was never driven: at the origin, to the north."""
 FAR_M = 100_000.0
 """Beyond this from the origin it does not set out."""
 SLOWEST, FASTEST = 0.05, 5.0
@@ -25,38 +29,46 @@ class Rover:
     another ended, however seldom anybody looks.
     """
 
-    def __init__(self, store: Store, *, rule: str, origin: SiteOrigin | None, at: Pose | None) -> None:
-        self._store = store
-        self._rule = rule
+    def __init__(
+        self, store: Store, drive: ExactDrive | RealDrive, *, rule: str, origin: SiteOrigin | None
+    ) -> None:
+        self._store, self._rule = store, rule
+        self.motion = drive
         self.origin = origin
-        self.speed = LIMITS.speed
-        self._motion = Motion(at or store.kept.pose or Pose(x=0.0, y=0.0, heading=math.pi / 2))
-        self._began_ns = 0
 
     def at(self, now_ns: int) -> tuple[Pose, float]:
-        """Pose and speed."""
-        return self._motion.at((now_ns - self._began_ns) / 1e9)
+        """True pose and speed."""
+        return self.motion.at(now_ns)
 
-    def drive(self, to: Point, now_ns: int, *, heading: float | None = None, to_spare: float = 0.0) -> int:
-        """Set out for a point; when it will be there.
+    def told(self, now_ns: int) -> Estimate:
+        """Pose and speed as the autopilot knows them."""
+        return self.motion.told(now_ns)
 
-        `to_spare` metres before the point the drive ends.
+    def drive(
+        self,
+        to: Point,
+        now_ns: int,
+        *,
+        heading: float | None = None,
+        to_spare: float = 0.0,
+        keeps: bool = False,
+    ) -> int:
+        """Set out for a point; when to look whether it is there.
+
+        `to_spare` metres before the point the drive ends; if it `keeps`, the place is held until it brakes.
         """
-        start = self.at(now_ns)[0]
-        away = math.hypot(to[0] - start.x, to[1] - start.y)
-        share = max(0.0, 1.0 - to_spare / away) if away > 0 else 0.0
-        end = (start.x + (to[0] - start.x) * share, start.y + (to[1] - start.y) * share)
-        self._motion = along(
-            start, [end], heading,
-            speed=self.speed, turn_rate=LIMITS.turn_rate, acceleration=LIMITS.acceleration,
-        )  # fmt: skip
-        self._began_ns = now_ns
-        return now_ns + round(self._motion.duration * 1e9)
+        return self.motion.set_out(to, now_ns, heading=heading, to_spare=to_spare, keeps=keeps)
+
+    def arrival_ns(self, now_ns: int) -> int | None:
+        """When to look again; `None` once it has arrived."""
+        return self.motion.arrival_ns(now_ns)
+
+    def course(self, course: Course, now_ns: int) -> None:
+        """Keep a heading and a speed."""
+        self.motion.course(course, now_ns)
 
     def brake(self, now_ns: int) -> None:
-        pose, speed = self.at(now_ns)
-        self._motion = Motion(pose, (Brake(pose, speed, LIMITS.acceleration),) if speed > 0 else ())
-        self._began_ns = now_ns
+        self.motion.brake(now_ns)
 
     def keep(self, now_ns: int) -> None:
         """Write down where it stands, if it has moved."""
@@ -68,8 +80,12 @@ class Rover:
         """Metres per second from the next drive on; false if that is none."""
         if not SLOWEST <= speed <= FASTEST:
             return False
-        self.speed = speed
+        self.motion.speed = speed
         return True
+
+    @property
+    def speed(self) -> float:
+        return self.motion.speed
 
     @property
     def alt_mm(self) -> int:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge.link.clock import Clock
@@ -11,11 +12,16 @@ from bridge.mavlink.line.wire import Who, sender
 from bridge.mavlink.simulated import parameters, replies
 from bridge.mavlink.simulated.auto_mission import AutoEvents, AutoMission
 from bridge.mavlink.simulated.camera import Camera
+from bridge.mavlink.simulated.estimator import Estimate
+from bridge.mavlink.simulated.exact_drive import ExactDrive
 from bridge.mavlink.simulated.guided_target import GuidedTarget
 from bridge.mavlink.simulated.parameters import Parameters
-from bridge.mavlink.simulated.rover import Rover
+from bridge.mavlink.simulated.real_drive import RealDrive
+from bridge.mavlink.simulated.rover import STANDING, Rover
+from bridge.mavlink.simulated.steering import LAWS
 from bridge.mavlink.simulated.streams import Streams
 from bridge.mavlink.simulated.transfers import Transfers
+from bridge.mavlink.simulated.tuning import Tuning
 from bridge.mavlink.simulated.vehicle_faults import NO_FAULTS, Mishaps, VehicleFaults
 from bridge.mavlink.simulated.vehicle_store import MISSION, Store
 from mission.document import SiteOrigin
@@ -50,6 +56,10 @@ class Setting:
     at: Pose | None = None
     """Where it stands, x to the east and y to the north of the origin; else where it last stood."""
     faults: VehicleFaults = NO_FAULTS
+    seed: int | None = None
+    """It drives as a real one, by chances of this seed, if it is known how its kind does; else exactly."""
+    changed: Mapping[str, float] = field(default_factory=dict)
+    """Parameters that are not as by default."""
 
 
 class Vehicle:
@@ -82,6 +92,7 @@ class Vehicle:
         self._told_clock = wall if setting.faults.any("jitter") else None
         self._told_from_ns = wall.now_ns()
         self._quiet_until_ns = self._kept_ns = 0
+        self._made_ns = wall.now_ns()
         self.now_ns = self._booted_ns
         """The time of what is happening."""
         self.mode: ModeName = "manual"
@@ -90,10 +101,13 @@ class Vehicle:
         """The item reached last."""
         self.store = Store(setting.state)
         rule = self.autopilot.rule
-        self.rover = Rover(self.store, rule=rule, origin=setting.origin, at=setting.at)
-        self.target = GuidedTarget(self.rover, wall)
+        tuning = Tuning(self.autopilot.name, **setting.changed)
+        self.rover = Rover(self.store, self._drive(tuning), rule=rule, origin=setting.origin)
+        self.target = GuidedTarget(
+            self.rover, wall, patience_s=lambda: tuning.values.get("GUID_TIMEOUT", math.inf)
+        )
         self.parameters = Parameters(
-            self.autopilot.habits, speed=self.rover.speed, set_speed=self.rover.set_speed
+            self.autopilot.habits, tuning, speed=self.rover.speed, set_speed=self.rover.set_speed
         )
         self.camera = Camera(self.store, self.rover, self._mishaps, default_s=lambda: self.parameters.scan_s)
         tells = AutoEvents(
@@ -112,6 +126,11 @@ class Vehicle:
             **parameters.answer(self.parameters, self.say),
             **orders(self),
         }
+
+    def _drive(self, tuning: Tuning) -> ExactDrive | RealDrive:
+        pose, seed = self._setting.at or self.store.kept.pose or STANDING, self._setting.seed
+        real = seed is not None and self.autopilot.name in LAWS
+        return RealDrive(self.autopilot.name, tuning, pose, seed=seed or 0) if real else ExactDrive(pose)
 
     # What it hears, and the time
 
@@ -133,8 +152,13 @@ class Vehicle:
                 self.auto.step()
         self.now_ns = max(self.now_ns, until_ns)
         self._keep()
+        self._suffer()
         if self._quiet():
             return
+        if self.target.overdue:
+            self.text("target not received, stopping")
+            self.target.forget()
+            self.rover.brake(self.now_ns)
         if self.mode == "guided" and self.autopilot.driving.streams and not self.target.fresh:
             self.text("Offboard: setpoints lost")
             self.set_mode("hold")
@@ -162,8 +186,9 @@ class Vehicle:
     def text(self, text: str) -> None:
         self.say(replies.text(text))
 
-    def motion(self) -> tuple[Pose, float]:
-        return self.rover.at(self.now_ns)
+    def motion(self) -> Estimate:
+        """Where it believes it is, and how it moves."""
+        return self.rover.told(self.now_ns)
 
     @property
     def boot_ms(self) -> int:
@@ -263,6 +288,17 @@ class Vehicle:
         if wall_ns >= self._kept_ns + KEEP_NS:
             self._kept_ns = wall_ns
             self.rover.keep(self.now_ns)
+
+    def _suffer(self) -> None:
+        """What goes wrong at a time happens."""
+        up_s = (self._wall.now_ns() - self._made_ns) / 1e9
+        for jump in self._mishaps.by("jump", up_s):
+            self.rover.motion.jump(jump.amount, self.now_ns)
+        for gap in self._mishaps.by("gap", up_s):
+            self._quiet_until_ns = self._wall.now_ns() + round(gap.amount * 1e9)
+        for restart in self._mishaps.by("restart", up_s):
+            self.reboot()
+            self._quiet_until_ns += round(restart.amount * 1e9)
 
     def _quiet(self) -> bool:
         return self._wall.now_ns() < self._quiet_until_ns

@@ -11,7 +11,7 @@ from mission.errors import InputError
 
 VehicleFaultKind = Literal[
     "loss", "duplicates", "jitter", "lostack", "nack", "silent", "reboot-upload", "reboot-mission",
-    "beside", "finish", "scanner", "unsigned",
+    "beside", "finish", "scanner", "unsigned", "jump", "gap", "restart",
 ]  # fmt: skip
 
 
@@ -41,6 +41,9 @@ FAULTS: dict[VehicleFaultKind, str] = {
     "beside": "the vehicle stands AMOUNT metres to the left of item N's waypoint, and says it is reached",
     "finish": "item N's waypoint is said to be reached AMOUNT metres before it, in passing",
     "scanner": "scan N fails",
+    "jump": "N seconds after it was switched on, where it believes it is jumps by AMOUNT metres, for good",
+    "gap": "N seconds after it was switched on, nothing is said or heard for AMOUNT seconds",
+    "restart": "N seconds after it was switched on, it reboots, and takes AMOUNT seconds more for that",
     "unsigned": "nothing is signed, though there is a key; only what is signed is heard (N means nothing)",
 }
 
@@ -79,6 +82,12 @@ class Mishaps:
         self._happened.add(fault)
         return fault
 
+    def by(self, kind: VehicleFaultKind, seconds: float) -> list[VehicleFault]:
+        """The faults of a kind whose time has come just now."""
+        came = [f for f in self._faults.all if f.kind == kind and f.at <= seconds and f not in self._happened]
+        self._happened.update(came)
+        return came
+
 
 def read_vehicle_fault(text: str) -> VehicleFault:
     """A fault from KIND@N or KIND@N=AMOUNT, such as `beside@3=0.4`."""
@@ -99,16 +108,16 @@ def read_vehicle_fault(text: str) -> VehicleFault:
 def _nonsense(fault: VehicleFault) -> str | None:
     """What a fault must be that could not happen as it is."""
     kind, at, amount = fault.kind, fault.at, fault.amount
-    if kind in ("loss", "duplicates") and at > 100:
-        return f"N is a percentage, 0 to 100, such as {kind}@20"
-    if kind == "jitter" and at > MOST_JITTER_MS:
-        return f"N is milliseconds, 0 to {MOST_JITTER_MS}, such as jitter@300"
-    if kind in ("lostack", "scanner") and at == 0:
-        return f"N counts from 1: {kind}@1 is the first"
-    if kind in ("beside", "finish") and amount == 0:
-        return f"AMOUNT is metres, more than 0, such as {kind}@{at}=0.4"
-    if kind == "nack" and amount not in RESULTS:
-        return (
-            f"RESULT is a MAV_MISSION_RESULT, {RESULTS[0]} to {RESULTS[-1]} (0: ERROR), such as nack@{at}=5"
-        )
-    return None
+    percent = at > 100, f"N is a percentage, 0 to 100, such as {kind}@20"
+    counted = at == 0, f"N counts from 1: {kind}@1 is the first"
+    metres = amount == 0, f"AMOUNT is metres, more than 0, such as {kind}@{at}=0.4"
+    results = f"RESULT is a MAV_MISSION_RESULT, {RESULTS[0]} to {RESULTS[-1]} (0: ERROR)"
+    rules: dict[VehicleFaultKind, tuple[bool, str]] = {
+        "loss": percent, "duplicates": percent, "lostack": counted, "scanner": counted,
+        "beside": metres, "finish": metres, "jump": metres,
+        "jitter": (at > MOST_JITTER_MS, f"N is milliseconds, 0 to {MOST_JITTER_MS}, such as jitter@300"),
+        "gap": (amount == 0, f"AMOUNT is seconds, more than 0, such as gap@{at}=2"),
+        "nack": (amount not in RESULTS, f"{results}, such as nack@{at}=5"),
+    }  # fmt: skip
+    wrong, why = rules.get(kind, (False, ""))
+    return why if wrong else None

@@ -18,6 +18,7 @@ from bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from bridge.mavlink.simulated.lossy_line import on_line
 from bridge.mavlink.simulated.profiles import profile_named
 from bridge.mavlink.simulated.rover import to_east
+from bridge.mavlink.simulated.tuning import Tuning
 from bridge.mavlink.simulated.vehicle import Setting, Vehicle
 from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from mission.document import SiteOrigin
@@ -44,6 +45,10 @@ class VehicleOptions:
     at: Pose | None = None
     """In the site's frame, whose +y bears what the origin says."""
     faults: tuple[str, ...] = field(default=())
+    seed: int | None = None
+    """As in `Setting`."""
+    parameters: tuple[str, ...] = field(default=())
+    """NAME=VALUE each."""
 
 
 def run_vehicle(options: VehicleOptions, ready: Callable[[Url], None]) -> None:
@@ -121,13 +126,28 @@ def setting_of(options: VehicleOptions) -> Setting:
     level = (
         None if origin is None else SiteOrigin(lat=origin.lat, lon=origin.lon, alt=origin.alt, heading_deg=0)
     )
+    autopilot = profile_named(options.profile)
     return Setting(
-        autopilot=profile_named(options.profile),
+        autopilot=autopilot,
         state=options.state,
         origin=level,
         at=None if options.at is None else to_east(options.at, heading),
         faults=VehicleFaults(tuple(read_vehicle_fault(text) for text in options.faults)),
+        seed=options.seed,
+        changed=dict(_read_parameter(autopilot.name, text) for text in options.parameters),
     )
+
+
+def _read_parameter(kind: str, text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        number = float(value)
+    except ValueError:
+        raise InputError(f"--param {text}: write NAME=VALUE, as WP_RADIUS=0.1") from None
+    if not Tuning(kind).set(name, number):
+        known = ", ".join(sorted(Tuning(kind).values))
+        raise InputError(f"--param {text}: no value that it can have; its parameters are {known}")
+    return name, number
 
 
 def read_origin(text: str) -> SiteOrigin:

@@ -59,15 +59,18 @@ def battery_status(vehicle: Vehicle) -> Message:
 
 
 def attitude(vehicle: Vehicle) -> Message:
-    pose, _ = vehicle.motion()
-    return dialect.MAVLink_attitude_message(vehicle.boot_ms, 0.0, 0.0, bearing(pose.heading), 0.0, 0.0, 0.0)
+    now = vehicle.motion()
+    return dialect.MAVLink_attitude_message(
+        vehicle.boot_ms, 0.0, 0.0, bearing(now.pose.heading), 0.0, 0.0, -now.turning
+    )
 
 
 def global_position(vehicle: Vehicle) -> Message:
     """All zeros before there is an origin, as autopilots do."""
-    pose, speed = vehicle.motion()
+    now = vehicle.motion()
+    pose = now.pose
     lat, lon = vehicle.rover.place((pose.x, pose.y))
-    north, east = _velocity(pose.heading, 100 * speed)
+    north, east = 100 * now.speed_y, 100 * now.speed_x
     heading = round(math.degrees(bearing(pose.heading)) % 360 * 100) % 36_000
     return dialect.MAVLink_global_position_int_message(
         vehicle.boot_ms, lat, lon, vehicle.rover.alt_mm, 0, round(north), round(east), 0, heading
@@ -75,13 +78,15 @@ def global_position(vehicle: Vehicle) -> Message:
 
 
 def local_position(vehicle: Vehicle) -> Message:
-    pose, speed = vehicle.motion()
-    north, east = _velocity(pose.heading, speed)
-    return dialect.MAVLink_local_position_ned_message(vehicle.boot_ms, pose.y, pose.x, 0.0, north, east, 0.0)
+    now = vehicle.motion()
+    return dialect.MAVLink_local_position_ned_message(
+        vehicle.boot_ms, now.pose.y, now.pose.x, 0.0, now.speed_y, now.speed_x, 0.0
+    )
 
 
 def gps_raw(vehicle: Vehicle) -> Message:
-    pose, speed = vehicle.motion()
+    now = vehicle.motion()
+    pose, speed = now.pose, math.hypot(now.speed_x, now.speed_y)
     lat, lon = vehicle.rover.place((pose.x, pose.y))
     fix = dialect.GPS_FIX_TYPE_3D_FIX if vehicle.rover.origin else dialect.GPS_FIX_TYPE_NO_FIX
     auto = round(math.degrees(bearing(pose.heading)) % 360 * 100) % 36_000
@@ -91,7 +96,8 @@ def gps_raw(vehicle: Vehicle) -> Message:
 
 
 def vfr_hud(vehicle: Vehicle) -> Message:
-    pose, speed = vehicle.motion()
+    now = vehicle.motion()
+    pose, speed = now.pose, math.hypot(now.speed_x, now.speed_y)
     auto = round(math.degrees(bearing(pose.heading))) % 360
     return dialect.MAVLink_vfr_hud_message(speed, speed, auto, 0, vehicle.rover.alt_mm / 1000, 0.0)
 
@@ -177,8 +183,3 @@ MAKERS: dict[int, Maker] = {
     MessageId.CAMERA_CAPTURE_STATUS: capture_status,
     MessageId.CAMERA_IMAGE_CAPTURED: image_captured,
 }
-
-
-def _velocity(heading: float, speed: float) -> tuple[float, float]:
-    """North and east."""
-    return speed * math.sin(heading), speed * math.cos(heading)

@@ -42,6 +42,6 @@ GENERIC = Autopilot(
     keep=as_sent, brake_hold_s=0, longest_hold_s=32_767, max_delay_s=4_294_967.0, keeps_arrival=True,
     reached="within the acceptance radius that is sent", turns=True, gives_items="either",
     modes=px4.MODES, in_auto=in_auto,
-    driving=Driving(streams=False, takes_speed=True, turns=True, reposition_mode="hold"), drivable=False,
-    habits=HABITS,
+    driving=Driving(streams=False, gives_up_s=3.0, turns=True, courses="heading", reposition_mode="hold"),
+    drivable=False, habits=HABITS,
 )  # fmt: skip

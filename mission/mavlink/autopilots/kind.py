@@ -85,10 +85,13 @@ class Driving:
 
     streams: bool
     """It leaves that mode unless setpoints keep coming, so it is put on hold wherever it arrives."""
-    takes_speed: bool
-    """DO_CHANGE_SPEED counts there."""
+    gives_up_s: float
+    """How long it drives on by a velocity that is not told again."""
     turns: bool
     """It turns to a yaw that is told without a place."""
+    courses: Literal["heading", "vector"]
+    """What a velocity without a place means: with a yaw, a speed along that yaw, backwards if its first
+    number is negative; or, whatever the yaw, a way to drive, to which it turns on the spot first."""
     reposition_mode: ModeName
     """The mode in which it drives DO_REPOSITION."""
 

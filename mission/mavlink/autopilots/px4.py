@@ -59,7 +59,7 @@ MODES = Modes(
 # that a stop could not be seen to have been obeyed; and OFFBOARD ends by itself when our setpoints cease.
 # Setpoints at 2 Hz or more for a second before OFFBOARD and as long as it lasts; speed in it is the vehicle's
 # own (RO_SPEED_LIM), and yaw is of mecanum drives alone (SurfaceVehiclePositionSetpoint).
-DRIVING = Driving(streams=True, takes_speed=False, turns=False, reposition_mode="hold")
+DRIVING = Driving(streams=True, gives_up_s=1.0, turns=False, courses="vector", reposition_mode="hold")
 
 HABITS = Habits(
     asks_int=True, ask_again_s=0.25, give_up_s=5.0, tells_giving_up=False, atomic=True, strays="ignore",
@@ -78,7 +78,7 @@ HABITS = Habits(
     acknowledges_set_mode=False, start_takes_item=True,
     start_arms=True,  # source
     pauses_by_command=False, speed_while_driving=False,
-    speed_parameter="GND_SPEED_TRIM", system_parameter="MAV_SYS_ID",
+    speed_parameter="RO_SPEED_LIM", system_parameter="MAV_SYS_ID",
 )  # fmt: skip
 
 # Source: navigation.h allows 500 items on flight controllers (2 000 in older releases, 50 on the smallest

@@ -36,7 +36,7 @@ class Vehicle:
         write(tour(), self.mission)
         self.process = subprocess.Popen(
             [*STOPGO, "simulate", "vehicle", "--mavlink", f"udpin:127.0.0.1:{port}", "--profile", "ardupilot",
-             "--origin", "51.5,7.5,100", "--at", "0,0,0", "--speed-up", "10"],
+             "--exact", "--origin", "51.5,7.5,100", "--at", "0,0,0", "--speed-up", "10"],
             stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         assert self.process.stderr is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,12 @@ import pytest
 
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import read_signing_key
-from bridge.mavlink.simulated.rover import Rover as Wheels
+from bridge.mavlink.simulated.chassis import Chassis
 from bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
 from mission.document import sealed
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import Arrived, Finished, Held, PoseReport, Scanned
+from mission.mavlink.telemetry import STILL_M_S
 from tests.bridge.mavlink.driving.world import (
     SITE,
     bearing_of_corridor,
@@ -51,14 +53,14 @@ def test_an_autopilot_drives_a_mission_to_its_end(tmp_path: Path, profile: str, 
     events = [report for report in reports if isinstance(report, Arrived | Scanned | Finished)]
     assert [event.stop for event in events if isinstance(event, Scanned)] == ALL
     assert isinstance(events[-1], Finished)
-    assert all(event.deviation_m < 0.01 for event in events if isinstance(event, Arrived))
+    assert all(event.deviation_m < 0.05 for event in events if isinstance(event, Arrived))
     files = [event.file for event in events if isinstance(event, Scanned)]
     assert len(set(files)) == 2
     # Four metres along the corridor, which bears 120°.
-    assert stands == pytest.approx([4 * part for part in bearing_of_corridor()], abs=0.01)
+    assert stands == pytest.approx([4 * part for part in bearing_of_corridor()], abs=0.05)
     driven = [report.pose for report in reports if isinstance(report, PoseReport)]
-    assert max(abs(pose.y) for pose in driven) < 0.01
-    assert all(abs(math.remainder(pose.heading, math.tau)) < 0.01 for pose in driven)
+    assert max(abs(pose.y) for pose in driven) < 0.05
+    assert all(abs(math.remainder(pose.heading, math.tau)) < math.radians(10) for pose in driven)
 
 
 def test_an_ardupilot_rover_turns_to_the_headings_that_a_narrow_scanner_needs(tmp_path: Path) -> None:
@@ -132,7 +134,7 @@ def test_a_pause_stops_the_vehicle_and_resume_drives_on(tmp_path: Path, profile:
         reports = station.reports()
         until(reports, is_driving(0.5))
         station.command("pause")
-        until(reports, lambda report: isinstance(report, PoseReport) and report.speed == 0.0)
+        until(reports, lambda report: isinstance(report, PoseReport) and report.speed < STILL_M_S)
         until(reports, lambda report: isinstance(report, PoseReport) and operator.mode() == "HOLD")
         station.command("resume")
         until(reports, is_state("FINISHED"))
@@ -214,25 +216,27 @@ def test_a_disarmed_vehicle_ends_the_leg(tmp_path: Path) -> None:
 def test_a_blocked_leg_is_held_and_driven_once_the_way_is_free(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    free = Wheels.drive
-    along = bearing_of_corridor()
+    north, east = bearing_of_corridor()
+    free = Chassis.move
 
-    def to_the_wall(wheels: Wheels, to: Any, now_ns: int, **details: Any) -> int:
+    def to_the_wall(chassis: Chassis, *details: Any) -> None:
         """Three metres along the corridor is a wall."""
-        north, east = along
-        far = to[1] * north + to[0] * east
-        short = to if far <= 3.0 else (3.0 * east, 3.0 * north)
-        return free(wheels, short, now_ns, **details)
+        chassis.wall = ((3.0 * east, 3.0 * north), (3.0 * east - north, 3.0 * north + east))
+        free(chassis, *details)
+
+    def taken_away(chassis: Chassis, *details: Any) -> None:
+        chassis.wall = None
+        free(chassis, *details)
 
     with rover(tmp_path, "ardupilot") as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
-        monkeypatch.setattr(Wheels, "drive", to_the_wall)
+        monkeypatch.setattr(Chassis, "move", to_the_wall)
         station.push(site_mission())
         station.command("start")
         reports = station.reports()
         held = until(reports, lambda report: isinstance(report, Held))
-        assert held.reason.startswith("the way to s2 is blocked at (3.00, ")
-        assert "stands 1.00 m from where it was sent" in held.reason
-        monkeypatch.setattr(Wheels, "drive", free)
+        assert held.reason.startswith("the way to s2 is blocked at (")
+        assert re.search(r"stands (0\.9|1\.0)\d m from where it was sent", held.reason)
+        monkeypatch.setattr(Chassis, "move", taken_away)
         station.command("retry")
         until(reports, is_state("FINISHED"))
         assert scanned(station) == ALL
@@ -266,7 +270,7 @@ def test_a_line_that_is_cut_holds_the_leg_and_stops_the_vehicle_once_it_is_back(
         station.push(site_mission())
         station.command("start")
         reports = station.reports()
-        until(reports, is_driving(2.5))
+        until(reports, is_driving(2.1))
         line.roughness = Roughness(loss=1.0)
         held = until(reports, lambda report: isinstance(report, Held))
         assert "the autopilot has not been heard for" in held.reason
@@ -334,7 +338,7 @@ def test_home_is_driven_back_along_the_legs(tmp_path: Path) -> None:
         until(reports, is_driving(2.5))
         station.command("home")
         until(reports, is_state("ABORTED"))
-        assert operator.place() == pytest.approx((0.0, 0.0), abs=0.01)
+        assert operator.place() == pytest.approx((0.0, 0.0), abs=0.05)
 
 
 def test_a_robot_does_not_get_ready_without_an_autopilot(tmp_path: Path) -> None:

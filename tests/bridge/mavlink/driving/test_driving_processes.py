@@ -29,7 +29,7 @@ def vehicle(tmp_path: Path, profile: str) -> Iterator[tuple[Url, Operator]]:
     port = free_port()
     process = start(
         "simulate", "vehicle", "--mavlink", f"udpin:127.0.0.1:{port}", "--profile", profile, "--at", "0,0,0",
-        "--origin", "47.4,8.5,400,30", "--speed-up", "10", "--state", str(tmp_path / "vehicle"),
+        "--origin", "47.4,8.5,400,30", "--state", str(tmp_path / "vehicle"),
         called="the vehicle",
     )  # fmt: skip
     url = Url("udpout", "127.0.0.1", port)
@@ -75,7 +75,7 @@ def test_a_mission_over_zenoh_is_driven_by_an_autopilot_and_recorded(tmp_path: P
     assert review["mission_id"] == site_mission().id
     (run,) = review["runs"]
     assert (run["scanned"], run["ended"]) == (3, "Finished")
-    assert max(stop["deviation_m"] for stop in run["stops"]) < 0.01
+    assert max(stop["deviation_m"] for stop in run["stops"]) < 0.05
 
 
 @pytest.mark.parametrize(("stop", "doing"), [("s1", "SCANNING"), ("s2", "NAVIGATING")])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +26,12 @@ from bridge.robot.program import RobotOptions, robot_on
 from bridge.station.follow import Report
 from bridge.station.station import Station
 from mission.document import Mission, Scan, SiteOrigin, sealed
-from mission.events import AnyEvent, PoseReport, Scanned, StateReport
+from mission.events import AnyEvent, Pose, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor, pose_of
 from tests.ports import free_port
 
 SITE = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=30.0)
 """+y bears 30°, so +x, along the corridor, bears 120°."""
-FAST = 10.0
-"""How much faster the vehicle's time runs than ours."""
 ON_HOLD = dialect.MAVLINK_MSG_ID_HEARTBEAT
 
 
@@ -41,6 +40,23 @@ def site_mission(*, site: SiteOrigin | None = SITE, **details: Any) -> Mission:
     scan = Scan(profile="default", duration_s=3.0, timeout_s=20.0)
     made = corridor(**{"stops": 2, "closed": False, "settle_s": 0.2, "scan": scan, **details})
     return sealed(msgspec.structs.replace(made, georeference=site))
+
+
+def cornered_mission(*, speed: float = 0.5, **details: Any) -> Mission:
+    """Five stops after legs of 3 m, at corners of 90°, as of the Rover whose log is in `../shared`."""
+    places = [(0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (6.0, 3.0), (6.0, 0.0), (9.0, 0.0)]
+    made = site_mission(stops=5, **details)
+    robot = msgspec.structs.replace(made.robot, speed=speed)
+    stops = tuple(
+        msgspec.structs.replace(stop, x=x, y=y, approach=(before, (x, y)))
+        for stop, before, (x, y) in zip(made.stops, places, places[1:], strict=False)
+    )
+    return sealed(msgspec.structs.replace(made, stops=stops, robot=robot))
+
+
+def site_pose(pose: Pose) -> Pose:
+    """Where on the site a vehicle is that stands there, x to the east and y to the north of the origin."""
+    return to_east(pose, -SITE.heading_deg)
 
 
 class Rover:
@@ -54,6 +70,8 @@ class Rover:
         faults: VehicleFaults = NO_FAULTS,
         origin: SiteOrigin | None = SITE,
         signing_key: bytes | None = None,
+        seed: int = 1,
+        changed: Mapping[str, float] | None = None,
     ) -> None:
         self._key = signing_key
         start = site_mission().start
@@ -62,18 +80,16 @@ class Rover:
         self.url = Url("udpout", "127.0.0.1", free_port())
         self._first = Setting(
             autopilot=profile_named(profile), state=state, origin=level, faults=faults,
-            at=to_east(pose_of(start), SITE.heading_deg),
+            at=to_east(pose_of(start), SITE.heading_deg), seed=seed, changed=changed or {},
         )  # fmt: skip
-        self._again = Setting(autopilot=profile_named(profile), state=state, origin=level)
+        self._again = replace(self._first, at=None, faults=NO_FAULTS)
         self._life = ExitStack()
         self.on(self._first)
 
     def on(self, setting: Setting | None = None) -> None:
         """Switch it on; it stands where it stood."""
         url = Url("udpin", self.url.host, self.url.number)
-        self._life.enter_context(
-            vehicle_on(url, setting or self._again, speed_up=FAST, signing_key=self._key)
-        )
+        self._life.enter_context(vehicle_on(url, setting or self._again, signing_key=self._key))
 
     def off(self) -> None:
         self._life.close()

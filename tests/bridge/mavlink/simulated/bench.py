@@ -52,12 +52,12 @@ class Bench:
 
     def __init__(
         self, profile: str = "strict", *, state: Path | None = None, origin: SiteOrigin | None = ORIGIN,
-        faults: Sequence[str] = (), at: Pose | None = None,
+        faults: Sequence[str] = (), at: Pose | None = None, seed: int | None = None, **changed: float,
     ) -> None:  # fmt: skip
         self.clock, self.wall = SimulatedClock(), SimulatedClock()
         self.all: list[Message] = []
         made = tuple(read_vehicle_fault(text) for text in faults)
-        setting = Setting(PROFILES[profile], state, origin, at, VehicleFaults(made))
+        setting = Setting(PROFILES[profile], state, origin, at, VehicleFaults(made), seed, changed)
         self.vehicle = complete_vehicle(setting, clock=self.clock, wall=self.wall, say=self._hear)
         self.first = 1 if self.vehicle.autopilot.home_first else 0
         self._wires = {who: dialect.MAVLink(None, *vars(who).values()) for who in (STATION, OTHER)}

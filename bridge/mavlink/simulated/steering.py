@@ -1,0 +1,301 @@
+"""An autopilot's loops: from where it should go to throttle and steering, as ArduPilot Rover and PX4 do it.
+
+ArduPilot's: AR_AttitudeControl (speed and turn rate loops, stop), AR_PivotTurn, AR_PosControl and AR_WPNav
+(a target that runs ahead on the straight and is followed). PX4's: DifferentialVelControl (turn on the spot
+or drive), DifferentialPosControl (pure pursuit). Written anew from what these do.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from bridge.mavlink.simulated.estimator import Estimate
+from bridge.mavlink.simulated.tuning import Tuning
+from mission.document import Point
+
+PIVOTED_RAD = math.radians(5.0)
+STEER_SPEED = 1.0
+"""ArduPilot turns a sideways acceleration into a turn rate as if it drove at least so fast."""
+REACHED_M = 0.01
+"""So near its end ArduPilot's running target counts as arrived."""
+PARTS = 8
+"""Of a mean over time."""
+STARTS_M_S = 0.05
+"""PX4's speed at the very beginning of a straight."""
+
+
+@dataclass
+class RunningStraight:
+    """From a place to another, and how far the target on it has run."""
+
+    start: Point
+    end: Point
+    run_s: float = 0.0
+    run_m: float = 0.0
+    run_speed: float = 0.0
+    scale: float = 1.0
+    turning: bool = False
+    """Turning on the spot, before it drives."""
+    reached: bool = False
+    keeps: bool = False
+    """It is followed on when its end is reached: ArduPilot does so while it holds in AUTO."""
+
+    @property
+    def length(self) -> float:
+        return math.dist(self.start, self.end)
+
+    @property
+    def along(self) -> Point:
+        """Its direction."""
+        length = self.length
+        return (
+            ((self.end[0] - self.start[0]) / length, (self.end[1] - self.start[1]) / length)
+            if length
+            else (1.0, 0.0)
+        )
+
+
+@dataclass(frozen=True)
+class Course:
+    """A heading and a speed that were ordered; backwards if it is negative."""
+
+    heading: float
+    speed: float
+
+
+Want = tuple[float, float]
+"""Speed ahead and turn rate."""
+
+
+class Law(Protocol):
+    """How one kind of autopilot drives."""
+
+    def set_out(self, straight: RunningStraight, here: Estimate) -> None:
+        """At the beginning of a straight."""
+
+    def follow(self, straight: RunningStraight, here: Estimate, speed: float, dt: float) -> Want:
+        """On the way to its end; sets `reached`."""
+
+    def steer(self, course: Course, here: Estimate) -> Want: ...
+
+    def reset(self) -> None:
+        """Forget the loops' past: they are begun anew."""
+
+    def output(self, want: Want, here: Estimate, dt: float) -> tuple[float, float]:
+        """Throttle and steering, within ±1 or beyond."""
+
+
+class ArduPilotLaw:
+    """Of ArduPilot Rover with skid steering."""
+
+    def __init__(self, tuning: Tuning) -> None:
+        self._p = tuning
+        self.reset()
+
+    def reset(self) -> None:
+        self._speed = self._turn = self._speed_sum = self._turn_sum = 0.0
+
+    def set_out(self, straight: RunningStraight, here: Estimate) -> None:
+        off = abs(_off(_bearing(here, straight.end), here))
+        angle = math.radians(self._p["WP_PIVOT_ANGLE"])
+        straight.turning = angle > PIVOTED_RAD and off > angle
+
+    def follow(self, straight: RunningStraight, here: Estimate, speed: float, dt: float) -> Want:
+        if straight.turning:
+            bearing = _bearing(here, straight.end)
+            straight.turning = abs(_off(bearing, here)) >= PIVOTED_RAD
+            return 0.0, self._turn_to(bearing, here) if abs(self._speed) < 1e-6 else 0.0
+        target, velocity, push = self._run(straight, here, speed, dt)
+        to_x, to_y = target[0] - here.pose.x, target[1] - here.pose.y
+        gain = self._p["PSC_POS_P"]
+        want = _within((velocity[0] + gain * to_x, velocity[1] + gain * to_y), speed)
+        self._look_for_the_end(straight, here, math.hypot(to_x, to_y))
+        return self._ahead_and_turn(want, push, here)
+
+    def _run(
+        self, straight: RunningStraight, here: Estimate, speed: float, dt: float
+    ) -> tuple[Point, Point, Point]:
+        """The running target: its place, velocity and acceleration."""
+        p, (ux, uy) = self._p, straight.along
+        accel = p["WP_ACCEL"] or p["ATC_ACCEL_MAX"] or 20.0
+        smooth_s = accel / (p["WP_JERK"] or accel)
+        before = straight.run_speed
+        straight.run_s += straight.scale * dt
+        straight.run_m, straight.run_speed = _smooth(straight.length, speed, accel, smooth_s, straight.run_s)
+        self._scale(straight, here, dt / smooth_s)
+        at = (straight.start[0] + ux * straight.run_m, straight.start[1] + uy * straight.run_m)
+        push = (straight.run_speed - before) / dt
+        return at, (ux * straight.run_speed, uy * straight.run_speed), (ux * push, uy * push)
+
+    def _scale(self, straight: RunningStraight, here: Estimate, share: float) -> None:
+        """The target's time runs slower for a vehicle that does not keep up with it."""
+        if straight.run_speed <= 0:
+            return
+        ux, uy = straight.along
+        ahead = (
+            straight.run_m - (here.pose.x - straight.start[0]) * ux - (here.pose.y - straight.start[1]) * uy
+        )
+        keeps_up = (here.speed_x * ux + here.speed_y * uy - self._p["PSC_POS_P"] * ahead) / straight.run_speed
+        straight.scale += (max(0.0, min(1.0, 0.05 + keeps_up)) - straight.scale) * share
+
+    def _look_for_the_end(self, straight: RunningStraight, here: Estimate, away: float) -> None:
+        """Reached within the radius or past the finish line, once the target is there."""
+        if straight.length - straight.run_m <= REACHED_M:
+            ux, uy = straight.along
+            past = (here.pose.x - straight.end[0]) * ux + (here.pose.y - straight.end[1]) * uy
+            straight.reached = (
+                past >= 0 or math.dist((here.pose.x, here.pose.y), straight.end) <= self._p["WP_RADIUS"]
+            )
+
+    def _ahead_and_turn(self, want: Point, push: Point, here: Estimate) -> Want:
+        cos, sin = math.cos(here.pose.heading), math.sin(here.pose.heading)
+        gain = self._p["PSC_VEL_P"]
+        lateral = -sin * (push[0] + gain * (want[0] - here.speed_x)) + cos * (
+            push[1] + gain * (want[1] - here.speed_y)
+        )
+        ahead = cos * want[0] + sin * want[1]
+        return ahead, lateral / max(STEER_SPEED, abs(ahead))
+
+    def steer(self, course: Course, here: Estimate) -> Want:
+        return _limit(course.speed, self._p["WP_SPEED"]), self._turn_to(course.heading, here)
+
+    def _turn_to(self, heading: float, here: Estimate) -> float:
+        off = _off(heading, here)
+        most = math.radians(self._p["WP_PIVOT_RATE"] or self._p["ATC_STR_RAT_MAX"])
+        slows = math.sqrt(2 * abs(off) * math.radians(self._p["ATC_STR_ACC_MAX"])) or most
+        return _limit(_limit(self._p["ATC_STR_ANG_P"] * off, most), slows)
+
+    def output(self, want: Want, here: Estimate, dt: float) -> tuple[float, float]:
+        return self._throttle(want[0], here.ahead, dt), self._steering(want[1], here.turning, dt)
+
+    def _throttle(self, wanted: float, speed: float, dt: float) -> float:
+        p = self._p
+        slower = abs(wanted) < abs(self._speed)
+        step = ((p["ATC_DECEL_MAX"] if slower else 0.0) or p["ATC_ACCEL_MAX"] or 1e3) * dt
+        self._speed = max(self._speed - step, min(self._speed + step, wanted))
+        if self._speed == 0.0 and abs(speed) <= p["ATC_STOP_SPEED"]:
+            self._speed_sum = 0.0
+            return 0.0
+        off = self._speed - speed
+        self._speed_sum = _limit(self._speed_sum + p["ATC_SPEED_I"] * off * dt, p["ATC_SPEED_IMAX"])
+        base = self._speed * p["CRUISE_THROTTLE"] / 100.0 / p["CRUISE_SPEED"]
+        out = base + p["ATC_SPEED_P"] * off + self._speed_sum
+        brakes = p["ATC_BRAKE"] or out * self._speed > 0
+        return out if brakes else 0.0
+
+    def _steering(self, wanted: float, turning: float, dt: float) -> float:
+        p = self._p
+        step = (math.radians(p["ATC_STR_ACC_MAX"]) or 1e3) * dt
+        wanted = max(self._turn - step, min(self._turn + step, wanted))
+        self._turn = _limit(wanted, math.radians(p["ATC_STR_RAT_MAX"]) or 1e3)
+        off = self._turn - turning
+        self._turn_sum = _limit(self._turn_sum + p["ATC_STR_RAT_I"] * off * dt, 1.0)
+        return p["ATC_STR_RAT_FF"] * self._turn + p["ATC_STR_RAT_P"] * off + self._turn_sum
+
+
+class Px4Law:
+    """Of PX4's differential rover."""
+
+    def __init__(self, tuning: Tuning) -> None:
+        self._p = tuning
+        self._spot = False
+        self.reset()
+
+    def reset(self) -> None:
+        self._speed = self._turn = self._sum = 0.0
+
+    def set_out(self, straight: RunningStraight, here: Estimate) -> None:
+        """Nothing: whether it turns on the spot is decided anew at every moment."""
+
+    def follow(self, straight: RunningStraight, here: Estimate, speed: float, dt: float) -> Want:
+        p, place = self._p, (here.pose.x, here.pose.y)
+        away, begun = math.dist(place, straight.end), math.dist(place, straight.start)
+        straight.reached = away <= p["NAV_ACC_RAD"]
+        if straight.reached:
+            return 0.0, 0.0
+        slows = math.sqrt(2 * p["RO_DECEL_LIM"] * away)
+        starts = math.sqrt(2 * p["RO_ACCEL_LIM"] * begun) + STARTS_M_S
+        speed = min(speed, slows, starts)
+        return self.steer(Course(self._pursued(straight, place, speed), speed), here)
+
+    def _pursued(self, straight: RunningStraight, place: Point, speed: float) -> float:
+        """Bearing of the point of the straight that lies a lookahead away (pure pursuit)."""
+        p, (ux, uy) = self._p, straight.along
+        ahead = max(p["PP_LOOKAHD_MIN"], min(p["PP_LOOKAHD_MAX"], p["PP_LOOKAHD_GAIN"] * speed))
+        along = (place[0] - straight.start[0]) * ux + (place[1] - straight.start[1]) * uy
+        across = (place[1] - straight.start[1]) * ux - (place[0] - straight.start[0]) * uy
+        reach = min(straight.length, along + math.sqrt(max(0.0, ahead * ahead - across * across)))
+        aim = (straight.start[0] + reach * ux, straight.start[1] + reach * uy)
+        return math.atan2(aim[1] - place[1], aim[0] - place[0])
+
+    def steer(self, course: Course, here: Estimate) -> Want:
+        """Turn on the spot while the bearing is far off, else drive."""
+        p, off = self._p, _off(course.heading, here)
+        self._spot = abs(off) > p["RD_TRANS_TRN_DRV" if self._spot else "RD_TRANS_DRV_TRN"]
+        turn = _limit(p["RO_YAW_P"] * off, math.radians(p["RO_YAW_RATE_LIM"]))
+        return (0.0 if self._spot else _limit(course.speed, p["RO_SPEED_LIM"])), turn
+
+    def output(self, want: Want, here: Estimate, dt: float) -> tuple[float, float]:
+        p = self._p
+        self._speed = _toward(self._speed, want[0], p["RO_ACCEL_LIM"] * dt, p["RO_DECEL_LIM"] * dt)
+        self._turn += _limit(want[1] - self._turn, math.radians(p["RO_YAW_ACCEL_LIM"]) * dt)
+        felt = here.ahead if abs(here.ahead) > p["RO_SPEED_TH"] else 0.0
+        self._sum = (
+            _limit(self._sum + p["RO_SPEED_I"] * (self._speed - felt) * dt, 1.0) if self._speed else 0.0
+        )
+        throttle = self._speed / p["RO_MAX_THR_SPEED"] + p["RO_SPEED_P"] * (self._speed - felt) + self._sum
+        return (throttle if self._speed or felt else 0.0), self._turn / math.radians(p["SIM_TURN_TOP"])
+
+
+LAWS: dict[str, type[ArduPilotLaw] | type[Px4Law]] = {"ardupilot": ArduPilotLaw, "px4": Px4Law}
+
+
+def _smooth(length: float, speed: float, accel: float, smooth_s: float, run_s: float) -> tuple[float, float]:
+    """Way and speed from rest to rest with limited acceleration and jerk, after `run_s`.
+
+    The mean over `smooth_s` of what an acceleration that sets in at once would do.
+    """
+    parts = [
+        _run_after(length, speed, accel, run_s - (part + 0.5) / PARTS * smooth_s) for part in range(PARTS)
+    ]
+    return sum(way for way, _ in parts) / PARTS, sum(fast for _, fast in parts) / PARTS
+
+
+def _run_after(length: float, speed: float, accel: float, seconds: float) -> tuple[float, float]:
+    top = min(speed, math.sqrt(length * accel))
+    if seconds <= 0 or top <= 0:
+        return 0.0, 0.0
+    ramp_s, whole_s = top / accel, length / top + top / accel
+    left_s = whole_s - seconds
+    if left_s <= 0:
+        return length, 0.0
+    if seconds <= ramp_s:
+        return accel * seconds * seconds / 2, accel * seconds
+    if left_s <= ramp_s:
+        return length - accel * left_s * left_s / 2, accel * left_s
+    return top * (seconds - ramp_s / 2), top
+
+
+def _bearing(here: Estimate, to: Point) -> float:
+    return math.atan2(to[1] - here.pose.y, to[0] - here.pose.x)
+
+
+def _off(heading: float, here: Estimate) -> float:
+    return math.remainder(heading - here.pose.heading, math.tau)
+
+
+def _limit(value: float, most: float) -> float:
+    return max(-most, min(most, value))
+
+
+def _within(vector: Point, most: float) -> Point:
+    length = math.hypot(*vector)
+    return vector if length <= most else (vector[0] * most / length, vector[1] * most / length)
+
+
+def _toward(value: float, wanted: float, up: float, down: float) -> float:
+    """A step from `value`; away from 0 by `up` at most, towards it by `down`."""
+    step = down if abs(wanted) < abs(value) else up
+    return value + _limit(wanted - value, step or 1e3)
