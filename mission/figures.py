@@ -64,15 +64,15 @@ class Shares:
 
 @dataclass(frozen=True)
 class LimitCost:
-    """What one limit on how targets are seen costs, by plans made quickly with it and without it."""
+    """What one limit on how targets are seen costs, by a plan made quickly without it."""
 
     limit: str
     """The parameter that sets it."""
     words: str
     stops: int
-    """With all limits."""
+    """Of the plan, with all limits."""
     without: int
-    """Without this one."""
+    """About how many it takes without this one."""
     bound: int
     """Without this one there are never fewer."""
 

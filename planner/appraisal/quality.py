@@ -26,7 +26,7 @@ MOST_NAMED = 5
 def quality_of(selection: Selection) -> Quality | None:
     """What the limits on views cost, each switched off alone; None where there are none.
 
-    Plans for that are made by greedy choice from what is known to be in sight, so they are about right.
+    Plans for that are made quickly from what is known to be in sight, so they are about right.
     """
     seen = selection.visibility
     settings = seen.candidates.space.settings
@@ -34,8 +34,7 @@ def quality_of(selection: Selection) -> Quality | None:
     if not told:
         return None
     in_sight = _in_sight(seen)
-    stops, _ = quick(_under(in_sight, settings))
-    costs = []
+    stops, costs = len(selection.chosen), []
     for key, words in told.items():
         fewer, bound = quick(_under(in_sight, without(settings, key)))
         costs.append(LimitCost(key, words, stops=stops, without=fewer, bound=bound))
