@@ -1,6 +1,7 @@
 """Measures the link: orders a second, large missions on a slow line, and what a robot costs at rest.
 
-Run: python -m benchmarks.bridge [--keys]; one line per figure, medians and p99.
+Run: python -m benchmarks.bridge [--keys]; one line per figure, medians and p99. With --far instead: pushes
+and pauses on a line of long round trips, several pieces under way and, as formerly, one.
 """
 
 from __future__ import annotations
@@ -12,15 +13,18 @@ import statistics
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 
 import msgspec
 
-from bridge.commands.spawn import end_robot, start_robot
+from bridge.commands.spawn import end_robot, robot_process, start_robot
 from bridge.link.authority import init_site, issue
 from bridge.link.keys import now_utc
 from bridge.station.station import Station, connect
+from bridge.station.window import Window
 from mission.document import Mission, sealed
 from mission.ports import free_port
 from tests.bridge.proxy import Proxy
@@ -29,14 +33,20 @@ from tests.bridge.world import corridor
 ORDERS = 1000
 STOPS_OF_10_MB = 9_000
 POINTS_BETWEEN = 50
+FAR_BITS_PER_S, FAR_S = 8e6, 0.3
+FAR_STOPS = (2_000, 9_000)
 
 
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--keys", action="store_true", help="measure mTLS with signed orders")
-    with_keys = options.parse_args().keys
+    options.add_argument("--far", action="store_true", help="measure a line of 8 Mbit/s and 300 ms")
+    given = options.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        measure(Path(folder), with_keys=with_keys)
+        if given.far:
+            far(Path(folder))
+        else:
+            measure(Path(folder), with_keys=given.keys)
 
 
 def measure(folder: Path, *, with_keys: bool) -> None:
@@ -110,6 +120,70 @@ def slow_push(station: Station) -> None:
     print(f"push of {size / 1e6:.1f} MB at 8 Mbit/s: {seconds:.1f} s; the line alone {size * 8 / 8e6:.1f} s")
     tell("info meanwhile", latencies)
     tell("info while the robot reads the document", reading)
+
+
+@contextmanager
+def one_by_one() -> Iterator[None]:
+    """Every piece waits for the answer to the last one, as formerly."""
+    size = Window.size
+    Window.size = property(lambda window: 1)  # type: ignore[assignment, method-assign]
+    try:
+        yield
+    finally:
+        Window.size = size  # type: ignore[method-assign]
+
+
+def far(folder: Path) -> None:
+    """Rows of the table in benchmarks/README.md."""
+    revisions = count(2)
+    print("| document | under way | pieces s | of the line | pause: n | median ms | p99 ms | greatest ms |")
+    print("|---|---|---|---|---|---|---|---|")
+    with robot_process("r1", folder / "state", extra=["--endurance", "0"]) as endpoint:
+        with connect(endpoint, robot="r1") as station:
+            station.push(corridor())
+        with (
+            Proxy(int(endpoint.rpartition(":")[2]), bits_per_s=FAR_BITS_PER_S, delay_s=FAR_S / 2) as proxy,
+            connect(proxy.endpoint, robot="r1", timeout_s=30) as station,
+        ):
+            for stops in FAR_STOPS:
+                with one_by_one():
+                    far_push(station, stops, next(revisions), "one")
+                far_push(station, stops, next(revisions), "several")
+
+
+def far_push(station: Station, stops: int, revision: int, under_way: str) -> None:
+    """One push, with pauses given beside it while its pieces are under way."""
+    mission = winding(corridor(stops=stops, revision=revision))
+    size = len(msgspec.json.encode(mission))
+    pauses: list[float] = []
+    sent, began, ended = threading.Event(), [0.0], [0.0]
+
+    def told(held: int, whole: int) -> None:
+        began[0] = began[0] or time.monotonic()
+        ended[0] = time.monotonic()
+        if held == whole:
+            sent.set()
+
+    def pause_now_and_then() -> None:
+        while not sent.wait(0.05):
+            pauses.append(timed(lambda: station.link.ask(*pause(station), timeout_s=10)))
+
+    pausing = threading.Thread(target=pause_now_and_then)
+    pausing.start()
+    station.push(mission, progress=told)
+    pausing.join()
+    took, alone = ended[0] - began[0], size * 8 / FAR_BITS_PER_S
+    ordered = sorted(pauses)
+    p99, median = ordered[min(len(ordered) - 1, int(len(ordered) * 0.99))], statistics.median(ordered)
+    print(
+        f"| {size / 1e6:.1f} MB | {under_way} | {took:.1f} | {alone / took:.0%} | {len(ordered)}"
+        f" | {median * 1e3:.0f} | {p99 * 1e3:.0f} | {ordered[-1] * 1e3:.0f} |"
+    )
+
+
+def pause(station: Station) -> tuple[str, bytes]:
+    """Where a pause is sent, and the pause; in READY it is refused, and stored."""
+    return station.keys.command("pause"), msgspec.json.encode(station.stop_order("pause"))
 
 
 def at_rest(pid: int, seconds: float = 10.0) -> None:
