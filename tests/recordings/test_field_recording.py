@@ -17,11 +17,13 @@ from mission.__main__ import main
 from mission.document import Mission
 from mission.errors import InputError
 from mission.events import PoseReport, StateReport
+from mission.run_log import Track
 from recordings import entities, pieces
 from recordings.compact import compact
 from recordings.field import FieldRecording
 from recordings.read import check
 from recordings.runs.report import run_report
+from recordings.runs.trail import Trail
 from tests.disk import ROOMY, small_disk
 from tests.recordings import run, world
 from tests.recordings.conftest import tell, write_field, write_plan
@@ -346,3 +348,14 @@ def test_names_of_a_thousand_stops_do_not_bury_the_plan(tmp_path: Path, mission:
         pass
     assert static(path, entities.STOPS, "Points2D:show_labels") == [False]
     assert len(static(path, entities.STOPS, "Points2D:labels")) == 1000
+
+
+def test_no_path_is_drawn_through_what_nobody_knows_of() -> None:
+    trail = Trail()
+    _, first = trail.lengthened(Track.of([0, 10**9], [(0.0, 0.0), (1.0, 0.0)], [0.0, 0.0]))
+    trail.end()
+    _, second = trail.lengthened(Track.of([2 * 10**9, 3 * 10**9], [(5.0, 0.0), (6.0, 0.0)], [0.0, 0.0]))
+    assert [strip.tolist() for strip in (*first, *second)] == [
+        [[0.0, 0.0], [1.0, 0.0]],
+        [[5.0, 0.0], [6.0, 0.0]],
+    ]
