@@ -153,8 +153,6 @@ class Vehicle:
         self.now_ns = max(self.now_ns, until_ns)
         self._keep()
         self._suffer()
-        if self._quiet():
-            return
         if self.target.overdue:
             self.text("target not received, stopping")
             self.target.forget()
@@ -162,6 +160,8 @@ class Vehicle:
         if self.mode == "guided" and self.autopilot.driving.streams and not self.target.fresh:
             self.text("Offboard: setpoints lost")
             self.set_mode("hold")
+        if self._quiet():
+            return
         self.transfers.tick()
         for number in self.streams.due():
             self.tell(number)

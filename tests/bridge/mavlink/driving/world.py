@@ -82,14 +82,14 @@ class Rover:
             autopilot=profile_named(profile), state=state, origin=level, faults=faults,
             at=to_east(pose_of(start), SITE.heading_deg), seed=seed, changed=changed or {},
         )  # fmt: skip
-        self._again = replace(self._first, at=None, faults=NO_FAULTS)
+        self.setting = replace(self._first, at=None, faults=NO_FAULTS)
         self._life = ExitStack()
         self.on(self._first)
 
     def on(self, setting: Setting | None = None) -> None:
         """Switch it on; it stands where it stood."""
         url = Url("udpin", self.url.host, self.url.number)
-        self._life.enter_context(vehicle_on(url, setting or self._again, signing_key=self._key))
+        self._life.enter_context(vehicle_on(url, setting or self.setting, signing_key=self._key))
 
     def off(self) -> None:
         self._life.close()
@@ -112,6 +112,9 @@ class Operator:
 
     def manual(self) -> None:
         self.peer.order(dialect.MAV_CMD_DO_SET_MODE, *self.autopilot.modes.numbers["manual"].params)
+
+    def arm(self) -> None:
+        self.peer.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
     def disarm(self) -> None:
         self.peer.order(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)

@@ -1,0 +1,116 @@
+"""What the gateway makes of a vehicle that drives as a real one: in time, on its way, on after a mishap."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaultKind, VehicleFaults
+from mission.events import Arrived, Held, Pose, PoseReport
+from mission.run.way import foot
+from mission.schedule import schedule
+from tests.bridge.mavlink.driving.world import (
+    cornered_mission,
+    events_of,
+    gateway,
+    is_driving,
+    is_state,
+    rover,
+    scanned,
+    site_mission,
+    until,
+)
+from tests.own_time import World, stepped_into
+
+STIFF = {"SIM_STICTION": 0.03, "SIM_LAG": 0.6, "SIM_TURN_LAG": 0.3, "SIM_POS_DRIFT": 0.01}
+"""Wheels that stick and follow late, and a place that wanders by a centimetre."""
+
+
+@pytest.fixture(autouse=True)
+def world() -> Iterator[World]:
+    with stepped_into() as stepped:
+        yield stepped
+
+
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize("changed", [{}, STIFF], ids=["as the log's", "stiff"])
+def test_stops_of_5_cm_are_reached_in_twice_the_planned_time_and_on_the_legs(
+    tmp_path: Path, world: World, profile: str, changed: dict[str, float]
+) -> None:
+    mission = cornered_mission()
+    with rover(tmp_path, profile, changed=changed) as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
+        station.push(mission)
+        began_ns = world.monotonic_ns()
+        station.command("start")
+        poses = [report.pose for report in station.reports() if isinstance(report, PoseReport)]
+        took_s = (world.monotonic_ns() - began_ns) / 1e9
+        events = events_of(station)
+    arrived = [event for event in events if isinstance(event, Arrived)]
+    assert [event.stop for event in arrived] == ["s1", "s2", "s3", "s4", "s5"]
+    assert max(event.deviation_m for event in arrived) <= 0.05
+    assert took_s <= 2 * schedule(mission).total_s
+    legs = [pair for stop in mission.stops for pair in pairwise(stop.approach)]
+    assert max(min(_beside(pair, pose) for pair in legs) for pose in poses) < 0.1
+
+
+def _beside(leg: Any, pose: Pose) -> float:
+    return math.dist((pose.x, pose.y), foot(*leg, (pose.x, pose.y)))
+
+
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+@pytest.mark.parametrize(("kind", "lasts_s"), [("gap", 0.8), ("gap", 8.0), ("restart", 4.0)])
+def test_a_short_silence_and_a_restart_are_taken_up_by_itself(
+    tmp_path: Path, profile: str, kind: VehicleFaultKind, lasts_s: float
+) -> None:
+    faults = VehicleFaults((VehicleFault(kind, 9, lasts_s),))
+    with rover(tmp_path, profile, faults=faults) as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
+        station.push(site_mission())
+        station.command("start")
+        until(station.reports(), is_state("FINISHED", "HELD"))
+        assert [event for event in events_of(station) if isinstance(event, Held)] == []
+        assert scanned(station) == ["s1", "s2"]
+
+
+def test_a_jump_of_its_place_is_driven_back_from(tmp_path: Path) -> None:
+    faults = VehicleFaults((VehicleFault("jump", 6, 0.25),))
+    with rover(tmp_path, "ardupilot", faults=faults) as (vehicle, _), gateway(tmp_path, vehicle.url) as s:
+        s.push(site_mission())
+        s.command("start")
+        until(s.reports(), is_state("FINISHED", "HELD"))
+        assert scanned(s) == ["s1", "s2"]
+        assert all(event.deviation_m <= 0.05 for event in events_of(s) if isinstance(event, Arrived))
+
+
+def test_a_vehicle_that_was_carried_while_it_restarted_is_not_driven_on(tmp_path: Path) -> None:
+    with rover(tmp_path, "ardupilot") as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
+        station.push(site_mission())
+        station.command("start")
+        reports = station.reports()
+        until(reports, is_driving(0.5))
+        vehicle.off()
+        vehicle.on(replace(vehicle.setting, at=Pose(x=3.0, y=3.0, heading=0.0)))
+        held = until(reports, lambda report: isinstance(report, Held))
+        assert "the autopilot was started again and tells a place" in held.reason
+        assert "see where it stands" in held.reason
+
+
+def test_without_leave_to_arm_a_restart_is_held_for_who_arms_it(tmp_path: Path) -> None:
+    with (
+        rover(tmp_path, "ardupilot") as (vehicle, operator),
+        gateway(tmp_path, vehicle.url, arm=False) as station,
+    ):
+        operator.arm()
+        station.push(site_mission())
+        station.command("start")
+        reports = station.reports()
+        until(reports, is_driving(0.5))
+        vehicle.off()
+        vehicle.on()
+        held = until(reports, lambda report: isinstance(report, Held))
+        assert "started again and is disarmed; arm it, or start stopgo robot with --arm" in held.reason
