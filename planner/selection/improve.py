@@ -13,6 +13,8 @@ SWAPS = 400
 """Most swaps tried before a smaller selection is given up; a count, so that no plan depends on speed."""
 TRIALS = 24_000
 """Stops looked at for all those swaps together, so that large floors get fewer swaps."""
+ENTRIES = 50_000_000
+"""Views of columns looked at for them together, so that open floors and long ranges get fewer of them too."""
 TENURE = 7
 """Swaps for which a row that left may not come back."""
 
@@ -20,7 +22,9 @@ TENURE = 7
 def improved(cover: Cover, chosen: IntArray, *, at_least: int, swaps: int = SWAPS) -> IntArray:
     """A selection with as few rows as drop-and-repair finds, never fewer than the bound `at_least`."""
     best = chosen
-    swaps = min(swaps, max(TENURE, TRIALS // max(1, len(chosen))))
+    at_once = len(chosen) * cover.sees.nnz**2 // max(1, cover.rows * cover.columns)
+    least = min(TRIALS // max(1, len(chosen)), ENTRIES // max(1, at_once))
+    swaps = min(swaps, max(TENURE, least))
     while len(best) > at_least:
         smaller = _repaired(cover, _without_least(cover, best), swaps)
         if smaller is None:
