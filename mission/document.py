@@ -122,6 +122,19 @@ class Stop(Document, frozen=True):
     sees: Sees
 
 
+class Overlap(Document, frozen=True):
+    """Two stops whose scans register with one another, by the boundary that both see."""
+
+    a: str
+    b: str
+    common_m: float
+    """Metres of boundary that both see."""
+    share: float
+    """Of what the one of the two sees that sees less."""
+    hold_m: float
+    """Metres of wall that face the weakest of all small moves in x, y and heading."""
+
+
 class Policy(Document, frozen=True):
     link_loss: Literal["continue", "finish_stop", "hold", "home"]
     link_loss_after_s: float
@@ -158,6 +171,14 @@ class Mission(Document, frozen=True, kw_only=True):
     return_: tuple[Point, ...] | None = msgspec.field(name="return")
     policy: Policy
     origin: Origin
+    network: tuple[Overlap, ...] | msgspec.UnsetType = msgspec.UNSET
+    """Pairs of stops that register with one another; left out where the plan does not ask for it."""
+
+
+def stop_names(count: int) -> list[str]:
+    """The ids of so many stops, in the order of driving."""
+    width = max(2, len(str(count)))
+    return [f"s{number:0{width}d}" for number in range(1, count + 1)]
 
 
 def canonical(document: dict[str, Any]) -> bytes:

@@ -170,7 +170,7 @@ class Candidates:
     must: BoolArray = field(default_factory=lambda: frozen([], np.bool_))
     """Whether a stop must be at each candidate (n,); empty where none must."""
     extra: BoolArray = field(default_factory=lambda: frozen([], np.bool_))
-    """Whether each candidate was added beside a chosen one, and does not count for what is visible (n,)."""
+    """Whether each candidate is there to save or join stops, and not for what is visible (n,)."""
     heading: FloatArray = field(default_factory=lambda: frozen([]))
     """The scanner's heading at each candidate (n,); empty where it looks all round."""
 
@@ -202,7 +202,7 @@ class Candidates:
 
     @cached_property
     def extra_rows(self) -> IntArray:
-        """Rows (indices into `kept`) of the candidates that were added beside chosen ones."""
+        """Rows (indices into `kept`) of the candidates that do not count for what is visible."""
         return self._rows_where(self.extra)
 
     def _rows_where(self, flag: BoolArray) -> IntArray:
@@ -278,7 +278,7 @@ class Visibility:
 
     @cached_property
     def visible(self) -> BoolArray:
-        """Whether any candidate, those added beside chosen ones aside, sees each unit (n,)."""
+        """Whether any candidate, those that do not count aside, sees each unit (n,)."""
         return self._seen_by_any(self._pattern)
 
     @cached_property

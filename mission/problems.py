@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import msgspec
 from msgspec import UNSET
 
 from mission.document import Mission, Point, Start, Stop
@@ -40,6 +41,7 @@ def problems_of(mission: Mission) -> tuple[Problem, ...]:
         *_stops(mission),
         *_legs(mission),
         *_policy(mission),
+        *_network(mission),
     )
 
 
@@ -165,6 +167,22 @@ def _policy(mission: Mission) -> Iterator[Problem]:
     yield from _not_negative("$.policy.link_loss_after_s", policy.link_loss_after_s)
     if not 0 <= policy.battery_min < 1:
         yield Problem("$.policy.battery_min", f"is {policy.battery_min}; it must be at least 0 and below 1")
+
+
+def _network(mission: Mission) -> Iterator[Problem]:
+    overlaps = () if isinstance(mission.network, msgspec.UnsetType) else mission.network
+    stops, pairs = {stop.id for stop in mission.stops}, set()
+    for index, item in enumerate(overlaps):
+        path = f"$.network[{index}]"
+        for end in ("a", "b"):
+            if getattr(item, end) not in stops:
+                yield Problem(f"{path}.{end}", f"is {getattr(item, end)!r}, which is no stop")
+        pair = frozenset((item.a, item.b))
+        if len(pair) < 2 or pair in pairs:
+            yield Problem(path, f"{item.a} and {item.b} are {'a pair twice' if pair in pairs else 'no pair'}")
+        pairs.add(pair)
+        for key in ("common_m", "share", "hold_m"):
+            yield from _not_negative(f"{path}.{key}", getattr(item, key))
 
 
 def _pose(path: str, place: Point, heading: float) -> Iterator[Problem]:

@@ -128,6 +128,16 @@ class Settings:
         Literal["length", "paper"],
         _plan("Count metres; or, as the paper does, units of the whole"),
     ] = "length"
+    overlap: Annotated[
+        float,
+        _plan(
+            "Least share of a scan that its neighbour sees too, so that all register; 0: not asked for",
+            least=0,
+            below=1,
+            why="0.1 is 10 %",
+        ),
+    ] = 0.0
+    overlap_range: Annotated[float, _plan("Farthest boundary that counts for overlap", "m", above=0)] = 20.0
     d_sec: Annotated[float, _plan("Stop to element", "m", least=0)] = 0.7
     d_dis: Annotated[
         float, _plan("Length of a unit", "m", least=1e-3, why="units below 1 mm are not planned")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import shapely
 
@@ -18,6 +19,7 @@ from mission.document import (
     Stop,
     mission_id,
     sealed,
+    stop_names,
 )
 from mission.errors import StopgoError
 from mission.geometry import FloatArray
@@ -35,6 +37,7 @@ from mission.specs import (
     site_origin_of,
 )
 from mission.turning import SAME
+from planner.overlap.registered import registered_pairs
 from planner.routing import GRAPHS
 from planner.shapes import local_origin
 from planner.space.gaps import Walls, keeps_clear
@@ -70,6 +73,7 @@ def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
             return_=None if route.return_leg is None else _line(route.return_leg),
             policy=policy_of(settings),
             origin=origin_of(settings, floor=floor.name, digest=floor.digest),
+            network=registered_pairs(route) if settings.overlap > 0 else msgspec.UNSET,
         )
     )
 
@@ -86,16 +90,15 @@ def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
     rows = route.selection.chosen[route.order]
     doorways = set(visibility.candidates.doorway_rows.tolist())
     views = np.zeros(visibility.targets.total, dtype=np.int64)
-    width = max(2, len(str(len(rows))))
     stops = []
     heading = _turned(route.start[2])
-    for number, (row, approach) in enumerate(zip(rows, route.approaches, strict=True), start=1):
+    for name, row, approach in zip(stop_names(len(rows)), rows, route.approaches, strict=True):
         units = visibility.seen_by(int(row))
         views[units] += 1
         new = int(np.count_nonzero(views[units] == visibility.asked[units]))
         heading = _scan_heading(visibility.candidates, int(row), _arrival_heading(approach, heading))
         sees = Sees(units=len(units), new_units=new)
-        name, doorway = f"s{number:0{width}d}", int(row) in doorways
+        doorway = int(row) in doorways
         stops.append(_stop(name, approach, heading, sees, settings, doorway=doorway))
     return tuple(stops)
 

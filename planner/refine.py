@@ -83,7 +83,8 @@ def _joined(seen: Visibility, more: Visibility) -> Visibility:
     """The candidates of both with what they see."""
     one, other = seen.candidates, more.candidates
     both: dict[str, Any] = {name: _frozen(getattr(one, name), getattr(other, name)) for name in PER_CANDIDATE}
-    extra = _frozen(np.zeros(len(one.xy), dtype=np.bool_), other.extra)
+    before = one.extra if len(one.extra) else np.zeros(len(one.xy), dtype=np.bool_)
+    extra = _frozen(before, other.extra)
     return replace(
         seen,
         candidates=replace(one, **both, extra=extra),

@@ -11,6 +11,7 @@ from typing import Any
 from mission.document import Mission
 from mission.figures import Figures, Share, percent
 from mission.floor import Finding, Rank
+from mission.network import network_lines, network_table
 from mission.plan import PartPlan
 from mission.schedule import schedule
 from mission.table import printable
@@ -74,6 +75,7 @@ class PlanReport:
                 "bound": selection.bound,
                 "method": selection.method,
             },
+            **network_table(self.mission),
             "coverage": coverage_table(self.figures),
             **quality_told(self.figures),
             "route": {
@@ -129,6 +131,7 @@ class PlanReport:
             f"  time        {times['total_s'] / 60:.0f} min: drive {times['drive_s']:.0f} s, "
             f"turn {times['turn_s']:.0f} s, settle {times['settle_s']:.0f} s, scan {times['scan_s']:.0f} s",
             *quality_lines(figures),
+            *network_lines(self.mission),
             *coverage_lines(figures),
         ]
         lines += [

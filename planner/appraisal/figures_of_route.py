@@ -12,6 +12,7 @@ from mission.seen import seen_units
 from planner.appraisal.plausible import doubts_of, near_legs
 from planner.appraisal.quality import not_met, quality_of
 from planner.appraisal.unreached import unreached
+from planner.overlap.registered import scans_apart
 from planner.shapes import local_origin, to_shape
 from planner.space.reach import reach_of
 
@@ -24,7 +25,8 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
     parts = planned or frozenset([candidates.chosen_part])
     left_out = unreached(candidates, parts)
     reached = _reached_m2(candidates, parts)
-    findings = (*space.findings, *doubts_of(route, reached_m2=reached), *not_met(selection))
+    doubts = (*doubts_of(route, reached_m2=reached), *not_met(selection), *scans_apart(route))
+    findings = (*space.findings, *doubts)
     shares = shares_of(selection, why={item.room: item.why for item in left_out})
     return Figures(
         rule=settings.coverage_rule,

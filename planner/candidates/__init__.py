@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mission.errors import AnswerIsNo, InputError
-from mission.geometry import FloatArray, IntArray, frozen
+from mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from mission.planning import (
     AT_EDGE,
     AVOIDED,
@@ -106,7 +106,15 @@ def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> C
         part_area=reach.parts.areas,
         doorway=frozen(proposals.doorway, np.bool_),
         must=frozen(proposals.must, np.bool_),
+        extra=_for_overlap_only(space, proposals),
     )
+
+
+def _for_overlap_only(space: NavigableSpace, proposals: Proposals) -> BoolArray:
+    """Doorways that nobody asked for: they may join scans, and do not count for what is visible."""
+    settings = space.settings
+    asked = settings.door_scan or settings.door_candidates
+    return frozen([] if asked or not proposals.doorway.any() else proposals.doorway, np.bool_)
 
 
 def _check_used(space: NavigableSpace, proposals: Proposals, at: IntArray, chosen: int) -> None:

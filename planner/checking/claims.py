@@ -123,7 +123,7 @@ def _candidates(mission: Mission, space: NavigableSpace) -> Candidates:
 def _could_see(found: Candidates, lines: SightLines) -> IntArray:
     """How many candidates see each unit, up to as many as are asked for.
 
-    Places added beside chosen ones are none.
+    Places that do not count are none.
     """
     places, row = viewpoints_of(found)
     stands = found.xy[found.kept]
@@ -137,7 +137,7 @@ def _could_see(found: Candidates, lines: SightLines) -> IntArray:
         seen = with_headings(visibility_of(found, alone, method="line by line"))
         return frozen(seen.visible, np.int64)
     could = np.zeros(found.space.targets.total, dtype=np.int64)
-    for k in range(len(stands)):
+    for k in np.setdiff1d(np.arange(len(stands)), found.extra_rows).tolist():
         could[seen_by(k, could < found.space.settings.least_views)] += 1
     return frozen(could, np.int64)
 

@@ -16,12 +16,15 @@ from mission.geometry import FloatArray, IntArray, frozen
 from mission.planning import Selection, Visibility
 from mission.plugins import Variant, variant
 from mission.settings import Settings
-from planner.selection.bound import lower_bound
+from planner.overlap import links_of
+from planner.selection.bound import counting_bound, lower_bound
 from planner.selection.cover import Cover, cover_of
 from planner.selection.demands import demands_of
 from planner.selection.exact_cover import exact
 from planner.selection.greedy import greedy, in_greedy_order
+from planner.selection.hanging_together import JoinedCover, Search, connected
 from planner.selection.improve import improved
+from planner.selection.separators import Conditions
 
 Selector = Callable[[Cover, Settings], tuple[IntArray, int]]
 
@@ -46,6 +49,11 @@ def _exact(cover: Cover, settings: Settings) -> tuple[IntArray, int]:
 
 QUICK_SWAPS = 20
 """Swaps for each stop that a plan made only to tell about how many it takes tries to do without."""
+ROUNDS = 6
+"""Times that the default looks at what parts its selection."""
+EXACT_ROUNDS = 60
+SWAPS_BETWEEN = 120
+"""Swaps tried in each of those rounds before a smaller selection is given up."""
 METHODS: dict[str, Selector] = {"default": _default, "greedy": _greedy, "exact": _exact}
 NAMES = {
     "default": "greedy, drop-and-repair",
@@ -57,11 +65,14 @@ NAMES = {
 def select(visibility: Visibility) -> Selection:
     """Choose stops by the method named in the settings, and say how few there could be at best.
 
-    Stops that must be used, and doorways added for registration, are chosen first and count.
+    Stops that must be used, and doorways added for registration, are chosen first and count. Where scans are
+    to register with one another, doorways are offered too.
     """
     settings = visibility.candidates.space.settings
     method = variant("selector", settings.selector, METHODS)
     whole, fixed, problem = _posed(visibility)
+    if settings.overlap > 0:
+        return _select_connected(visibility, whole, fixed, method)
     rows, bound = _solved(method, problem, settings)
     chosen = np.concatenate([fixed, in_greedy_order(problem, rows)]).astype(np.int64)
     return _selection(visibility, whole, chosen, len(fixed) + bound, method)
@@ -88,6 +99,49 @@ def _posed(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
     return whole, fixed, whole.after(fixed).offering(offered)
 
 
+def _select_connected(
+    visibility: Visibility, whole: Cover, fixed: IntArray, method: Variant[Selector]
+) -> Selection:
+    """Stops whose scans register with one another: one network, or as few as the candidates allow."""
+    settings = visibility.candidates.space.settings
+    cover = whole.with_one_of_each([np.array([row]) for row in fixed])
+    task = JoinedCover(cover, links_of(visibility.candidates), np.arange(whole.rows))
+    if method.name == "exact":
+        rows, bound = connected(task, Searches.exact(settings), rounds=EXACT_ROUNDS)
+    elif method.name == "default":
+        rows, bound = connected(task, Searches.default(settings), rounds=ROUNDS)
+    else:
+        rows, bound = connected(task, lambda cover, *_: _solved(method, cover, settings), rounds=1)
+    if method.ours:
+        bound = max(bound, lower_bound(task.problem, found=len(rows)))
+    problem = whole.after(fixed)
+    others = in_greedy_order(problem, np.setdiff1d(rows, fixed))
+    return _selection(visibility, whole, np.concatenate([fixed, others]), bound, method)
+
+
+class Searches:
+    """How our own methods look for fewer rows, from some that solve the problem and under conditions."""
+
+    @staticmethod
+    def default(settings: Settings) -> Search:
+        """Drop-and-repair; the conditions are left to what joins its pieces."""
+        return lambda cover, start, conditions: (
+            improved(cover, start, at_least=counting_bound(cover), swaps=SWAPS_BETWEEN),
+            0,
+        )
+
+    @staticmethod
+    def exact(settings: Settings) -> Search:
+        """Branch and bound, after drop-and-repair."""
+
+        def search(cover: Cover, start: IntArray, conditions: Conditions) -> tuple[IntArray, int]:
+            free = not len(conditions.least)
+            better = improved(cover, start, at_least=counting_bound(cover)) if free else start
+            return exact(cover, better, settings=settings, conditions=conditions)
+
+        return search
+
+
 def select_further(visibility: Visibility, done: IntArray) -> Selection:
     """As few candidates as see what the rows `done` leave of what is asked for; none where that is nothing.
 
@@ -99,7 +153,8 @@ def select_further(visibility: Visibility, done: IntArray) -> Selection:
     settings = visibility.candidates.space.settings
     method = variant("selector", settings.selector, METHODS)
     whole = cover_of(visibility, demands_of(visibility))
-    problem = whole.after(done).offering(np.setdiff1d(np.arange(whole.rows), done))
+    not_offered = np.union1d(done, visibility.candidates.extra_rows)
+    problem = whole.after(done).offering(np.setdiff1d(np.arange(whole.rows), not_offered))
     rows, bound = _solved(method, problem, settings)
     both = np.concatenate([done, in_greedy_order(problem, rows)]).astype(np.int64)
     made = _selection(visibility, whole, both, len(done) + bound, method)

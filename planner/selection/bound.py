@@ -98,7 +98,7 @@ class _Priced:
         before = np.cumsum(self._weight[order]) - self._weight[order]
         bought = np.empty(len(cost))
         bought[order] = np.clip((self._needed[0] - before) / worth[order], 0.0, 1.0)
-        return np.where(cost < 0, 1.0, bought)
+        return np.where(cost < 0, 1.0, np.where(self._weight > 0, bought, 0.0))
 
 
 def relaxation_bound(cover: Cover) -> int:

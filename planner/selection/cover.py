@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse import block_diag, coo_array, csr_array, diags_array, hstack
 
 from mission.geometry import IntArray
 from mission.planning import Visibility
 from planner.selection.demands import Demands
+from planner.visibility.runs import ranges
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +124,22 @@ class Cover:
         taken = np.clip(self.needed[:, None] - before, 0, worth)
         return np.asarray(taken @ asks, dtype=np.int64)
 
+    def with_one_of_each(self, sets: Sequence[IntArray]) -> Cover:
+        """The same, where of each of these sets of rows (n,) one must be chosen: one more demand each."""
+        if not sets:
+            return self
+        worth = max(1, int((self.sees @ self.weight).mean()))  # about what a row sees, for greedy's sake
+        sizes = [len(rows) for rows in sets]
+        entries = (np.ones(sum(sizes)), (np.concatenate(sets), np.repeat(np.arange(len(sets)), sizes)))
+        chosen = coo_array(entries, shape=(self.rows, len(sets)))
+        worths = block_diag([self.worth, diags_array(np.full(len(sets), float(worth)))])
+        return Cover(
+            _sorted(hstack([self.sees, chosen]).astype(np.int64)),
+            _sorted(worths.astype(np.int64)),
+            np.concatenate([self.needed, np.full(len(sets), worth)]),
+            np.concatenate([self.asks, np.ones(len(sets), np.int64)]),
+        )
+
 
 def cover_of(visibility: Visibility, demands: Demands) -> Cover:
     """Merge equal columns, without loss: within a run's ends nothing changes, then equal sets join."""
@@ -159,12 +177,6 @@ def _worth(demands: Demands, column: IntArray) -> csr_array:
     worth = coo_array(entries, shape=shape, dtype=np.int64).tocsr()
     worth.sum_duplicates()
     return _sorted(worth)
-
-
-def ranges(first: IntArray, counts: IntArray) -> IntArray:
-    """`first[k]`, `first[k] + 1`, …, `counts[k]` of each, one after the other."""
-    offsets = np.repeat(first - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
-    return np.arange(int(counts.sum())) + offsets
 
 
 def _without(sees: csr_array, rows: IntArray) -> csr_array:

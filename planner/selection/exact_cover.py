@@ -12,12 +12,15 @@ from mission.geometry import IntArray
 from mission.settings import Settings
 from planner.selection.bound import scaled
 from planner.selection.cover import Cover
+from planner.selection.separators import Conditions
 
 WHOLE = 1e-6
 """The solver's bound may exceed the truth by its tolerance; this much is taken off before rounding up."""
 
 
-def exact(cover: Cover, start: IntArray, *, settings: Settings) -> tuple[IntArray, int]:
+def exact(
+    cover: Cover, start: IntArray, *, settings: Settings, conditions: Conditions | None = None
+) -> tuple[IntArray, int]:
     """Fewest rows that meet every demand, and a lower bound on their number.
 
     min Σ x_i, v_j y_j <= Σ x_i that see j, Σ w_kj y_j >= needed_k; x whole, y in [0, 1], and whole too where
@@ -30,7 +33,7 @@ def exact(cover: Cover, start: IntArray, *, settings: Settings) -> tuple[IntArra
     solver = highspy.Highs()
     for option, value in _options(settings).items():
         solver.setOptionValue(option, value)
-    solver.passModel(_model(cover))
+    solver.passModel(_model(cover, conditions or Conditions(cover.rows)))
     first = highspy.HighsSolution()
     first.col_value = _as_solution(cover, start)
     solver.setSolution(first)
@@ -56,21 +59,22 @@ def _options(settings: Settings) -> dict[str, Any]:
     return options
 
 
-def _model(cover: Cover) -> Any:
-    """The programme in HiGHS's form: columns x then y, rows the coverings then the demand."""
+def _model(cover: Cover, conditions: Conditions) -> Any:
+    """The programme in HiGHS's form: columns x then y, rows the coverings, the demands, the conditions."""
     import highspy
 
     rows, columns = cover.rows, cover.columns
     worth, needed, _ = scaled(cover)
     demand = hstack([csr_array((len(needed), rows)), worth])
     asks = diags_array(-cover.asks.astype(float))
-    matrix = vstack([hstack([cover.sees.T, asks]), demand], format="csc")
+    further = hstack([conditions.matrix, csr_array((len(conditions.least), columns))])
+    matrix = vstack([hstack([cover.sees.T, asks]), demand, further], format="csc")
     model = highspy.HighsLp()
-    model.num_col_, model.num_row_ = rows + columns, columns + len(needed)
+    model.num_col_, model.num_row_ = rows + columns, matrix.shape[0]
     model.col_cost_ = np.concatenate([np.ones(rows), np.zeros(columns)])
     model.col_lower_, model.col_upper_ = np.zeros(rows + columns), np.ones(rows + columns)
-    model.row_lower_ = np.concatenate([np.zeros(columns), needed])
-    model.row_upper_ = np.full(columns + len(needed), highspy.kHighsInf)
+    model.row_lower_ = np.concatenate([np.zeros(columns), needed, conditions.least])
+    model.row_upper_ = np.full(matrix.shape[0], highspy.kHighsInf)
     model.a_matrix_.format_ = highspy.MatrixFormat.kColwise
     model.a_matrix_.start_, model.a_matrix_.index_ = matrix.indptr, matrix.indices
     model.a_matrix_.value_ = matrix.data.astype(float)

@@ -8,7 +8,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from mission.geometry import IntArray
-from planner.selection.cover import Cover, ranges
+from planner.selection.cover import Cover
+from planner.visibility.runs import ranges
 
 
 def greedy(cover: Cover) -> IntArray:

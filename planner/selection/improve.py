@@ -7,7 +7,8 @@ from collections import deque
 import numpy as np
 
 from mission.geometry import IntArray
-from planner.selection.cover import Cover, ranges
+from planner.selection.cover import Cover
+from planner.visibility.runs import ranges
 
 SWAPS = 400
 """Most swaps tried before a smaller selection is given up; a count, so that no plan depends on speed."""

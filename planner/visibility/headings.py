@@ -88,5 +88,6 @@ def _turned(candidates: Candidates, headings: list[list[float]]) -> Candidates:
         part=frozen(candidates.part[source], np.int64),
         doorway=frozen(candidates.doorway[source] if len(candidates.doorway) else [], np.bool_),
         must=frozen(candidates.must[source] if len(candidates.must) else [], np.bool_),
+        extra=frozen(candidates.extra[source] if len(candidates.extra) else [], np.bool_),
         heading=frozen(np.concatenate([np.empty(0), *per_candidate])),
     )

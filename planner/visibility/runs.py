@@ -33,3 +33,9 @@ def runs_of(units: IntArray, segments: IntArray) -> tuple[IntArray, IntArray]:
     new[1:] = (np.diff(units) != 1) | (np.diff(segment) != 0)
     starts = np.flatnonzero(new)
     return units[starts], units[np.append(starts[1:], len(units))[: len(starts)] - 1]
+
+
+def ranges(first: IntArray, counts: IntArray) -> IntArray:
+    """`first[k]`, `first[k] + 1`, …, `counts[k]` of each, one after the other."""
+    offsets = np.repeat(first - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
+    return np.arange(int(counts.sum())) + offsets

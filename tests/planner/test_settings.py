@@ -19,6 +19,7 @@ from mission.settings import PARAMETERS, Settings, check_settings, read_settings
 from mission.specs import robot_of
 
 OTHER: dict[str, Any] = {
+    "overlap": 0.25,
     "room_coverage": 0.5,
     "kind_coverage": 0.5,
     "targets": ("walls",),

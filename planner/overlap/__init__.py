@@ -1,0 +1,41 @@
+"""Candidates -> which of them register with one another, by the boundary that both see."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from mission.geometry import IntArray
+from mission.planning import Candidates
+from planner.kept import kept
+from planner.overlap.boundary import shown
+from planner.overlap.pairs import Overlaps, Pairs
+
+LEAST_HOLD_M = 0.15
+"""Metres of wall that must face the weakest move of a pair of scans, so that it registers."""
+LEAST_COMMON_M = 1.0
+"""Metres of boundary that both must see."""
+
+
+@kept
+def overlaps_of(candidates: Candidates) -> Overlaps:
+    """What the kept candidates see in common."""
+    return Overlaps(shown(candidates))
+
+
+def registers(pairs: Pairs, *, share: float) -> IntArray:
+    """Which of the pairs (indices) are fixed in x, y and heading by what both see, a share at least."""
+    firm = (pairs.hold_m >= LEAST_HOLD_M) & (pairs.common_m >= LEAST_COMMON_M)
+    return np.flatnonzero(firm & (pairs.share >= share))
+
+
+def links_of(candidates: Candidates) -> csr_array:
+    """1 where two kept candidates register with one another, by the share in the settings (rows, rows)."""
+    overlaps, share = overlaps_of(candidates), candidates.space.settings.overlap
+    near = [(pairs := overlaps.of(row)).other[registers(pairs, share=share)] for row in range(overlaps.rows)]
+    pointer = np.cumsum([0, *map(len, near)])
+    columns = np.concatenate([np.empty(0, np.int64), *near])
+    return csr_array((np.ones(len(columns), np.int64), columns, pointer), shape=(overlaps.rows,) * 2)
+
+
+__all__ = ["LEAST_COMMON_M", "LEAST_HOLD_M", "Overlaps", "Pairs", "links_of", "overlaps_of", "registers"]

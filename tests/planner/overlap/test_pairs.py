@@ -1,0 +1,100 @@
+"""What two scans have in common, and how firmly it holds them: numbers that can be checked on paper."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mission.floor import FloorPlan
+from mission.geometry import frozen
+from mission.planning import KEPT, OUTSIDE, Candidates
+from mission.settings import Settings
+from planner.candidates import candidates
+from planner.floors import read_floor
+from planner.overlap import links_of, overlaps_of
+from planner.overlap.pairs import LEVER_M
+from planner.space.navigable import navigable
+from tests.planner.worlds import LAYERED, SHARED, box, column, door, floor_of, shell, wall
+
+SETTINGS = Settings(d_sec=0.5, edge=0.0, overlap=0.1)
+
+
+def standing(floor: FloorPlan, settings: Settings, *places: tuple[float, float]) -> Candidates:
+    """Candidates where one wants them."""
+    found = candidates(navigable(floor, replace(settings, use=places)))
+    return replace(found, reason=frozen(np.where(found.must, KEPT, OUTSIDE), np.int64))
+
+
+def hold_of_box(width: float, height: float, at: tuple[float, float]) -> float:
+    """Least eigenvalue for all four walls of an empty box (0, 0)-(width, height), about a point."""
+    x, y = at
+    normal = np.zeros((3, 3))
+    for n, length, arms in (
+        ((1.0, 0.0), height, (-y, height - y)),
+        ((-1.0, 0.0), height, (-y, height - y)),
+        ((0.0, 1.0), width, (-x, width - x)),
+        ((0.0, -1.0), width, (-x, width - x)),
+    ):
+        s = np.linspace(arms[0], arms[1], 20_001)
+        s = (s[:-1] + s[1:]) / 2
+        turn = (-n[0] * s if n[0] else n[1] * s) / LEVER_M
+        j = np.stack([np.full_like(s, n[0]), np.full_like(s, n[1]), turn])
+        normal += j @ j.T * length / len(s)
+    return float(np.linalg.eigvalsh(normal)[0])
+
+
+def test_two_stops_in_an_empty_room_share_all_of_it() -> None:
+    floor = floor_of(box(0, 0, 6, 4), elements=(shell(0, 0, 6, 4),))
+    pairs = overlaps_of(standing(floor, SETTINGS, (1.5, 2), (4, 1.5))).of(0)
+    assert pairs.other.tolist() == [1]
+    assert pairs.common_m[0] == pytest.approx(20)
+    assert pairs.share[0] == pytest.approx(1)
+    expected = min(hold_of_box(6, 4, (1.5, 2)), hold_of_box(6, 4, (4, 1.5)))
+    assert pairs.hold_m[0] == pytest.approx(expected, rel=1e-6)
+
+
+def test_one_long_wall_holds_nothing_along_itself() -> None:
+    """In the open, before a wall 20 m long, with 20 m beyond what either sees of its ends."""
+    floor = floor_of(box(0, 0, 60, 10), elements=(wall("w", box(0, 10, 60, 10.2)),))
+    settings = replace(SETTINGS, overlap_range=15.0)
+    pairs = overlaps_of(standing(floor, settings, (28, 5), (32, 5))).of(0)
+    assert pairs.common_m[0] > 20
+    assert pairs.hold_m[0] == 0
+
+
+def test_boundary_beyond_the_range_does_not_count() -> None:
+    floor = floor_of(box(0, 0, 30, 4), elements=(shell(0, 0, 30, 4),))
+    near = overlaps_of(standing(floor, replace(SETTINGS, overlap_range=3.0), (5, 2), (20, 2))).of(0)
+    assert not len(near.other)
+
+
+def test_an_opening_shows_little_of_the_other_room() -> None:
+    """A door 0.9 m wide: what both see of one room is less than all of it, and a column stands in its way."""
+    rooms = (wall("w", box(5, 0, 5.2, 1.5), box(5, 2.4, 5.2, 4)), shell(0, 0, 10, 4))
+    open_door = floor_of(box(0, 0, 10, 4), elements=rooms, openings=(door("d", (5.1, 1.5), (5.1, 2.4)),))
+    behind = replace(open_door, elements=(*rooms, column("c", 4.0, 1.95)))
+    places = (2.0, 1.95), (8.0, 1.95)
+    free = overlaps_of(standing(open_door, SETTINGS, *places)).of(0)
+    hidden = overlaps_of(standing(behind, SETTINGS, *places)).of(0)
+    assert 0 < free.share[0] < 0.6
+    assert not len(hidden.other) or hidden.common_m[0] < free.common_m[0]
+
+
+@pytest.mark.parametrize("name", LAYERED[1:2])
+def test_a_pair_is_the_same_from_both_ends(name: str) -> None:
+    if not (SHARED / name).exists():
+        pytest.skip(f"{SHARED / name} is not there")
+    found = candidates(navigable(read_floor(SHARED / name), SETTINGS))
+    overlaps = overlaps_of(found)
+    known: dict[tuple[int, int], tuple[float, ...]] = {}
+    for row in range(overlaps.rows):
+        pairs = overlaps.of(row)
+        for other, *figures in zip(*vars(pairs).values(), strict=True):
+            known[row, int(other)] = tuple(figures)
+    assert known
+    assert all(known[b, a] == figures for (a, b), figures in known.items())
+    links = links_of(found)
+    assert (links != links.T).nnz == 0
+    assert not links.diagonal().any()
