@@ -57,6 +57,7 @@ COVERAGE = "/plan/coverage"
 ROUTE = "/plan/route"
 STOPS = "/plan/stops"
 HEADINGS = "/plan/stops/heading"
+NETWORK = "/plan/stops/network"
 PLANNED_ROBOT = "/plan/robot"
 
 WORLD = "/world"

@@ -15,6 +15,7 @@ from mission.files import route_drawing as route_look
 from mission.files.sheet import COLUMN, HEADER, ROW, Chunk, PaperBox, PaperSheet
 from mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
 from mission.limits import limits_in_words
+from mission.network import network_of
 from mission.planning import Route
 from mission.schedule import schedule
 from mission.table import duration
@@ -104,9 +105,20 @@ def legend_entries(route: Route, mission: Mission) -> list[tuple[str, str]]:
         ("start", "start", True),
         ("way", "route", bool(mission.stops)),
         ("back", _back_words(route), mission.return_ is not None),
+        *_network_entries(mission),
     ]
     kinds = [(kind, kind) for kind in floor_look.kinds_of(space.floor)]
     return kinds + [(symbol, words) for symbol, words, there in some if there]
+
+
+def _network_entries(mission: Mission) -> list[tuple[str, str, bool]]:
+    network = network_of(mission)
+    if network is None:
+        return []
+    return [
+        ("pair", "scans that register", len(network.overlaps) > len(network.bridges)),
+        ("bridge", "without it they fall apart", bool(network.bridges)),
+    ]
 
 
 def _back_words(route: Route) -> str:
@@ -157,6 +169,8 @@ _STROKES: dict[str, dict[str, object]] = {
     "passable": floor_look.PASSABLE,
     "way": route_look.WAY,
     "back": route_look.BACK,
+    "pair": route_look.PAIR,
+    "bridge": route_look.BRIDGE,
 }
 
 

@@ -11,7 +11,7 @@ from mission.figures import Figures
 from mission.files import plan_panel as panel
 from mission.files.floor_drawing import building, targets
 from mission.files.room_labels import STOPS, WALLS, WAY, Busy, points_along, room_labels
-from mission.files.route_drawing import STOP, rings, route, stops
+from mission.files.route_drawing import STOP, network, rings, route, stops
 from mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit
 from mission.files.svg import FONT, attributes, clean, group, number, rect
 from mission.floor import FloorPlan
@@ -76,6 +76,7 @@ def drawing_of(made: Route, mission: Mission, sheet: PaperSheet, *, with_range: 
         targets(made.selection, sheet),
         [rings(mission, sheet)] if with_range else [],
         route(mission, sheet),
+        network(mission, sheet),
         [room_labels(space.floor.rooms, sheet, avoid=_busy(mission, space.floor, sheet))],
         stops(mission, sheet),
     )

@@ -9,12 +9,18 @@ import numpy as np
 
 from mission.document import Mission, Point, Stop
 from mission.files.sheet import PaperSheet
-from mission.files.svg import circle, group, line, line_data, path, polygon, text
+from mission.files.svg import circle, group, line, line_data, path, polygon, rect, text
 from mission.geometry import FloatArray
+from mission.network import network_of
 
 WAY: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.35}
 """The way to each stop."""
 BACK: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.3, "stroke_dasharray": "2 1"}
+PAIR: dict[str, object] = {"stroke": "#1f8a70", "stroke_width": 0.25, "stroke_dasharray": "0.6 0.9"}
+"""Two stops whose scans register with one another."""
+BRIDGE: dict[str, object] = {"stroke": "#c2410c", "stroke_width": 0.5, "stroke_dasharray": "0.6 0.9"}
+"""Such a pair without which the scans would fall apart."""
+THIN: dict[str, object] = {"stroke": "#c2410c", "stroke_width": 0.2}
 STOP = 2.6
 """Radius in millimetres of a stop's disc."""
 INK = "#2a0f5c"
@@ -40,6 +46,24 @@ def route(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
     yield group("route", [path(line_data(leg) for leg in legs if len(leg) > 1)], **join, **WAY)
     arrows = [polygon(head) for leg in (*legs, back) for head in _arrows(leg)]
     yield group("directions", arrows, fill=WAY["stroke"])
+
+
+def network(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
+    """Pairs of stops whose scans register: bridges stronger, the weakest pair with what holds it."""
+    found = network_of(mission)
+    if found is None:
+        return
+    at = dict(zip(found.stops, _stops_on_paper(mission, sheet).tolist(), strict=True))
+    bridges = set(found.bridges)
+    plain = [line(*at[item.a], *at[item.b]) for item in found.overlaps if item not in bridges]
+    yield group("pairs", plain, **PAIR)
+    yield group("bridges", [line(*at[item.a], *at[item.b]) for item in found.bridges], **BRIDGE)
+    if (weakest := found.weakest) is not None:
+        x, y = np.mean([at[weakest.a], at[weakest.b]], axis=0).tolist()
+        held = text(
+            x, y + 0.75, f"{weakest.hold_m:.2f} m", size=1.9, fill=BRIDGE["stroke"], text_anchor="middle"
+        )
+        yield group("weakest", [rect(x - 3.6, y - 1.4, 7.2, 2.8, fill="#ffffff", **THIN), held])
 
 
 def stops(mission: Mission, sheet: PaperSheet) -> Iterator[str]:

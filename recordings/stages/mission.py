@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mission.document import Mission, Point, Stop
 from mission.geometry import FloatArray, bounds
+from mission.network import network_of, pair_in_words
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
 from recordings.layout import Bounds
@@ -39,6 +40,7 @@ Leg = tuple[Point, ...]
 def draw_mission(canvas: Canvas, mission: Mission) -> None:
     """Stops and route; nothing of it changes with time."""
     _draw_route(canvas, mission)
+    _draw_network(canvas, mission)
     if mission.stops:
         _draw_stops(canvas, mission)
 
@@ -112,6 +114,24 @@ def _draw_route(canvas: Canvas, mission: Mission) -> None:
         flat, solid = route_lines(canvas, legs, colours)
         canvas.show(entities.ROUTE, flat)
         canvas.show(entities.WORLD_ROUTE, solid)
+
+
+def _draw_network(canvas: Canvas, mission: Mission) -> None:
+    """Pairs of stops whose scans register with one another; those that nothing stands in for in a colour."""
+    network = network_of(mission)
+    if network is None or not network.overlaps:
+        return
+    at = {stop.id: (stop.x, stop.y) for stop in mission.stops}
+    bridges = set(network.bridges)
+    lines = rr.LineStrips2D(
+        canvas.strips([np.array([at[item.a], at[item.b]]) for item in network.overlaps]),
+        colors=[palette.BRIDGE if item in bridges else palette.PAIR for item in network.overlaps],
+        labels=[pair_in_words(item) for item in network.overlaps],
+        show_labels=False,
+        radii=on_screen(1.0),
+        draw_order=ORDER["route"] + 0.5,
+    )
+    canvas.show(entities.NETWORK, lines)
 
 
 def legs_of(mission: Mission) -> tuple[list[Leg], list[Colour]]:
