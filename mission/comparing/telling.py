@@ -10,6 +10,7 @@ from mission.comparing.judging import judge
 from mission.comparison import Comparison, StopComparison
 from mission.events import Aborted, Finished
 from mission.figures import Share, percent
+from mission.network import apart_in_words, network_of
 from mission.table import duration, printable, table
 
 HEADER = (
@@ -61,11 +62,19 @@ def _totals(comparison: Comparison) -> list[str]:
     several = [f"revisions {', '.join(revisions)} of the mission, one after another"]
     return [
         *(several if len(revisions) > 1 else []),
+        *([printable(apart)] if (apart := apart_in_words(comparison.mission, _made(comparison))) else []),
         f"run {printable(comparison.run_id or 'without a name')}: {comparison.scanned} of "
         f"{len(comparison.asked)} stops scanned; planned {duration(comparison.planned_s)}, driven {driven}"
         + (f", of which paused or held {duration(stood)}" if stood else ""),
         f"greatest deviation at a stop {_millimetres(away)}, beside the route {_millimetres(beside)}",
     ]
+
+
+def _made(comparison: Comparison) -> list[str]:
+    """Stops whose scans are there, or may still be made."""
+    ended = _ended(comparison) is not None
+    lost = {"skipped", "failed", "withdrawn", *(("arrived", "not reached") if ended else ())}
+    return [item.stop for item in comparison.stops if item.outcome not in lost]
 
 
 def _millimetres(metres: float | None) -> str:
@@ -106,6 +115,7 @@ def comparison_json(comparison: Comparison) -> dict[str, Any]:
         "greatest_deviation_m": comparison.greatest_deviation_m,
         "greatest_beside_route_m": comparison.beside.greatest_m,
         "travelled_m": comparison.log.poses.length_m if len(comparison.log.poses) else None,
+        "pieces": _pieces(comparison),
         "coverage": None if comparison.acquired is None else _acquired_json(comparison.acquired),
         "stops": [_stop_json(item) for item in comparison.stops],
         "states": [
@@ -119,6 +129,12 @@ def _ended(comparison: Comparison) -> str | None:
     """The event by which the run ended."""
     ends = [type(event).__name__ for event in comparison.log.events if isinstance(event, Finished | Aborted)]
     return ends[-1] if ends else None
+
+
+def _pieces(comparison: Comparison) -> list[list[str]] | None:
+    """Scans that hang together, those included that may still be made; None where no network was planned."""
+    network = network_of(comparison.mission)
+    return None if network is None else [list(piece) for piece in network.among(_made(comparison)).pieces]
 
 
 def _stop_json(item: StopComparison) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from mission.problems import Problem
 from mission.settings import read_settings
 from planner.checking.claims import Recount, overclaims, recount
 from planner.checking.fit import misfits_on, other_machine
+from planner.checking.network_claims import network_overclaims
 from planner.floors import options_of, read_floor
 from planner.space.navigable import navigable
 
@@ -43,4 +44,5 @@ def verdict(mission: Mission, path: Path, coverage: Coverage | None) -> Verdict:
     except AnswerIsNo as error:
         claims = any(stop.sees.units for stop in mission.stops)
         return Verdict((*misfits, Problem("$.stops", f"see nothing: {error}")) if claims else misfits)
-    return Verdict((*misfits, *overclaims(mission, counted, coverage)), counted)
+    overclaimed = (*overclaims(mission, counted, coverage), *network_overclaims(mission, counted.space))
+    return Verdict((*misfits, *overclaimed), counted)

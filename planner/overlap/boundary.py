@@ -7,13 +7,14 @@ not count here; beams do not either, since how high they hang decides what of th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from mission.geometry import FloatArray, IntArray, frozen
 from mission.planning import Candidates, NavigableSpace
+from mission.settings import Settings
 from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
 from planner.sight.sight import scene_of, sight
 from planner.space.targets import face_segments, units_on
@@ -69,29 +70,59 @@ def shown(candidates: Candidates) -> Shown:
     faces = np.ones(len(boundary.a), dtype=bool)
     scene = scene_of(open_space(candidates), boundary.a, boundary.b, boundary.pieces, faces)
     runs = sight(scene, to_grid(places - origin), reach=space.settings.overlap_range)
-    at = np.repeat(row, np.diff(runs.pointer))
     start = (np.cumsum(boundary.pieces) - boundary.pieces)[runs.segment]
-    seen = _in_rows(candidates, boundary, at, start + runs.low, start + runs.high)
-    return _shown(boundary, candidates.xy[candidates.kept] - origin, seen)
+    stretches = _Stretches(np.repeat(row, np.diff(runs.pointer)), start + runs.low, start + runs.high)
+    xy, kept = candidates.xy[candidates.kept] - origin, candidates.kept
+    heading = candidates.heading[kept] if len(candidates.heading) else None
+    return shown_by(boundary, xy, stretches.pieces(len(kept)), heading, space.settings)
 
 
-def _in_rows(
-    candidates: Candidates, boundary: Boundary, row: IntArray, first: IntArray, last: IntArray
-) -> Iterator[tuple[IntArray, IntArray, IntArray]]:
-    """Face, first and last piece of each row's stretches: its views joined, and cut to where it looks."""
+@dataclass(frozen=True, eq=False)
+class _Stretches:
+    """Stretches of pieces that rows see, from first to last; a row's may overlap."""
+
+    row: IntArray
+    """Ascending (n,)."""
+    first: IntArray
+    last: IntArray
+
+    def pieces(self, rows: int) -> Iterator[IntArray]:
+        """The pieces that each row sees, ascending."""
+        bounds = np.searchsorted(self.row, np.arange(rows + 1))
+        for k in range(rows):
+            own = slice(bounds[k], bounds[k + 1])
+            yield np.unique(ranges(self.first[own], self.last[own] - self.first[own] + 1))
+
+
+def shown_by(
+    boundary: Boundary,
+    xy: FloatArray,
+    pieces: Iterable[IntArray],
+    heading: FloatArray | None,
+    settings: Settings,
+) -> Shown:
+    """What is shown from places (rows, 2), local metres, that see these pieces all round.
+
+    With a field of view below 360° only what lies within it about each place's `heading` (rows,) is.
+    """
     face = np.repeat(np.arange(len(boundary.pieces)), boundary.pieces)
-    middle = _middles(boundary, face) if candidates.space.settings.fov < 360 else None
-    bounds = np.searchsorted(row, np.arange(len(candidates.kept) + 1))
-    fov = math.radians(candidates.space.settings.fov)
-    for k in range(len(candidates.kept)):
-        own = slice(bounds[k], bounds[k + 1])
-        pieces = np.unique(ranges(first[own], last[own] - first[own] + 1))
-        if middle is not None and len(candidates.heading):
-            index = candidates.kept[k]
-            way = middle[pieces] - (candidates.xy[index] - local_origin(candidates.space.floor))
-            pieces = pieces[in_view(way, float(candidates.heading[index]), fov=fov)]
-        begin, end = runs_of(pieces, face)
-        yield face[begin], begin, end
+    if heading is not None and settings.fov < 360:
+        fov, middle = math.radians(settings.fov), _middles(boundary, face)
+        looks = zip(pieces, xy, heading.tolist(), strict=True)
+        pieces = (own[in_view(middle[own] - at, turn, fov=fov)] for own, at, turn in looks)
+    runs = [runs_of(own, face) for own in pieces]
+    empty = np.empty(0, np.int64)
+    first, last = (np.concatenate([empty, *(run[k] for run in runs)]) for k in range(2))
+    start = (np.cumsum(boundary.pieces) - boundary.pieces)[face[first]]
+    piece = (np.hypot(*(boundary.b - boundary.a).T) / boundary.pieces)[face[first]]
+    return Shown(
+        boundary=boundary,
+        pointer=frozen(np.cumsum([0, *(len(run[0]) for run in runs)]), np.int64),
+        face=frozen(face[first], np.int64),
+        begin=frozen((first - start) * piece),
+        end=frozen((last + 1 - start) * piece),
+        xy=frozen(xy),
+    )
 
 
 def _middles(boundary: Boundary, face: IntArray) -> FloatArray:
@@ -99,19 +130,3 @@ def _middles(boundary: Boundary, face: IntArray) -> FloatArray:
     number = np.arange(len(face)) - (np.cumsum(boundary.pieces) - boundary.pieces)[face]
     t = ((number + 0.5) / boundary.pieces[face])[:, None]
     return boundary.a[face] + t * (boundary.b[face] - boundary.a[face])
-
-
-def _shown(boundary: Boundary, xy: FloatArray, seen: Iterator[tuple[IntArray, IntArray, IntArray]]) -> Shown:
-    rows = list(seen)
-    empty = np.empty(0, np.int64)
-    face, first, last = (np.concatenate([empty, *(row[k] for row in rows)]) for k in range(3))
-    start = (np.cumsum(boundary.pieces) - boundary.pieces)[face]
-    piece = np.hypot(*(boundary.b[face] - boundary.a[face]).T) / boundary.pieces[face]
-    return Shown(
-        boundary=boundary,
-        pointer=frozen(np.cumsum([0, *(len(row[0]) for row in rows)]), np.int64),
-        face=frozen(face, np.int64),
-        begin=frozen((first - start) * piece),
-        end=frozen((last + 1 - start) * piece),
-        xy=frozen(xy),
-    )

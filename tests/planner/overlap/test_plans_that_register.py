@@ -1,0 +1,77 @@
+"""Plans whose scans register: one network, told, checked anew, and what would join what lies apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import msgspec
+import pytest
+
+from mission.floor import FloorPlan
+from mission.network import network_of
+from mission.settings import Settings
+from planner import plan
+from planner.checking.network_claims import network_overclaims
+from planner.report import PlanReport
+from tests.planner.worlds import box, door, floor_of, room, shell, wall
+
+ASKED = Settings(d_sec=0.4, edge=0.0, overlap=0.1, seed=1)
+
+
+def three_rooms(*, gap: float = 0.9) -> FloorPlan:
+    """Three rooms in a row, 4 m x 4 m each, with a door between neighbours."""
+    low, high = 2 - gap / 2, 2 + gap / 2
+    walls = [
+        wall(f"w{k}", box(x, 0, x + 0.2, low), box(x, high, x + 0.2, 4)) for k, x in enumerate((4.0, 8.2))
+    ]
+    return floor_of(
+        box(0, 0, 12.4, 4),
+        rooms=[room(f"r{k}", box(x, 0, x + 4, 4)) for k, x in enumerate((0, 4.2, 8.4))],
+        openings=[door(f"d{k}", (x + 0.1, low), (x + 0.1, high)) for k, x in enumerate((4.0, 8.2))],
+        elements=[shell(0, 0, 12.4, 4), *walls],
+    )
+
+
+@pytest.fixture(scope="module")
+def made() -> PlanReport:
+    return PlanReport(plan(three_rooms(), ASKED).first, {}, {})
+
+
+def test_the_plan_is_one_network_and_its_pairs_are_counted_anew(made: PlanReport) -> None:
+    network = network_of(made.mission)
+    assert network is not None
+    assert len(network.pieces) == 1
+    assert not list(network_overclaims(made.mission, made.part.space))
+    told = made.as_json()["network"]
+    assert told["pieces"] == network.pieces
+    assert "one piece" in made.as_text()
+
+
+def test_a_pair_that_says_more_than_is_counted_is_a_problem(made: PlanReport) -> None:
+    pairs = made.mission.network
+    assert not isinstance(pairs, msgspec.UnsetType)
+    more = msgspec.structs.replace(pairs[0], hold_m=pairs[0].hold_m + 0.01)
+    wrong = msgspec.structs.replace(made.mission, network=(more, *pairs[1:]))
+    (problem,) = network_overclaims(wrong, made.part.space)
+    assert problem.path == "$.network[0].hold_m"
+    assert "counted line by line" in problem.message
+
+
+def test_without_overlap_there_is_no_network_and_not_more_stops(made: PlanReport) -> None:
+    plain = plan(three_rooms(), replace(ASKED, overlap=0.0)).mission
+    assert network_of(plain) is None
+    assert "network" not in msgspec.to_builtins(plain)
+    assert len(plain.stops) <= len(made.mission.stops)
+
+
+def test_rooms_that_cannot_see_one_another_are_told_with_a_way_out() -> None:
+    """No pair shares 99 % of a scan: every piece is told, with where spheres would join it."""
+    settings = replace(ASKED, doors="closed", overlap=0.99, candidates="grid")
+    report = PlanReport(plan(three_rooms(), settings).first, {}, {})
+    apart = [item for item in report.figures.grave if item.code == "scans_apart"]
+    network = network_of(report.mission)
+    assert network is not None
+    assert len(apart) == len(network.pieces) - 1 > 0
+    assert "spheres" in apart[0].message
+    assert report.strict_answer == 1
+    assert "PIECES" in report.as_text()
