@@ -30,6 +30,8 @@ class Simulation:
     slant: bool = False
     """Whether the range counts along the rays; else along the floor, as in the plan."""
     fov_deg: float = 360.0
+    near_m: float = 0.0
+    """What is nearer, along the floor, is not measured."""
     step_deg: float = 0.1
     """Between neighbouring rays, both ways."""
     noise_m: float = 0.002
@@ -84,9 +86,9 @@ class StopScan:
     claimed: int
     """Units it sees, as the mission has it."""
     sighted: int
-    """Units whose midpoint it has in sight, looked at one by one."""
+    """Units whose midpoint it has in sight as was asked, looked at one by one."""
     units: int
-    """Units on which its points lie."""
+    """Units on which its points lie, as well as was asked."""
     points: int
 
     @property
@@ -102,7 +104,7 @@ class CloudQuality:
     total_m2: float
     seen_m2: float
     by_spacing_mm: dict[int, float]
-    """Share of what has points where neighbouring points lie at most so far apart."""
+    """Share of what has points where those of one scan lie at most so far apart, the wider way."""
     by_incidence_deg: dict[int, float]
     """Share that some stop meets at most so far off the perpendicular."""
     by_stops: dict[int, float]

@@ -322,11 +322,20 @@ def prove_command(
     ] = None,
     *,
     step: Annotated[
-        float, typer.Option(min=0.005, max=2.0, help="Between neighbouring rays, degrees.")
-    ] = 0.1,
+        float | None,
+        typer.Option(
+            min=0.005,
+            max=2.0,
+            help="Between neighbouring rays, degrees.",
+            show_default="the scanner's, else 0.1",
+        ),
+    ] = None,
     noise: Annotated[float, typer.Option(min=0.0, max=100.0, help="Of a distance, mm rms.")] = 2.0,
     height: Annotated[
-        float | None, typer.Option(min=0.1, max=10.0, help="Scanner above the floor, m.", show_default="1.3")
+        float | None,
+        typer.Option(
+            min=0.1, max=10.0, help="Scanner above the floor, m.", show_default="the scanner's, else 1.3"
+        ),
     ] = None,
     ceiling: Annotated[
         float | None,
@@ -359,9 +368,9 @@ def prove_command(
     files = proof_files(folder, mission)
     for path in files.values():
         must_be_writable(path)
-    assumed = {"step_deg": step, "noise_m": noise / 1000, "slant": slant}
+    assumed = {"noise_m": noise / 1000, "slant": slant}
     assumed |= {"poses": not without_poses, "seed": seed}
-    given = {"height_m": height, "ceiling_m": ceiling}
+    given = {"step_deg": step, "height_m": height, "ceiling_m": ceiling}
     heights = {key: value for key, value in given.items() if value is not None}
     proof, planned = prove_file(mission, floor, coverage, {**assumed, **heights}, say=_progress)
     _progress("")

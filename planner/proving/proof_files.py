@@ -11,6 +11,7 @@ from mission.document import Mission
 from mission.errors import AnswerIsNo, InputError
 from mission.files.coverage_json import Coverage, read_coverage
 from mission.files.mission_json import read
+from mission.limits import scanner_height
 from mission.plan_proof import PlanProof, Simulation
 from mission.problems import problems_of
 from planner.further import PlannedFloor, planned_floor
@@ -67,10 +68,18 @@ def prove_file(
 
 
 def _as_modelled(simulation: Simulation, planned: PlannedFloor) -> Simulation:
-    """With the heights that the floor's model, or the plan's settings, tell."""
-    height, ceiling = planned.settings.scan_height, planned.floor.ceiling_m
-    if height is not None:
-        simulation = replace(simulation, height_m=height)
+    """With what the plan's settings tell of the scanner, and the floor's model of the ceiling."""
+    settings, ceiling = planned.settings, planned.floor.ceiling_m
+    known: dict[str, Any] = {
+        "step_deg": settings.angular_step,
+        "near_m": settings.near,
+        "cone_deg": settings.blind_cone,
+    }
+    simulation = replace(
+        simulation,
+        height_m=scanner_height(settings),
+        **{name: value for name, value in known.items() if value is not None},
+    )
     return simulation if ceiling is None else replace(simulation, ceiling_m=ceiling, ceiling_known=True)
 
 

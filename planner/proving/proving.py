@@ -16,6 +16,7 @@ from mission.files.coverage_json import Coverage
 from mission.floor import FloorPlan
 from mission.geometry import BoolArray, FloatArray, frozen
 from mission.ledger import OUTSIDE
+from mission.limits import limits_of
 from mission.plan_proof import (
     CloudQuality,
     PlanProof,
@@ -25,6 +26,7 @@ from mission.plan_proof import (
     StopScan,
 )
 from mission.planning import NavigableSpace, Targets, weights_of
+from planner.proving.asked import AskedPoints
 from planner.proving.casting import SolidScene
 from planner.proving.extrusion import NONE, ExtrudedFloor, extruded, heights_of
 from planner.proving.joining import joined
@@ -49,6 +51,7 @@ REACH_SLACK_M = 1e-4
 """A midpoint exactly at the range is within it, as in the plan."""
 GRAZED, HIDDEN = "in sight, but so flat that it falls between two rays", "hidden from every stop"
 """Why something is missed."""
+NOT_AS_ASKED = "in sight, but too flat, too far apart or from too few stops"
 
 
 def prove(
@@ -76,7 +79,7 @@ def prove(
     doors = _closed_doors(space)
     solids = extruded(space.floor, doors, simulation.ceiling_m)
     strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
-    tally = _Tally(strips)
+    tally = _Tally(strips, AskedPoints.of(space.settings, strips), simulation)
     scans = []
     stands = [
         replace(
@@ -91,6 +94,7 @@ def prove(
         scans.append(scan)
         say(f"{stop.id} scanned, {len(scans)} of {len(stands)}")
     places = frozen([stand.place for stand in stands])
+    seen = frozen(tally.views >= np.clip(tally.sights, 1, space.settings.least_views), np.bool_)
     names = [stop.id for stop in mission.stops]
     pairs = []
     for pair in registered(names, places, [scan.cloud for scan in scans], simulation):
@@ -101,14 +105,14 @@ def prove(
         mission=mission,
         simulation=simulation,
         targets=space.targets,
-        seen=frozen(tally.seen, np.bool_),
+        seen=seen,
         promised=promise.units,
         grain=float(promise.weight.max()),
-        missed=promise.missed(tally.seen, tally.sighted),
+        missed=promise.missed(seen, frozen(tally.sights > 0, np.bool_)),
         unit="units" if space.settings.coverage_rule == "paper" else "m",
-        whole=promise.whole(tally.seen),
-        rooms=promise.rooms(tally.seen),
-        kinds=promise.kinds(tally.seen),
+        whole=promise.whole(seen),
+        rooms=promise.rooms(seen),
+        kinds=promise.kinds(seen),
         stops=tuple(
             StopScan(stop.id, stop.sees.units, *counts)
             for stop, counts in zip(mission.stops, tally.of_stop, strict=True)
@@ -154,35 +158,35 @@ def _drawn(
 class _Tally:
     """What all scans came to, cell by cell."""
 
-    def __init__(self, strips: Strips) -> None:
-        self._strips = strips
+    def __init__(self, strips: Strips, asked: AskedPoints, simulation: Simulation) -> None:
+        self._strips, self._asked = strips, asked
+        self._step = math.radians(simulation.step_deg)
+        self.views = np.zeros(len(strips.low), np.int16)
+        """Stops that show each unit as well as was asked."""
+        self._spacing = np.full(strips.cells, np.inf)
         self._unit = strips.unit_of_cell
         self._points = np.zeros(strips.cells)
         self._stops = np.zeros(strips.cells, np.int16)
         self._incidence = np.full(strips.cells, np.inf)
-        self.sighted = np.zeros(len(strips.low), dtype=bool)
-        """Whether any stop has each unit's midpoint in sight."""
+        self.sights = np.zeros(len(strips.low), np.int64)
+        """Stops that have each unit's midpoint in sight as was asked; more views are asked of none."""
         self.of_stop: list[tuple[int, int, int]] = []
         """Units in sight, units with points, and points of each scan."""
 
     def take(self, scan: ScanCount, sighted: BoolArray) -> None:
-        self.sighted |= sighted
+        self.sights += sighted
         self._points[scan.cell] += scan.points
         self._stops[scan.cell] += 1
         self._incidence[scan.cell] = np.minimum(self._incidence[scan.cell], scan.incidence)
-        units = len(np.unique(self._unit[scan.cell]))
-        self.of_stop.append((int(sighted.sum()), units, int(scan.points.sum())))
-
-    @property
-    def seen(self) -> BoolArray:
-        """Whether points lie on each unit (units,)."""
-        seen = np.zeros(len(self._strips.low), dtype=bool)
-        seen[self._unit[self._points > 0]] = True
-        return seen
+        spacing = scan.away * self._step / np.maximum(np.cos(scan.incidence), 1e-9)
+        self._spacing[scan.cell] = np.minimum(self._spacing[scan.cell], spacing)
+        shown = self._asked.shown(scan)
+        self.views += shown
+        self.of_stop.append((int(sighted.sum()), int(shown.sum()), int(scan.points.sum())))
 
     def quality(self) -> CloudQuality:
         area, hit = self._strips.area, self._points > 0
-        spacing = 1000 * np.sqrt(area[hit] / self._points[hit])
+        spacing = 1000 * self._spacing[hit]
         incidence = np.degrees(self._incidence[hit])
         seen = float(area[hit].sum())
 
@@ -263,7 +267,8 @@ class _Promise:
         """What of the promised units was missed, by reason; `sighted` have their midpoint in sight."""
         if self.units is None:
             return {}
-        masks = {GRAZED: self.units & ~seen & sighted, HIDDEN: self.units & ~seen & ~sighted}
+        why = GRAZED if limits_of(self.space.settings).none else NOT_AS_ASKED
+        masks = {why: self.units & ~seen & sighted, HIDDEN: self.units & ~seen & ~sighted}
         return {name: float(self.weight[mask].sum()) for name, mask in masks.items() if mask.any()}
 
     def _share(
@@ -294,12 +299,27 @@ def _sighted(space: NavigableSpace, solids: ExtrudedFloor, stand: Stand, ceiling
     near = np.hypot(points[:, 0], points[:, 1]) <= space.settings.range + REACH_SLACK_M
     along = (targets.b - targets.a)[targets.unit_segment]
     before = along[:, 0] * points[:, 1] - along[:, 1] * points[:, 0] < 0  # the stop is left of a -> b
-    wanted = near & (before | ~targets.occluding[targets.unit_segment]) & _in_view(space, stand, points)
+    wanted = near & (before | ~targets.occluding[targets.unit_segment])
+    wanted &= _in_view(space, stand, points) & _as_asked(space, points, along)
     found = np.zeros(targets.total, dtype=bool)
     if wanted.any():
         scene = SolidScene(solids, stand.place, see_through=False, open_door=stand.open_door)
         found[wanted] = scene.in_sight(frozen(points[wanted]))
     return found
+
+
+def _as_asked(space: NavigableSpace, points: FloatArray, along: FloatArray) -> BoolArray:
+    """Whether midpoints, told from the scanner, are steep, far and dense enough, at the scanner's height."""
+    limits = limits_of(space.settings)
+    away = np.hypot(points[:, 0], points[:, 1])
+    across = np.abs(along[:, 0] * points[:, 1] - along[:, 1] * points[:, 0])
+    cosine = across / np.maximum(away * np.hypot(*along.T), 1e-12)
+    good: BoolArray = away >= limits.near - REACH_SLACK_M
+    if limits.max_incidence is not None:
+        good &= cosine >= math.cos(limits.max_incidence) - 1e-9
+    if limits.spacing is not None and limits.step is not None:
+        good &= away * limits.step <= limits.spacing * cosine + 1e-9
+    return good
 
 
 def _in_view(space: NavigableSpace, stand: Stand, points: FloatArray) -> BoolArray:

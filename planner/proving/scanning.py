@@ -37,6 +37,10 @@ class ScanCount:
     """Cells with points, ascending."""
     points: IntArray
     """How many there are on each."""
+    columns: IntArray
+    """On how many upright lines they lie; 0 on undersides."""
+    away: FloatArray
+    """From the scanner to the middle of each, metres."""
     incidence: FloatArray
     """Between the ray and the perpendicular at each, radians."""
     cloud: FloatArray
@@ -70,6 +74,8 @@ def scanned(solids: ExtrudedFloor, strips: Strips, stand: Stand, simulation: Sim
     return ScanCount(
         cell=frozen(cell, np.int64),
         points=frozen(counting.points[cell], np.int64),
+        columns=frozen(counting.columns[cell], np.int64),
+        away=frozen(np.linalg.norm(strips.middle[cell] - stand.place, axis=1)),
         incidence=frozen(_incidence(strips, cell, stand.place)),
         cloud=frozen(np.concatenate(cloud)),
     )
@@ -128,6 +134,7 @@ class _Counting:
         self._length = np.hypot(*way.T)
         self._way = way / self._length[:, None]
         self.points = np.zeros(strips.cells, np.int64)
+        self.columns = np.zeros(strips.cells, np.int64)
 
     def take(self, met: Met, turn: RayFan, block: slice, ways: FloatArray) -> None:
         self._take_upright(self._face[met], turn, turn.azimuth[block])
@@ -142,7 +149,7 @@ class _Counting:
             away = _cross(to, along) / _cross(towards, along)
         at = np.einsum("ij,ij->i", away[:, None] * towards - to, along)
         unit = self._unit(face, at, np.where(_cross(along, -to) > 0, 0, 1))
-        good = (unit != NONE) & (away > 0) & (away <= self._reach)
+        good = (unit != NONE) & (away >= self._simulation.near_m) & (away <= self._reach)
         column, begin, end, away, unit = (item[good] for item in (column, begin, end, away, unit))
         if self._simulation.slant:
             steepest = np.arccos(np.clip(away / self._reach, 0.0, 1.0))
@@ -173,6 +180,7 @@ class _Counting:
             many = np.maximum(np.minimum(after, end) - np.maximum(before, begin), 0)
             kept = (row < rows) & (many > 0)
             np.add.at(self.points, strips.first_cell[unit[kept]] + row, many[kept])
+            np.add.at(self.columns, strips.first_cell[unit[kept]] + row, 1)
             before = after
 
     def _take_under(self, met: Met, ways: FloatArray) -> None:

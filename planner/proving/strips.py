@@ -34,6 +34,8 @@ class Strips:
     """(units + 1,)."""
     low: FloatArray
     """Height at which each unit's strip begins (units,)."""
+    tall: FloatArray
+    """Height of each unit's strip (units,)."""
     area: FloatArray
     """Of each cell, m² (cells,)."""
     middle: FloatArray
@@ -94,6 +96,7 @@ def strips_of(solids: ExtrudedFloor, targets: Targets, floor: FloorPlan, ceiling
     return Strips(
         first_cell=frozen(first, np.int64),
         low=frozen(low),
+        tall=frozen(high - low),
         area=frozen(targets.unit_length[unit] * np.where(below, UNDER_M, top - bottom)),
         middle=frozen(np.column_stack([(targets.unit_xy - solids.origin)[unit], z])),
         normal=frozen(np.where(below[:, None], (0.0, 0.0, 1.0), side)),

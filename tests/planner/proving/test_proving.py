@@ -205,3 +205,13 @@ def coverage_of(made) -> Coverage:
     import msgspec
 
     return msgspec.json.decode(coverage_json(made.route, made.mission, made.figures), type=Coverage)
+
+
+def test_limits_are_held_by_what_was_measured() -> None:
+    """A scanner half as fine as planned makes points twice as far apart: too far."""
+    settings = Settings(range=6.0, angular_step=0.4, density=25.0, max_incidence=60.0)
+    simulation = replace(COARSEST, step_deg=0.4)
+    assert proved(hall(4, 3), settings, simulation).met
+    coarser = proved(hall(4, 3), settings, replace(simulation, step_deg=0.8))
+    assert not coarser.met
+    assert coarser.whole.missed > 1.0
