@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -25,6 +25,7 @@ from mission.errors import InputError
 from mission.files.atomic import write_atomic
 from mission.files.exports import qgc_plan, qgc_waypoints
 from mission.geodesy import STEPS_PER_DEGREE
+from mission.mavlink.accuracy import why_beside
 from mission.mavlink.autopilots import AUTOPILOTS, autopilot_named
 from mission.mavlink.fields import PLACED
 from mission.mavlink.items import Command, Item, ItemList, MavFrame
@@ -85,12 +86,16 @@ def push_mission(
         site = sent.origin
         with if_stopped(say, lambda: NOTHING_SENT):
             origin = None if leave.any_origin else check_origin(peer, site, set_it=leave.set_origin)
+        beside = _why_beside(peer, mission)
+        if beside:
+            say(beside)
         with Bar("pushing", ITEMS) as bar:
             done = upload(peer, sent, while_running=leave.while_running, progress=bar.show, tell=say)
         _note_down(url, peer, mission, sent, state, done)
         for note in sent.notes:
             say(f"note: {note}")
-        _report_push(peer, mission, sent, done, origin, as_json)
+        notes = (beside, *sent.notes) if beside else sent.notes
+        _report_push(peer, mission, replace(sent, notes=notes), done, origin, as_json)
 
 
 def fetch_mission(line: Line, *, out: Path | None, as_json: bool) -> None:
@@ -151,6 +156,13 @@ def _peer(line: Line) -> Iterator[tuple[Url, Peer]]:
     with reached(url, vehicle=line.vehicle, signing_key=key, timeout_s=line.timeout_s) as peer:
         peer.autopilot = autopilot_named(line.autopilot) if line.autopilot else peer.autopilot
         yield url, peer
+
+
+def _why_beside(peer: Peer, mission: Mission) -> str:
+    """What its own parameters make of the mission's tolerances, as far as it tells them."""
+    name = peer.autopilot.radius_parameter
+    radius = peer.parameter(name) if name else None
+    return "" if radius is None else why_beside(mission, peer.autopilot, radius)
 
 
 def _note_down(

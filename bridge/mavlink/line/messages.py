@@ -59,6 +59,11 @@ def interval(to: Who, message: int, hertz: float) -> Message:
     return command_long(to, Command.SET_MESSAGE_INTERVAL, message, 1e6 / hertz)
 
 
+def parameter_request(to: Who, name: str) -> Message:
+    """Asks for the value of a parameter."""
+    return dialect.MAVLink_param_request_read_message(to.system, to.component, name.encode(), -1)
+
+
 def set_origin(to: Who, origin: VehicleOrigin) -> Message:
     """What its local metres are to count from."""
     return dialect.MAVLink_set_gps_global_origin_message(

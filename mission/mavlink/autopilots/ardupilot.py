@@ -130,6 +130,7 @@ ARDUPILOT = Autopilot(
         Command.DO_SEND_SCRIPT_MESSAGE, Command.IMAGE_START_CAPTURE,
     }),
     keep=keeps, brake_hold_s=1, longest_hold_s=32_767, max_delay_s=4_294_967.0, keeps_arrival=False,
+    radius_parameter="WP_RADIUS",
     reached="within its parameter WP_RADIUS, or once past it", turns=False, gives_items="any order",
     modes=MODES, in_auto=in_auto, driving=DRIVING, drivable=True, habits=HABITS,
 )  # fmt: skip

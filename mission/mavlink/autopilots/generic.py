@@ -40,6 +40,7 @@ GENERIC = Autopilot(
         Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.IMAGE_START_CAPTURE,
     }),
     keep=as_sent, brake_hold_s=0, longest_hold_s=32_767, max_delay_s=4_294_967.0, keeps_arrival=True,
+    radius_parameter="",
     reached="within the acceptance radius that is sent", turns=True, gives_items="either",
     modes=px4.MODES, in_auto=in_auto,
     driving=Driving(streams=False, gives_up_s=3.0, turns=True, courses="heading", reposition_mode="hold"),

@@ -184,6 +184,8 @@ class Autopilot:
     max_delay_s: float
     keeps_arrival: bool
     """Keeps a waypoint's acceptance radius and heading."""
+    radius_parameter: str
+    """Within which a waypoint counts as reached; empty if it has no parameter of that kind."""
     reached: str
     """Where it counts a waypoint as reached, in words."""
     turns: bool

@@ -92,6 +92,7 @@ PX4 = Autopilot(
         Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED, Command.IMAGE_START_CAPTURE,
     }),
     keep=keeps, brake_hold_s=0, longest_hold_s=32_767, max_delay_s=4_294_967.0, keeps_arrival=True,
+    radius_parameter="NAV_ACC_RAD",
     reached="within its parameter NAV_ACC_RAD, 10 m unless set", turns=False, gives_items="in order",
     modes=MODES, in_auto=in_auto, driving=DRIVING, drivable=True, habits=HABITS,
 )  # fmt: skip

@@ -114,6 +114,19 @@ def test_what_is_fetched_opens_as_a_file(suffix: str, run: Run, mission: Mission
     ]
 
 
+@pytest.mark.parametrize(
+    ("profile", "radius"), [("ardupilot", "WP_RADIUS 0.02 m"), ("px4", "NAV_ACC_RAD 0.5 m")]
+)
+def test_a_push_tells_first_what_the_vehicle_makes_of_the_tolerances(
+    run: Run, profile: str, radius: str
+) -> None:
+    with vehicle(profile) as url:
+        code, out, said = run("push", "MISSION", "--mavlink", str(url), "--set-origin", "--json")
+    assert code == 0
+    assert f"in AUTO ({radius}, 1 m/s), and" in said
+    assert "or drive it by stopgo robot --controller mavlink:URL" in json.loads(out)["notes"][0]
+
+
 def test_what_was_pushed_is_in_the_logbook(run: Run, mission: Mission, tmp_path: Path) -> None:
     with at_site(mission) as url:
         assert run("push", "MISSION", "--mavlink", str(url))[0] == 0

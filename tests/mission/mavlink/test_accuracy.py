@@ -1,0 +1,36 @@
+"""What a vehicle's parameters make of a mission's tolerances, before it is pushed."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from mission.mavlink.accuracy import stops_within, why_beside
+from mission.mavlink.autopilots import AUTOPILOTS
+from tests.bridge.mavlink.driving.world import cornered_mission
+
+
+def test_it_stops_within_its_radius_or_where_it_has_rolled_to() -> None:
+    """The Rover of the log stood 218 mm beside its stops at 0.8 m/s, with a radius of 20 mm."""
+    assert stops_within(radius=0.02, speed=0.8) == pytest.approx(0.24)
+    assert stops_within(radius=0.5, speed=0.8) == 0.5
+
+
+def test_what_is_asked_and_cannot_be_is_told_with_two_ways_out() -> None:
+    mission = cornered_mission()
+    assert why_beside(mission, AUTOPILOTS["px4"], 0.5) == (
+        "this vehicle stops within 0.50 m in AUTO (NAV_ACC_RAD 0.5 m, 0.5 m/s),"
+        " and 5 of 5 stops must be met within less, the tightest within 0.05 m:"
+        " set NAV_ACC_RAD to 0.05 and plan with --speed 0.16,"
+        " or drive it by stopgo robot --controller mavlink:URL"
+    )
+    assert "(WP_RADIUS 0.02 m, 0.5 m/s)" in why_beside(mission, AUTOPILOTS["ardupilot"], 0.02)
+    assert "set WP_RADIUS" not in why_beside(mission, AUTOPILOTS["ardupilot"], 0.02)
+
+
+def test_of_stops_that_ask_for_no_more_nothing_is_told() -> None:
+    mission = cornered_mission(tolerance_m=0.3)
+    assert why_beside(mission, AUTOPILOTS["ardupilot"], 0.1) == ""
+    slow = msgspec.structs.replace(mission.robot, speed=0.15)
+    tight = msgspec.structs.replace(cornered_mission(), robot=slow)
+    assert why_beside(tight, AUTOPILOTS["ardupilot"], 0.05) == ""
