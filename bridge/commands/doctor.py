@@ -9,13 +9,14 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from bridge.commands.checks import Check
 from bridge.commands.connection import (
     DEFAULT_ENDPOINT,
     AnyRobot,
@@ -23,8 +24,12 @@ from bridge.commands.connection import (
     Connection,
     Insecure,
     KeyFolder,
+    MavlinkUrl,
+    SigningKey,
     SiteName,
     Timeout,
+    VehicleId,
+    alone,
     connection_of,
     given_in,
     reached,
@@ -38,23 +43,19 @@ from mission.errors import InputError, StopgoError
 
 if TYPE_CHECKING:
     from bridge.link.protocol import Info
+    from bridge.mavlink.line.url import Url
 
+Satellites = Annotated[
+    bool, typer.Option("--any-origin", help="With --mavlink: it finds its place by satellites, not indoors.")
+]
 LEAST_FREE = 500_000_000
 """Bytes: a long run recorded with its poses, and room for the robot's journal."""
 CLOCKS_APART_S = 2.0
 """Orders are valid for some seconds on the robot's clock."""
-EXTRAS = {"plan": "shapely", "bim": "ifcopenshell", "record": "rerun"}
+EXTRAS = {
+    "plan": "shapely", "bim": "ifcopenshell", "record": "rerun", "clouds": "laspy", "prove": "embreex",
+}  # fmt: skip
 """A library of each extra."""
-
-
-@dataclass(frozen=True)
-class Check:
-    """What was looked at; `do` says what to do about it, if something is wrong or missing."""
-
-    name: str
-    ok: bool
-    told: str
-    do: str = ""
 
 
 def doctor(
@@ -64,24 +65,40 @@ def doctor(
     connect: Connect = DEFAULT_ENDPOINT,
     site: SiteName = None,
     keys: KeyFolder = None,
+    mavlink: MavlinkUrl = None,
+    vehicle: VehicleId = None,
+    signing_key: SigningKey = None,
+    any_origin: Satellites = False,
     timeout: Timeout = 5.0,
     insecure: Insecure = False,
     json_: Json = False,
 ) -> int:
     """Tell what is preset and where, and whether keys, robot, clock, disk and libraries are as they must be.
 
+    Of a vehicle (--mavlink): what stands between it and a mission, each with the value to set. It is only
+    asked, nothing of it is changed.
+
     Exit code 1: something is wrong, and its line says what to do. An extra that is missing is not.
 
     Example: stopgo doctor --robot r1 --connect tcp/127.0.0.1:7447
     """
     given = given_in(context)
-    told: dict[str, Any] = {"robot": robot, "connect": connect, "site": site, "keys": keys, "mavlink": None}
+    told: dict[str, Any] = {"robot": robot, "connect": connect, "site": site, "keys": keys}
+    told["mavlink"] = mavlink
     checks = [_system(), *_extras(), _viewer(), _disk(Path()), *_checked("profile", lambda: _profile(given))]
     with contextlib.suppress(InputError):  # which the profile's line tells
         told = with_presets(given, told)
     if told["keys"] is not None:
         checks += _checked("keys", lambda: _keys(told["keys"]))
-    if told["robot"] is not None:
+    if mavlink is not None:
+        from bridge.mavlink.line.wire import read_line
+
+        alone(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
+        url, key = read_line(mavlink, signing_key, insecure=insecure)
+        checks += _checked(
+            "vehicle", lambda: _vehicle(url, vehicle, key, timeout_s=timeout, any_origin=any_origin)
+        )
+    elif told["robot"] is not None:
         connection = connection_of(given, **told, timeout=timeout, insecure=insecure)
         checks += [*_ports(connection.endpoint), *_checked("robot", lambda: _asked(connection))]
     else:
@@ -93,6 +110,16 @@ def doctor(
 def _asked(connection: Connection) -> Iterator[Check]:
     with reached(connection) as station:
         yield from robot_checks(station.info(), time.time_ns())
+
+
+def _vehicle(
+    url: Url, vehicle: int | None, key: bytes | None, *, timeout_s: float, any_origin: bool
+) -> Iterator[Check]:
+    from bridge.commands.vehicle_checks import vehicle_checks
+    from bridge.mavlink.line.peer import reached as vehicle_at
+
+    with vehicle_at(url, vehicle=vehicle, signing_key=key, timeout_s=timeout_s) as peer:
+        yield from vehicle_checks(peer, any_origin=any_origin)
 
 
 def _unasked(told: dict[str, Any], *, insecure: bool) -> Iterator[Check]:

@@ -14,6 +14,7 @@ from bridge.console import Bar, print_json, say, tell, tell_lines
 from bridge.mavlink.auto.logbook import forget, logbook, remember
 from bridge.mavlink.auto.unfinished_run import check_run_over
 from bridge.mavlink.line.origin import check_origin
+from bridge.mavlink.line.parameter_reading import read_parameters
 from bridge.mavlink.line.peer import Peer, reached
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import read_line
@@ -161,7 +162,7 @@ def _peer(line: Line) -> Iterator[tuple[Url, Peer]]:
 def _why_beside(peer: Peer, mission: Mission) -> str:
     """What its own parameters make of the mission's tolerances, as far as it tells them."""
     name = peer.autopilot.radius_parameter
-    radius = peer.parameter(name) if name else None
+    radius = read_parameters(peer, [name]).get(name) if name else None
     return "" if radius is None else why_beside(mission, peer.autopilot, radius)
 
 

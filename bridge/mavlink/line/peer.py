@@ -20,7 +20,6 @@ from bridge.mavlink.line.messages import (
     enum_name,
     is_signed,
     message_name,
-    parameter_request,
     request,
     set_origin,
     station_beat,
@@ -44,8 +43,6 @@ OTHERS_S = 1.3
 """Every vehicle beats once a second: so long one waits for a second one after the first."""
 KNOCK_S = 0.3
 """So often a vehicle that is not heard is asked for a heartbeat."""
-PARAMETER_S = 1.5
-"""How long a parameter is asked for: not every vehicle has each."""
 CLOCKS = (MessageId.SYSTEM_TIME, MessageId.ATTITUDE)
 UNSET_ANSWERS = 8
 """So often a vehicle takes the question and sends nothing before that means there is nothing to send."""
@@ -247,17 +244,6 @@ class Peer:
     def request(self, number: int) -> None:
         """Ask for the message of this number, and wait for nothing; `newest` has it if it comes."""
         self.wire.send(request(self.who, number))
-
-    def parameter(self, name: str, *, patience_s: float = PARAMETER_S) -> float | None:
-        """The value of one of its parameters; `None` if it tells none of that name."""
-        with self.waiting("PARAM_VALUE") as waiting:
-            for _ in self._tries(AGAIN_S, patience_s):
-                self.wire.send(parameter_request(self.who, name))
-                until = time.monotonic() + AGAIN_S
-                while (message := waiting.get(until - time.monotonic())) is not None:
-                    if message.param_id == name:
-                        return float(message.param_value)
-        return None
 
     def origin(self, *, patience_s: float | None = None) -> VehicleOrigin | None:
         """What its metres count from (GPS_GLOBAL_ORIGIN); `None` if it is not set, or not told."""

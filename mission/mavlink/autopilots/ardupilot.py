@@ -17,6 +17,7 @@ from mission.mavlink.autopilots.kind import (
     Heartbeat,
     Mode,
     Modes,
+    ParameterRule,
 )
 from mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag, VehicleType
 from mission.mavlink.fields import (
@@ -118,6 +119,77 @@ HABITS = Habits(
     speed_parameter="WP_SPEED", system_parameter="SYSID_THISMAV",
 )  # fmt: skip
 
+PARAMETERS = (
+    ParameterRule(
+        ("FRAME_CLASS",), lambda v: v == 1, "1 (rover)", "other frames drive in other ways", must=False
+    ),
+    ParameterRule(
+        ("GPS1_TYPE", "GPS_TYPE"),
+        lambda v: v == 0,
+        "0",
+        "no satellites indoors, and no false fixes at windows",
+        when="indoors",
+    ),
+    ParameterRule(
+        ("VISO_TYPE",),
+        lambda v: v in (1, 2, 3),
+        "1 (MAVLink)",
+        "it takes ODOMETRY from the robot's localisation",
+        when="indoors",
+    ),
+    ParameterRule(("AHRS_EKF_TYPE",), lambda v: v == 3, "3", "the filter that can use it", when="indoors"),
+    ParameterRule(("EK3_ENABLE",), lambda v: v == 1, "1", "the filter that can use it", when="indoors"),
+    ParameterRule(
+        ("EK3_SRC1_POSXY",),
+        lambda v: v == 6,
+        "6 (external)",
+        "its place comes from the localisation",
+        when="indoors",
+    ),
+    ParameterRule(
+        ("EK3_SRC1_VELXY",),
+        lambda v: v in (0, 6, 7),
+        "6 (external)",
+        "no satellites tell its speed",
+        when="indoors",
+    ),
+    ParameterRule(
+        ("EK3_SRC1_YAW",),
+        lambda v: v in (1, 6),
+        "6 (external), or 1 (compass)",
+        "steel in floors bends a compass: 6 where the localisation tells the heading",
+        when="indoors",
+    ),
+    ParameterRule(("WP_RADIUS",), lambda v: v <= 0.1, "0.05", "within it a stop counts as reached"),
+    ParameterRule(
+        ("WP_PIVOT_ANGLE",),
+        lambda v: 0 < v <= 60,
+        "60 or less, skid steering only",
+        "it turns on the spot at corners",
+        must=False,
+    ),
+    ParameterRule(
+        ("MIS_RESTART",), lambda v: v == 0, "0", "AUTO goes on where it was, not from the beginning"
+    ),
+    ParameterRule(
+        ("SCR_ENABLE",), lambda v: v == 1, "1", "a script on the vehicle starts the scanner", must=False
+    ),
+    ParameterRule(
+        ("FS_GCS_ENABLE",),
+        lambda v: v == 0,
+        "0",
+        "else it stops or goes home when no station is heard, whatever the mission's link_loss says",
+        must=False,
+    ),
+    ParameterRule(
+        ("ARMING_CHECK",),
+        lambda v: v == 1,
+        "1",
+        "checks before arming that are left out are not made up for here",
+        must=False,
+    ),
+)
+
 # Source: get_next_nav_cmd gives a waypoint without hold its next leg, and AR_WPNav then calls it reached when
 # the moving target passes it ("fast waypoint"), the robot being behind or cutting the corner. With a hold of
 # a second or more it stops there first. Delays are milliseconds in uint32 (mode_auto.cpp). Measured: more
@@ -133,4 +205,5 @@ ARDUPILOT = Autopilot(
     radius_parameter="WP_RADIUS",
     reached="within its parameter WP_RADIUS, or once past it", turns=False, gives_items="any order",
     modes=MODES, in_auto=in_auto, driving=DRIVING, drivable=True, habits=HABITS,
+    parameters=PARAMETERS,
 )  # fmt: skip

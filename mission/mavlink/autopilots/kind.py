@@ -157,6 +157,22 @@ class Habits:
 
 
 @dataclass(frozen=True)
+class ParameterRule:
+    """A parameter on which a mission of scan stops depends."""
+
+    names: tuple[str, ...]
+    """What releases call it; the first that the vehicle has counts."""
+    right: Callable[[float], bool]
+    set_to: str
+    """The value to set, in words."""
+    why: str
+    when: Literal["always", "indoors"] = "always"
+    """Indoors the vehicle finds its place by somebody else's localisation, not by satellites."""
+    must: bool = True
+    """Whether a mission fails without it; else it is worth knowing."""
+
+
+@dataclass(frozen=True)
 class Autopilot:
     """A kind of autopilot."""
 
@@ -202,6 +218,10 @@ class Autopilot:
     drivable: bool
     """A robot of ours may drive it: `driving` was measured, or read in its source."""
     habits: Habits
+    parameters: tuple[ParameterRule, ...] = ()
+    """What its parameters must be for a mission."""
+    whole_bytewise: bool = False
+    """A whole number's four bytes stand in PARAM_VALUE as they are; else it is told as a float."""
 
     def kept(self, item: Item) -> Item:
         """The item as the vehicle will read it back."""

@@ -9,7 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from mission.mavlink.autopilots.kind import EVERYWHERE, Autopilot, Driving, Habits, Heartbeat, Mode, Modes
+from mission.mavlink.autopilots.kind import (
+    EVERYWHERE,
+    Autopilot,
+    Driving,
+    Habits,
+    Heartbeat,
+    Mode,
+    Modes,
+    ParameterRule,
+)
 from mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag
 from mission.mavlink.fields import as_sent, float32
 from mission.mavlink.items import Command, Item, MavFrame
@@ -81,6 +90,42 @@ HABITS = Habits(
     speed_parameter="RO_SPEED_LIM", system_parameter="MAV_SYS_ID",
 )  # fmt: skip
 
+PARAMETERS = (
+    ParameterRule(
+        ("EKF2_EV_CTRL",),
+        lambda v: int(v) & 9 == 9,
+        "15",
+        "place (1) and heading (8) come from the localisation, by ODOMETRY",
+        when="indoors",
+    ),
+    ParameterRule(
+        ("EKF2_GPS_CTRL",),
+        lambda v: v == 0,
+        "0",
+        "no satellites indoors, and no false fixes at windows",
+        when="indoors",
+    ),
+    ParameterRule(
+        ("COM_ARM_WO_GPS",), lambda v: v != 0, "1", "else it does not arm without satellites", when="indoors"
+    ),
+    ParameterRule(("NAV_ACC_RAD",), lambda v: v <= 0.1, "0.05", "within it a stop counts as reached"),
+    ParameterRule(("RO_SPEED_LIM",), lambda v: v > 0, "the mission's speed", "it drives no faster"),
+    ParameterRule(
+        ("NAV_DLL_ACT",),
+        lambda v: v == 0,
+        "0",
+        "else it stops or goes home when no station is heard, whatever the mission's link_loss says",
+        must=False,
+    ),
+    ParameterRule(
+        ("COM_RC_IN_MODE",),
+        lambda v: v in (1, 2, 4),
+        "1, where no remote control is there",
+        "else it does not arm without one",
+        must=False,
+    ),
+)
+
 # Source: navigation.h allows 500 items on flight controllers (2 000 in older releases, 50 on the smallest
 # boards, 65 534 on Linux); only multicopters brake for a hold (Mission::setActiveMissionItems), wait for a
 # heading, and take a waypoint's own radius (MissionBlock::is_mission_item_reached); a transfer ends when an
@@ -95,4 +140,5 @@ PX4 = Autopilot(
     radius_parameter="NAV_ACC_RAD",
     reached="within its parameter NAV_ACC_RAD, 10 m unless set", turns=False, gives_items="in order",
     modes=MODES, in_auto=in_auto, driving=DRIVING, drivable=True, habits=HABITS,
+    parameters=PARAMETERS, whole_bytewise=True,
 )  # fmt: skip

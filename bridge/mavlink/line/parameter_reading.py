@@ -1,0 +1,44 @@
+"""Parameters of a vehicle by their names: asked for together, and again for those that have not come."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Collection
+
+from bridge.mavlink.line.messages import parameter_request
+from bridge.mavlink.line.peer import Peer
+from mission.mavlink.telemetry import Message
+
+ROUNDS = 4
+ROUND_S = 0.7
+"""How long each round waits after the last answer; a vehicle says nothing of names that it has not."""
+WHOLE = {1: "<B", 2: "<b", 3: "<H", 4: "<h", 5: "<I", 6: "<i"}
+"""MAV_PARAM_TYPE of whole numbers, and how their first bytes are read."""
+
+
+def read_parameters(peer: Peer, names: Collection[str]) -> dict[str, float]:
+    """The values of those that the vehicle has."""
+    found: dict[str, float] = {}
+    with peer.waiting("PARAM_VALUE") as waiting:
+        for _ in range(ROUNDS):
+            missing = [name for name in names if name not in found]
+            if not missing:
+                break
+            for name in missing:
+                peer.send(parameter_request(peer.who, name))
+            until = time.monotonic() + ROUND_S
+            while (message := waiting.get(until - time.monotonic())) is not None:
+                if message.param_id in names:
+                    found[message.param_id] = value_of(message, bytewise=peer.autopilot.whole_bytewise)
+                    until = time.monotonic() + ROUND_S
+    return found
+
+
+def value_of(message: Message, *, bytewise: bool) -> float:
+    """The value in a PARAM_VALUE; `bytewise`: a whole number's bytes stand in the float as they are."""
+    form = WHOLE.get(message.param_type)
+    if not bytewise or form is None:
+        return float(message.param_value)
+    packed = struct.pack("<f", message.param_value)
+    return float(struct.unpack(form, packed[: struct.calcsize(form)])[0])

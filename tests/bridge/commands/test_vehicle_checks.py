@@ -1,0 +1,105 @@
+"""`stopgo doctor --mavlink`: what stands between a vehicle and a mission, each with the value to set."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from bridge.commands.vehicle_checks import parameter_checks
+from bridge.mavlink.line.parameter_reading import value_of
+from bridge.mavlink.line.url import Url
+from bridge.mavlink.simulated.profiles import PROFILES
+from bridge.mavlink.simulated.vehicle import Setting
+from bridge.mavlink.simulated.vehicle_process import vehicle_on
+from mission.__main__ import main
+from mission.document import SiteOrigin
+from mission.mavlink.autopilots.ardupilot import ARDUPILOT
+from mission.mavlink.autopilots.px4 import PX4
+from tests.ports import free_port
+
+INDOORS = {
+    "GPS1_TYPE": 0.0, "VISO_TYPE": 1.0, "AHRS_EKF_TYPE": 3.0, "EK3_ENABLE": 1.0, "EK3_SRC1_POSXY": 6.0,
+    "EK3_SRC1_VELXY": 6.0, "EK3_SRC1_YAW": 6.0, "WP_RADIUS": 0.05, "MIS_RESTART": 0.0,
+}  # fmt: skip
+GUIDE = Path(__file__).parents[3] / "docs" / "how-to" / "ardupilot-indoors.md"
+
+
+def test_a_rover_that_is_set_up_for_indoors_has_nothing_wrong() -> None:
+    (told,) = parameter_checks(ARDUPILOT, INDOORS, any_origin=False)
+    assert (told.name, told.ok) == ("params", True)
+    assert "not told by the vehicle: FRAME_CLASS" in told.told
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "wanted"),
+    [
+        ("GPS1_TYPE", 1.0, "set GPS1_TYPE to 0"),
+        ("EK3_SRC1_POSXY", 3.0, "set EK3_SRC1_POSXY to 6 (external)"),
+        ("WP_RADIUS", 2.0, "set WP_RADIUS to 0.05"),
+        ("MIS_RESTART", 1.0, "set MIS_RESTART to 0"),
+    ],
+)
+def test_what_is_wrong_is_named_with_the_value_to_set(name: str, value: float, wanted: str) -> None:
+    wrong = [
+        check
+        for check in parameter_checks(ARDUPILOT, {**INDOORS, name: value}, any_origin=False)
+        if not check.ok
+    ]
+    assert [(check.name, check.do) for check in wrong] == [(name, wanted)]
+
+
+def test_a_parameter_may_have_the_name_of_an_older_release() -> None:
+    values = {name: value for name, value in INDOORS.items() if name != "GPS1_TYPE"}
+    (wrong,) = [
+        c for c in parameter_checks(ARDUPILOT, {**values, "GPS_TYPE": 9.0}, any_origin=False) if not c.ok
+    ]
+    assert wrong.do == "set GPS_TYPE to 0"
+
+
+def test_who_finds_its_place_by_satellites_needs_no_localisation() -> None:
+    outdoors = {"GPS1_TYPE": 1.0, "EK3_SRC1_POSXY": 3.0, "WP_RADIUS": 0.05, "MIS_RESTART": 0.0}
+    assert all(check.ok for check in parameter_checks(ARDUPILOT, outdoors, any_origin=True))
+
+
+@pytest.mark.parametrize(("value", "ok"), [(0, False), (1, False), (9, True), (15, True)])
+def test_px4_needs_place_and_heading_from_outside(value: int, ok: bool) -> None:
+    told = list(parameter_checks(PX4, {"EKF2_EV_CTRL": float(value)}, any_origin=False))
+    assert any(check.name == "EKF2_EV_CTRL" for check in told) is not ok
+
+
+def test_whole_numbers_of_px4_stand_in_the_float_byte_by_byte() -> None:
+    as_float = struct.unpack("<f", struct.pack("<i", 15))[0]
+    message = SimpleNamespace(param_type=6, param_value=as_float)
+    assert value_of(message, bytewise=True) == 15.0
+    assert value_of(SimpleNamespace(param_type=6, param_value=15.0), bytewise=False) == 15.0
+    assert value_of(SimpleNamespace(param_type=9, param_value=0.5), bytewise=True) == 0.5
+
+
+def test_the_guide_names_every_parameter_that_is_looked_at() -> None:
+    text = GUIDE.read_text(encoding="utf-8")
+    assert [rule.names[0] for rule in ARDUPILOT.parameters if f"`{rule.names[0]}`" not in text] == []
+
+
+@pytest.mark.parametrize("origin", [None, SiteOrigin(lat=47.0, lon=8.0, alt=400.0, heading_deg=0.0)])
+def test_a_vehicle_is_asked_and_not_changed(
+    origin: SiteOrigin | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    port = free_port()
+    setting = Setting(PROFILES["ardupilot"], origin=origin)
+    with vehicle_on(Url("udpin", "127.0.0.1", port), setting):
+        code = main(["doctor", "--mavlink", f"udpout:127.0.0.1:{port}", "--json"])
+    told = {check["name"]: check for check in json.loads(capsys.readouterr().out)["checks"]}
+    assert told["vehicle"]["ok"]
+    assert told["origin"]["ok"] is (origin is not None)
+    assert code == (0 if origin is not None else 1)
+    assert "right" in told["params"]["told"]
+
+
+def test_nobody_there_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", "--mavlink", f"udpout:127.0.0.1:{free_port()}", "--timeout", "0.3"]) == 1
+    assert "no vehicle within 0.3 s" in capsys.readouterr().out
+    assert main(["doctor", "--mavlink", "nonsense"]) == 2
