@@ -212,7 +212,7 @@ class MavlinkBase:
         near_m = min((NEAR_M, *(NEAR_SHARE * stop.tolerance_m for stop in stops)))
         ability = Ability(
             near_m=near_m, over_m=max(near_m, limits.radius), speed=limits.speed,
-            acceleration=limits.acceleration, gives_up_s=driving.gives_up_s,
+            acceleration=limits.acceleration, gives_up_s=self.autopilot.gives_up_s,
             reverses=driving.courses == "heading",
         )  # fmt: skip
         start = self._laid_to(point, pose)

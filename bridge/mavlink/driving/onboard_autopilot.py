@@ -58,6 +58,8 @@ SOONEST_LATE_S, LATEST_S = 0.4, 2.0
 SOONEST_LOST_S = 20.0
 FORGETS = 0.998
 """Share of the longest pause that is remembered from one place to the next."""
+SOONEST_GIVEN_UP_S = 0.3
+"""Whatever a parameter says: an autopilot looks at it every now and then."""
 TURNING_M_S = 0.05
 """An autopilot that is told a velocity by its direction needs one to turn."""
 POSE = ("LOCAL_POSITION_NED", "ATTITUDE")
@@ -145,6 +147,7 @@ def on_board(
             autopilot.await_pose(timeout_s)
             with suppress(RobotUnreachable):
                 peer.origin(patience_s=ORDER_S)  # so that it is known to the first who asks
+            autopilot.ask_when_it_gives_up()
             yield autopilot
         finally:
             autopilot.close()
@@ -174,6 +177,7 @@ class OnboardAutopilot:
         self._turns = threading.Lock()
         """An order to hold and one to be guided are given one after the other, never crossed."""
         self._guide_asked_s = 0.0
+        self.gives_up_s = peer.autopilot.driving.gives_up_s
         self._stands: Point | None = None
         self._stop_owed = threading.Event()
         self._stop_asked_s = 0.0
@@ -202,6 +206,12 @@ class OnboardAutopilot:
                     " has it an origin, and GNSS or external navigation?"
                 )
             self._closing.wait(KEEP_S)
+
+    def ask_when_it_gives_up(self) -> None:
+        """Learn how long it drives on by a velocity that is not told again."""
+        told = self.peer.parameter(self.kind.driving.gives_up_parameter)
+        if told is not None:
+            self.gives_up_s = max(SOONEST_GIVEN_UP_S, told)
 
     # What it tells
 

@@ -9,8 +9,7 @@ from bridge.mavlink.simulated.rover import Rover
 from bridge.mavlink.simulated.steering import Course
 from mission.document import Point
 
-PATIENCE_NS = 1_000_000_000
-"""An autopilot that wants a stream of setpoints waits so long for the next one, by the wall's clock."""
+LONG_AGO_NS = 10**18
 
 
 class GuidedTarget:
@@ -19,12 +18,13 @@ class GuidedTarget:
     Parameters
     ----------
     patience_s
-        How long a course counts that is not told again, seconds.
+        How long a course counts that is not told again, and any setpoint of an autopilot that wants a stream
+        of them, seconds of the wall's clock.
     """
 
     def __init__(self, rover: Rover, wall: Clock, *, patience_s: Callable[[], float]) -> None:
         self._rover, self._wall, self._patience_s = rover, wall, patience_s
-        self._heard_ns = self._course_ns = -PATIENCE_NS
+        self._heard_ns = self._course_ns = -LONG_AGO_NS
         self._to: tuple[Point, float | None] | None = None
         self._course: Course | None = None
 
@@ -35,7 +35,7 @@ class GuidedTarget:
     @property
     def fresh(self) -> bool:
         """Whether a setpoint came just now."""
-        return self._wall.now_ns() - self._heard_ns <= PATIENCE_NS
+        return self._wall.now_ns() - self._heard_ns <= self._patience_s() * 1e9
 
     @property
     def overdue(self) -> bool:

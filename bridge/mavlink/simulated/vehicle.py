@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,6 +33,7 @@ from mission.mavlink.telemetry import Message
 
 BOOT_NS = KEEP_NS = 1_000_000_000
 FOREVER_NS = 2**63
+PATIENCE_S = 1.0
 BATTERY_NS = 6 * 3600 * 10**9
 """A full battery lasts six hours."""
 NOWHERE = Item(Command.NAV_WAYPOINT, MavFrame.GLOBAL)
@@ -101,10 +101,11 @@ class Vehicle:
         """The item reached last."""
         self.store = Store(setting.state)
         rule = self.autopilot.rule
+        driving = self.autopilot.driving
         tuning = Tuning(self.autopilot.name, **setting.changed)
         self.rover = Rover(self.store, self._drive(tuning), rule=rule, origin=setting.origin)
         self.target = GuidedTarget(
-            self.rover, wall, patience_s=lambda: tuning.values.get("GUID_TIMEOUT", math.inf)
+            self.rover, wall, patience_s=lambda: tuning.values.get(driving.gives_up_parameter, PATIENCE_S)
         )
         self.parameters = Parameters(
             self.autopilot.habits, tuning, speed=self.rover.speed, set_speed=self.rover.set_speed

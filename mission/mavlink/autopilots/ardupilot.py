@@ -101,7 +101,10 @@ MODES = Modes(
 # Source (Rover/mode_guided.cpp): it stays at its last place whatever becomes of us; set_desired_speed counts
 # only while it drives to a place, so that is sent first; a yaw alone is followed for GUID_TIMEOUT (3 s) and
 # then stops it.
-DRIVING = Driving(streams=False, gives_up_s=3.0, turns=True, courses="heading", reposition_mode="guided")
+DRIVING = Driving(
+    streams=False, gives_up_s=3.0, gives_up_parameter="GUID_TIMEOUT", turns=True, courses="heading",
+    reposition_mode="guided",
+)  # fmt: skip
 
 HABITS = Habits(
     asks_int=False, ask_again_s=1.0, give_up_s=8.0, tells_giving_up=True, atomic=False, strays="tell",

@@ -43,6 +43,9 @@ GENERIC = Autopilot(
     radius_parameter="",
     reached="within the acceptance radius that is sent", turns=True, gives_items="either",
     modes=px4.MODES, in_auto=in_auto,
-    driving=Driving(streams=False, gives_up_s=3.0, turns=True, courses="heading", reposition_mode="hold"),
+    driving=Driving(
+        streams=False, gives_up_s=3.0, gives_up_parameter="", turns=True, courses="heading",
+        reposition_mode="hold",
+    ),
     drivable=False, habits=HABITS,
 )  # fmt: skip

@@ -86,7 +86,9 @@ class Driving:
     streams: bool
     """It leaves that mode unless setpoints keep coming, so it is put on hold wherever it arrives."""
     gives_up_s: float
-    """How long it drives on by a velocity that is not told again."""
+    """How long it drives on by a velocity that is not told again, where it does not tell."""
+    gives_up_parameter: str
+    """Its parameter that says so."""
     turns: bool
     """It turns to a yaw that is told without a place."""
     courses: Literal["heading", "vector"]

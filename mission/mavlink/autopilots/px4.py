@@ -68,7 +68,10 @@ MODES = Modes(
 # that a stop could not be seen to have been obeyed; and OFFBOARD ends by itself when our setpoints cease.
 # Setpoints at 2 Hz or more for a second before OFFBOARD and as long as it lasts; speed in it is the vehicle's
 # own (RO_SPEED_LIM), and yaw is of mecanum drives alone (SurfaceVehiclePositionSetpoint).
-DRIVING = Driving(streams=True, gives_up_s=1.0, turns=False, courses="vector", reposition_mode="hold")
+DRIVING = Driving(
+    streams=True, gives_up_s=1.0, gives_up_parameter="COM_OF_LOSS_T", turns=False, courses="vector",
+    reposition_mode="hold",
+)  # fmt: skip
 
 HABITS = Habits(
     asks_int=True, ask_again_s=0.25, give_up_s=5.0, tells_giving_up=False, atomic=True, strays="ignore",

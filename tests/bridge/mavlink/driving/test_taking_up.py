@@ -59,6 +59,25 @@ def test_stops_of_5_cm_are_reached_in_twice_the_planned_time_and_on_the_legs(
     assert max(min(_beside(pair, pose) for pair in legs) for pose in poses) < 0.1
 
 
+@pytest.mark.parametrize(("profile", "parameter"), [("ardupilot", "GUID_TIMEOUT"), ("px4", "COM_OF_LOSS_T")])
+def test_one_that_gives_up_sooner_is_driven_faster_to_its_stops(
+    tmp_path: Path, world: World, profile: str, parameter: str
+) -> None:
+    took_ns = []
+    for gives_up_s in (0.5, 5.0):
+        folder = tmp_path / f"{gives_up_s}"
+        with (
+            rover(folder, profile, changed={parameter: gives_up_s}) as (vehicle, _),
+            gateway(folder, vehicle.url) as station,
+        ):
+            station.push(site_mission())
+            began_ns = world.monotonic_ns()
+            station.command("start")
+            until(station.reports(), is_state("FINISHED"))
+            took_ns.append(world.monotonic_ns() - began_ns)
+    assert took_ns[0] < 0.8 * took_ns[1]
+
+
 def _beside(leg: Any, pose: Pose) -> float:
     return math.dist((pose.x, pose.y), foot(*leg, (pose.x, pose.y)))
 
