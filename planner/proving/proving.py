@@ -30,7 +30,7 @@ from planner.proving.asked import AskedPoints
 from planner.proving.casting import SolidScene
 from planner.proving.extrusion import NONE, ExtrudedFloor, extruded, heights_of
 from planner.proving.joining import joined
-from planner.proving.registering import registered
+from planner.proving.registering import registered, surface_of
 from planner.proving.scanning import ScanCount, Stand, scanned, stand_of
 from planner.proving.strips import Strips, strips_of
 
@@ -80,7 +80,6 @@ def prove(
     solids = extruded(space.floor, doors, simulation.ceiling_m)
     strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
     tally = _Tally(strips, AskedPoints.of(space.settings, strips), simulation)
-    scans = []
     stands = [
         replace(
             stand_of(stop, origin=solids.origin, height=simulation.height_m, number=index),
@@ -88,16 +87,20 @@ def prove(
         )
         for index, stop in enumerate(mission.stops)
     ]
-    for stop, stand in zip(mission.stops, stands, strict=True):
+    surfaces, clouds = [], []
+    for stop, stand in zip(mission.stops, stands, strict=True):  # of a scan little is kept: there may be many
         scan = scanned(solids, strips, stand, simulation)
         tally.take(scan, _sighted(space, solids, stand, simulation.ceiling_m))
-        scans.append(scan)
-        say(f"{stop.id} scanned, {len(scans)} of {len(stands)}")
+        surfaces.append(surface_of(scan.cloud))
+        most = MOST_DRAWN // len(stands)
+        points = _drawn(stand, scan, most, simulation.ceiling_m, solids.origin)
+        clouds.append(ScanCloud(stop.id, points))
+        say(f"{stop.id} scanned, {len(clouds)} of {len(stands)}")
     places = frozen([stand.place for stand in stands])
     seen = frozen(tally.views >= np.clip(tally.sights, 1, space.settings.least_views), np.bool_)
     names = [stop.id for stop in mission.stops]
     pairs = []
-    for pair in registered(names, places, [scan.cloud for scan in scans], simulation):
+    for pair in registered(names, places, surfaces, simulation):
         pairs.append(pair)
         say(f"{pair.pair.a} and {pair.pair.b} registered")
     promise = _Promise.of(mission, space, coverage)
@@ -119,7 +122,7 @@ def prove(
         ),
         quality=tally.quality(),
         network=joined(names, places, pairs),
-        clouds=_drawn(names, places, scans, solids, simulation),
+        clouds=tuple(clouds),
     )
 
 
@@ -138,21 +141,11 @@ def _own_door(stop: Stop, doors: list[FloatArray]) -> int:
     return nearest if away[nearest] <= IN_DOORWAY_M else NONE
 
 
-def _drawn(
-    names: list[str],
-    places: FloatArray,
-    scans: list[ScanCount],
-    solids: ExtrudedFloor,
-    simulation: Simulation,
-) -> tuple[ScanCloud, ...]:
-    """Every scan's cloud, thinned evenly to MOST_DRAWN of all; without the ceiling, that hides the rooms."""
-    every = max(1, -(-sum(len(scan.cloud) for scan in scans) // MOST_DRAWN))
-    origin = np.append(solids.origin, 0.0)
-    clouds = []
-    for name, place, scan in zip(names, places, scans, strict=True):
-        points = scan.cloud[::every] + place + origin
-        clouds.append(ScanCloud(name, frozen(points[points[:, 2] < simulation.ceiling_m - BELOW_M])))
-    return tuple(clouds)
+def _drawn(stand: Stand, scan: ScanCount, most: int, ceiling: float, origin: FloatArray) -> FloatArray:
+    """A scan's points, thinned evenly to about `most`; without the ceiling, that hides the rooms."""
+    every = max(1, -(-len(scan.cloud) // max(1, most)))
+    points = scan.cloud[::every] + stand.place + np.append(origin, 0.0)
+    return frozen(points[points[:, 2] < ceiling - BELOW_M])
 
 
 class _Tally:

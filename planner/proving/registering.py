@@ -93,16 +93,15 @@ class Registered:
 
 
 def registered(
-    names: Sequence[str], places: FloatArray, clouds: Sequence[FloatArray], simulation: Simulation
+    names: Sequence[str], places: FloatArray, surfaces: Sequence[Surface6], simulation: Simulation
 ) -> Iterator[Registered]:
     """Every pair of scans that show some of the same surfaces; `places` (n, 3) are where they were taken."""
-    surfaces = [surface_of(cloud) for cloud in clouds]
     for i in range(len(names)):
         for j in range(i + 1, len(names)):
             if math.dist(places[i], places[j]) < 2 * simulation.range_m:
                 two = _Two(surfaces[i], surfaces[j], _shift(places[j] - places[i]))
                 if two.shared_points >= LEAST_POINTS:
-                    starts = _starts(two, (clouds[i], clouds[j]), simulation, (i, j))
+                    starts = _starts(two, simulation, (i, j))
                     yield _registered((names[i], names[j]), two, starts)
 
 
@@ -175,14 +174,12 @@ def _registered(names: tuple[str, str], two: _Two, starts: Sequence[FloatArray])
     return Registered(pair, ends[worst])
 
 
-def _starts(
-    two: _Two, clouds: tuple[FloatArray, FloatArray], simulation: Simulation, pair: tuple[int, int]
-) -> list[FloatArray]:
+def _starts(two: _Two, simulation: Simulation, pair: tuple[int, int]) -> list[FloatArray]:
     """Poses that are off to one side and to the other; or what is found without any."""
     random = np.random.default_rng([simulation.seed, *pair])
     way, turn = random.uniform(0, 2 * math.pi), random.choice((-1.0, 1.0))
     if not simulation.poses:
-        return [_without_pose(*clouds, turn=way)]
+        return [_without_pose(two.one.points, two.other.points, turn=way)]
     far, angle = simulation.pose_error_m, turn * math.radians(simulation.pose_error_deg)
     aside = far * np.array([math.cos(way), math.sin(way), 0.0])
     return [_shift(side * aside) @ two.truth @ _turned(side * angle) for side in (1.0, -1.0)]

@@ -20,7 +20,7 @@ from planner import plan
 from planner.proving.casting import RayFan, SolidScene
 from planner.proving.extrusion import NONE, extruded
 from planner.proving.proving import prove
-from planner.proving.registering import off, registered
+from planner.proving.registering import off, registered, surface_of
 from planner.proving.scanning import Stand, scanned
 from planner.proving.strips import strips_of
 from planner.space.navigable import navigable
@@ -154,9 +154,8 @@ def clouds_of(
 
 
 def pair_of(floor: FloorPlan, a: tuple[float, float], b: tuple[float, float], simulation: Simulation):
-    found = registered(
-        ("a", "b"), np.array([(*a, 1.3), (*b, 1.3)]), clouds_of(floor, [a, b], simulation), simulation
-    )
+    surfaces = [surface_of(cloud) for cloud in clouds_of(floor, [a, b], simulation)]
+    found = registered(("a", "b"), np.array([(*a, 1.3), (*b, 1.3)]), surfaces, simulation)
     return [item.pair for item in found]
 
 
