@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from msgspec import UnsetType
+
 from mission.document import Mission
 from mission.figures import percent
 from mission.geometry import BoolArray, FloatArray
@@ -27,6 +29,8 @@ class Simulation:
     """What is taken for granted where a mission is simulated; the scanner stands level."""
 
     range_m: float
+    joining_m: float = 20.0
+    """Up to where points count for registration; scanners reach farther than plans ask of them."""
     slant: bool = False
     """Whether the range counts along the rays; else along the floor, as in the plan."""
     fov_deg: float = 360.0
@@ -191,7 +195,7 @@ class PlanProof:
     @cached_property
     def unmet(self) -> tuple[str, ...]:
         """What the plan promises and the simulation does not show, in words."""
-        return (*_short_whole(self), *_short_parts(self), *_short_stops(self))
+        return (*_short_whole(self), *_short_parts(self), *_short_stops(self), *_short_pairs(self))
 
     @property
     def met(self) -> bool:
@@ -217,6 +221,17 @@ def _short_parts(proof: PlanProof) -> list[str]:
         and item.simulated is not None
         and item.simulated < min(item.required, item.coverage or 0.0) - ALLOWED_SHARE
         and item.missed > ALLOWED_UNITS_OF_PART * proof.grain
+    ]
+
+
+def _short_pairs(proof: PlanProof) -> list[str]:
+    """Pairs of the mission's network that do not register."""
+    promised = () if isinstance(proof.mission.network, UnsetType) else proof.mission.network
+    good = {frozenset((pair.a, pair.b)) for pair in proof.network.pairs if pair.registered}
+    return [
+        f"{item.a} and {item.b}: are to register, and do not"
+        for item in promised
+        if frozenset((item.a, item.b)) not in good
     ]
 
 

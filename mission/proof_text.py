@@ -176,6 +176,7 @@ def assumed_words(simulation: Simulation) -> list[str]:
     return [
         f"rays every {simulation.step_deg:g}° to {simulation.range_m:g} m along {way}, "
         f"noise {1000 * simulation.noise_m:g} mm",
+        f"for registration points up to {simulation.joining_m:g} m",
         f"scanner level at {simulation.height_m:g} m, blind below in a cone of {simulation.cone_deg:g}°",
         f"walls up to {simulation.ceiling_m:g} m ({known}), openings as high; floor and ceiling level",
         f"{start}; registered: from both sides under {1000 * REGISTERED_M:g} mm and {REGISTERED_DEG:g}°",

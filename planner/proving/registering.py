@@ -30,6 +30,8 @@ STAGES = ((0.35, 0.3), (0.15, 0.1))
 """Distances in metres: within which surfaces count as shared, and within which points are matched."""
 LEAST_POINTS = 100
 """Fewer shared points on upright surfaces, about 0.5 m², are no pair."""
+FEW = 10
+"""Of so many points one is looked at first."""
 WEAKEST = 0.02
 """At least this share of the shared upright surface must face in the direction that is held least."""
 UPRIGHT = 0.5
@@ -98,9 +100,9 @@ def registered(
     """Every pair of scans that show some of the same surfaces; `places` (n, 3) are where they were taken."""
     for i in range(len(names)):
         for j in range(i + 1, len(names)):
-            if math.dist(places[i], places[j]) < 2 * simulation.range_m:
+            if math.dist(places[i], places[j]) < 2 * simulation.joining_m:
                 two = _Two(surfaces[i], surfaces[j], _shift(places[j] - places[i]))
-                if two.shared_points >= LEAST_POINTS:
+                if two.meets and two.shared_points >= LEAST_POINTS:
                     starts = _starts(two, simulation, (i, j))
                     yield _registered((names[i], names[j]), two, starts)
 
@@ -118,6 +120,12 @@ class _Two:
         """Which upright points of each lie on surfaces of the other."""
         one, other = _shared(self.one, self.other, self.truth, SAME_M)
         return one & self.one.upright, other & self.other.upright
+
+    @property
+    def meets(self) -> bool:
+        """Whether it is worth while to look: a few points tell most pairs that share nothing."""
+        few = Surface6(self.other.points[::FEW], self.other.normals[::FEW])
+        return bool((self.one.near(few, self.truth, SAME_M) & few.upright).any())
 
     @property
     def shared_points(self) -> int:

@@ -96,16 +96,16 @@ def _points(
     """Where rays end, as measured, from the scanner (n, 3)."""
     hit = met != NONE
     far = distances(solids, place, met[hit], ways[hit])
-    near = _within(far, ways[hit], simulation)
+    near = _within(far, ways[hit], simulation.joining_m, slant=simulation.slant)
     far = far[near] + random.normal(0.0, simulation.noise_m, int(near.sum()))
     found: FloatArray = far[:, None] * ways[hit][near]
     return found
 
 
-def _within(far: FloatArray, ways: FloatArray, simulation: Simulation) -> BoolArray:
+def _within(far: FloatArray, ways: FloatArray, reach: float, *, slant: bool) -> BoolArray:
     """Whether what lies so far along each way (n, 3) is within range."""
-    level = 1.0 if simulation.slant else np.hypot(ways[:, 0], ways[:, 1])
-    found: BoolArray = far * level <= simulation.range_m
+    level = 1.0 if slant else np.hypot(ways[:, 0], ways[:, 1])
+    found: BoolArray = far * level <= reach
     return found
 
 
@@ -188,7 +188,7 @@ class _Counting:
         towards = ways[hit]
         far = distances(self._solids, self._place, met[hit], towards)
         unit = self._strips.under_at(self._place[:2] + far[:, None] * towards[:, :2])
-        good = (unit != NONE) & _within(far, towards, self._simulation)
+        good = (unit != NONE) & _within(far, towards, self._reach, slant=self._simulation.slant)
         np.add.at(self.points, self._strips.first_cell[unit[good] + 1] - 1, 1)
 
 

@@ -168,7 +168,7 @@ def test_two_scans_of_one_room_register_from_a_given_error() -> None:
 
 def test_scans_along_a_corridor_are_free_along_it_and_told_so() -> None:
     """Its ends are out of range: nothing holds the pair along x."""
-    simulation = replace(COARSEST, range_m=4.0)
+    simulation = replace(COARSEST, range_m=4.0, joining_m=4.0)
     (pair,) = pair_of(hall(30, 2), (13.0, 1.0), (15.0, 1.0), simulation)
     assert not pair.registered
     assert pair.free_deg is not None
@@ -177,7 +177,7 @@ def test_scans_along_a_corridor_are_free_along_it_and_told_so() -> None:
 
 def test_the_two_sides_of_a_wall_are_no_pair() -> None:
     floor = two_rooms(0.9, thick=0.1, at=0.5)
-    assert pair_of(floor, (2.0, 3.0), (6.0, 3.0), replace(COARSEST, range_m=3.0)) == []
+    assert pair_of(floor, (2.0, 3.0), (6.0, 3.0), replace(COARSEST, range_m=3.0, joining_m=3.0)) == []
 
 
 def test_how_far_off_a_pose_is() -> None:
@@ -214,3 +214,15 @@ def test_limits_are_held_by_what_was_measured() -> None:
     coarser = proved(hall(4, 3), settings, replace(simulation, step_deg=0.8))
     assert not coarser.met
     assert coarser.whole.missed > 1.0
+
+
+def test_a_pair_that_is_to_register_and_does_not_is_caught() -> None:
+    from mission.document import Overlap
+
+    made = plan(two_rooms(0.9, thick=0.1, at=0.5), Settings(range=3.0))
+    names = [stop.id for stop in made.mission.stops]
+    promised = (Overlap(a=names[0], b=names[-1], common_m=3.0, share=0.2, hold_m=1.0),)
+    lying = changed(made.mission, network=promised)
+    simulation = replace(COARSEST, range_m=3.0, joining_m=1.0)
+    proof = prove(lying, made.space, simulation, None)
+    assert f"{names[0]} and {names[-1]}: are to register, and do not" in proof.unmet
