@@ -1,7 +1,9 @@
 """Measures the link: orders a second, large missions on a slow line, and what a robot costs at rest.
 
 Run: python -m benchmarks.bridge [--keys]; one line per figure, medians and p99. With --far instead: pushes
-and pauses on a line of long round trips, several pieces under way and, as formerly, one.
+and pauses on a line of long round trips, several pieces under way and, as formerly, one. With --stops: how
+long `pause` and `abort` take, alone, beside a push of 10 MB by another process, and on a full disk; --former
+DIR has a former version's checkout measured in the same run.
 """
 
 from __future__ import annotations
@@ -10,11 +12,13 @@ import argparse
 import os
 import resource
 import statistics
+import subprocess
+import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 
@@ -26,11 +30,17 @@ from bridge.link.keys import now_utc
 from bridge.station.station import Station, connect
 from bridge.station.window import Window
 from mission.document import Mission, sealed
+from mission.errors import AnswerIsNo
 from mission.ports import free_port
+from mission.run.orders import Verb
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor
+from tests.faults.full_disk import fill
 
 ORDERS = 1000
+THIS = (sys.executable, "-m", "benchmarks.bridge")
+ALONE = 100
+"""Of each stop, with nothing beside."""
 STOPS_OF_10_MB = 9_000
 POINTS_BETWEEN = 50
 FAR_BITS_PER_S, FAR_S = 8e6, 0.3
@@ -41,9 +51,21 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--keys", action="store_true", help="measure mTLS with signed orders")
     options.add_argument("--far", action="store_true", help="measure a line of 8 Mbit/s and 300 ms")
+    options.add_argument("--stops", action="store_true", help="measure `pause` and `abort`")
+    options.add_argument("--former", type=Path, help="checkout of a former version, for --stops")
+    options.add_argument("--disk", nargs=3, help=argparse.SUPPRESS)
+    options.add_argument("--push", help=argparse.SUPPRESS)
     given = options.parse_args()
+    if given.disk is not None:
+        stops_on_a_full_disk(*given.disk)
+        return
+    if given.push is not None:
+        push_of_10_mb(given.push)
+        return
     with tempfile.TemporaryDirectory() as folder:
-        if given.far:
+        if given.stops:
+            stops(Path(folder), given.former)
+        elif given.far:
             far(Path(folder))
         else:
             measure(Path(folder), with_keys=given.keys)
@@ -181,9 +203,108 @@ def far_push(station: Station, stops: int, revision: int, under_way: str) -> Non
     )
 
 
+def stops(folder: Path, former: Path | None) -> None:
+    """Rows of another table in benchmarks/README.md: the former version and this one, in turn."""
+    print("| version | line | beside | order | n | median ms | p99 ms | greatest ms |", flush=True)
+    print("|---|---|---|---|---|---|---|---|", flush=True)
+    for name, checkout in (("former", former), ("present", Path.cwd())):
+        if checkout is None:
+            continue
+        for line, delay_s in (("no delay", None), ("8 Mbit/s, 300 ms", FAR_S / 2)):
+            stops_on(folder / f"{name}-{delay_s}", f"{name} | {line}", checkout, delay_s)
+        full = folder / f"{name}-full"
+        full.mkdir()
+        measuring = ["unshare", "-rm", *THIS, "--disk", str(full), name, str(checkout)]
+        subprocess.run(measuring, check=True)
+
+
+@contextmanager
+def running_from(checkout: Path, state: Path) -> Iterator[str]:
+    """A robot of this checkout's version; gives its endpoint."""
+    here = Path.cwd()
+    os.chdir(checkout)
+    try:
+        with robot_process("r1", state, extra=["--endurance", "3e6"]) as endpoint:
+            os.chdir(here)
+            yield endpoint
+    finally:
+        os.chdir(here)
+
+
+def stops_on(folder: Path, row: str, checkout: Path, delay_s: float | None) -> None:
+    """`pause` and `abort` alone and beside a push, over one line."""
+    with running_from(checkout, folder) as endpoint:
+        with connect(endpoint, robot="r1") as station:
+            station.push(corridor())
+        port = int(endpoint.rpartition(":")[2])
+        bits = None if delay_s is None else FAR_BITS_PER_S
+        with (
+            Proxy(port, bits_per_s=bits, delay_s=delay_s or 0.0) as proxy,
+            connect(proxy.endpoint, robot="r1", timeout_s=30) as station,
+        ):
+            alone = iter(range(ALONE))
+            tell_stops(f"{row} | alone", stopping(station, lambda: next(alone, None) is None))
+            with subprocess.Popen(
+                [*THIS, "--push", proxy.endpoint], stdout=subprocess.PIPE, text=True
+            ) as pushing:
+                assert pushing.stdout is not None
+                pushing.stdout.readline()
+                tell_stops(f"{row} | push of 10 MB", stopping(station, lambda: pushing.poll() is not None))
+            assert pushing.returncode == 0
+
+
+def push_of_10_mb(endpoint: str) -> None:
+    """Say when it begins."""
+    mission = winding(corridor(stops=STOPS_OF_10_MB, revision=2))
+    with connect(endpoint, robot="r1", commander="another", timeout_s=60) as station:
+        print("begins", flush=True)
+        station.push(mission, take_over=True)
+
+
+def stopping(station: Station, over: Callable[[], bool]) -> dict[str, list[float]]:
+    """Seconds that stops take, in turn, until it is over."""
+    took: dict[str, list[float]] = {"pause": [], "abort": []}
+    while not over():
+        for verb, seconds in took.items():
+            seconds.append(timed(lambda verb=verb: station.link.ask(*a_stop(station, verb), timeout_s=20)))
+            time.sleep(0.02)
+    return took
+
+
+def tell_stops(row: str, took: dict[str, list[float]]) -> None:
+    for verb, seconds in took.items():
+        ordered = sorted(seconds)
+        p99 = ordered[min(len(ordered) - 1, int(len(ordered) * 0.99))]
+        middle, greatest = statistics.median(ordered), ordered[-1]
+        print(
+            f"| {row} | `{verb}` | {len(ordered)} | {middle * 1e3:.0f} | {p99 * 1e3:.0f}"
+            f" | {greatest * 1e3:.0f} |", flush=True,
+        )  # fmt: skip
+
+
+def stops_on_a_full_disk(at: str, name: str, checkout: str) -> None:
+    """The same in a namespace of its own, on a disk of 16 MB that is filled to the last byte."""
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", at], check=True)
+    with (
+        running_from(Path(checkout), Path(at) / "state") as endpoint,
+        connect(endpoint, robot="r1", timeout_s=30.0) as station,
+    ):
+        station.push(corridor())
+        while "cannot be written" not in station.command("abort").message:
+            with suppress(AnswerIsNo):
+                station.command("start")
+            fill(Path(at) / "ballast")
+        alone = iter(range(ALONE))
+        tell_stops(f"{name} | no delay | full disk", stopping(station, lambda: next(alone, None) is None))
+
+
+def a_stop(station: Station, verb: Verb) -> tuple[str, bytes]:
+    return station.keys.command(verb), msgspec.json.encode(station.stop_order(verb))
+
+
 def pause(station: Station) -> tuple[str, bytes]:
     """Where a pause is sent, and the pause; in READY it is refused, and stored."""
-    return station.keys.command("pause"), msgspec.json.encode(station.stop_order("pause"))
+    return a_stop(station, "pause")
 
 
 def at_rest(pid: int, seconds: float = 10.0) -> None:

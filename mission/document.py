@@ -181,16 +181,36 @@ def stop_names(count: int) -> list[str]:
     return [f"s{number:0{width}d}" for number in range(1, count + 1)]
 
 
-def canonical(document: dict[str, Any]) -> bytes:
+def canonical(document: Any) -> bytes:
     """Canonical JSON: keys sorted, no spaces, shortest numbers that read back the same."""
     return msgspec.json.encode(document, order="deterministic")
 
 
 def digest_of(mission: Mission) -> str:
-    """sha256 of the mission's canonical JSON without its `digest`, hexadecimal."""
-    document = msgspec.to_builtins(mission)
+    """sha256 of the mission's canonical JSON without its `digest`, hexadecimal.
+
+    Stop by stop, so that other threads have their turn meanwhile: a robot's must still hear a stop.
+    """
+    document = msgspec.to_builtins(msgspec.structs.replace(mission, stops=()))
     del document["digest"]
-    return hashlib.sha256(canonical(document)).hexdigest()
+    hashed, before = hashlib.sha256(), b"{"
+    for key in sorted(document):
+        hashed.update(before + canonical(key) + b":")
+        if key == "stops":
+            _add_stops(hashed, mission.stops)
+        else:
+            hashed.update(canonical(document[key]))
+        before = b","
+    hashed.update(b"}")
+    return hashed.hexdigest()
+
+
+def _add_stops(hashed: hashlib._Hash, stops: tuple[Stop, ...]) -> None:
+    before = b"["
+    for stop in stops:
+        hashed.update(before + canonical(msgspec.to_builtins(stop)))
+        before = b","
+    hashed.update(b"]" if stops else b"[]")
 
 
 def sealed(mission: Mission) -> Mission:

@@ -115,7 +115,7 @@ class StationBench:
         journal.begin_transfer(manifest)
         for number in range(manifest.chunks):
             piece = document[number * CHUNK_BYTES : (number + 1) * CHUNK_BYTES]
-            journal.store_chunk(manifest.sha256, number, piece)
+            journal.store_chunk(manifest, number, piece)
         commit = Commit(
             manifest=manifest, commander=self.commander, nonce=uuid.uuid4().hex, take_over=True,
             not_after_ns=self.robot.wall.now_ns() + 10**10,

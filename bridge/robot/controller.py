@@ -20,6 +20,7 @@ from bridge.link.protocol import Commit, Rejected
 from bridge.robot.answers import answer_to, answered, remember_answer, situation_of
 from bridge.robot.base import Base, Rest, Scanner
 from bridge.robot.journal import Journal
+from bridge.robot.mission_reading import read_mission
 from bridge.robot.runner import Position
 from bridge.robot.unstored import Unstored
 from mission.document import Mission, Stop
@@ -85,6 +86,8 @@ class Controller:
         self._closing = False
         self._silent_s = 0.0
         self._mission: Mission | None = None
+        self._newest_mission: Mission | None = None
+        """The one that was taken last."""
         self._run = Run()
         self._unstored = Unstored()
         self._recover()
@@ -131,8 +134,12 @@ class Controller:
             self._mission_taken(mission)
 
     def _stored(self, mission_id: str | None, revision: int | None) -> Mission | None:
+        """A mission that was taken: the last one without reading it again."""
+        last = self._newest_mission
+        if last is not None and (last.id, last.revision) == (mission_id, revision):
+            return last
         held = None if mission_id is None else self._journal.mission(mission_id, revision or 0)
-        return None if held is None else msgspec.json.decode(held[1], type=Mission)
+        return None if held is None else read_mission(held[1])
 
     # Orders and missions, from the link's threads
 
@@ -184,44 +191,48 @@ class Controller:
         return answer_to(order, refused, run)
 
     def take(self, commit: Commit, mission: Mission) -> Rejected | None:
-        """Store a whole mission and make it the one to be run, or to be followed from the next stop on."""
-        with self._lock:
-            before = self.lease
-            lease = claimed(
-                before, commit.commander,
-                fence=commit.fence, take_over=commit.take_over, now_ns=self._command_clock.now_ns(),
-            )  # fmt: skip
-            if isinstance(lease, Refused):
-                return Rejected(reason=lease.reason, messages=(lease.message,))
-            known = self._follows(mission)
-            refused = self._out_of_time(commit, known) or (None if known else self._unfit(mission))
-            if refused:
-                return Rejected(reason=refused.reason, messages=(refused.message,))
-            change = Change(self._run) if known else self._taking(mission)
-            with self._journal.transaction():
-                self._journal.keep_transfer(commit.manifest)
-                self._journal.store_nonce(commit.nonce, mission.digest)
-                self._store_lease(lease)
-                run = self._write(Change(change.run, (*handed_over(before, lease), *change.events)))
-                self._journal.retire_missions(
-                    *((run.mission_id, wanted) for wanted in (run.revision, run.next_revision))
-                )
-            self._unstored.clear()
-            if not known and run.over:
-                self._hold(mission)
-            if not known:
-                self._adopt(run, ordered=run.over)
+        """Store a whole mission and make it the one to be run, or to be followed from the next stop on.
+
+        What takes long for a long mission is done before, without the lock: a stop must not wait for it.
+        """
+        while True:
+            run, held = self.snapshot()
+            unfit = None if _follows(run, mission) else self._unfit(run, held, mission)
+            with self._lock:
+                if _weighed(run) == _weighed(self._run):
+                    return self._take(commit, mission, unfit)
+
+    def _take(self, commit: Commit, mission: Mission, unfit: Refused | None) -> Rejected | None:
+        before = self.lease
+        lease = claimed(
+            before, commit.commander,
+            fence=commit.fence, take_over=commit.take_over, now_ns=self._command_clock.now_ns(),
+        )  # fmt: skip
+        if isinstance(lease, Refused):
+            return Rejected(reason=lease.reason, messages=(lease.message,))
+        known = _follows(self._run, mission)
+        refused = self._out_of_time(commit, known) or unfit
+        if refused:
+            return Rejected(reason=refused.reason, messages=(refused.message,))
+        change = Change(self._run) if known else self._taking(mission)
+        with self._journal.transaction():
+            self._journal.keep_transfer(commit.manifest)
+            self._journal.store_nonce(commit.nonce, mission.digest)
+            self._store_lease(lease)
+            run = self._write(Change(change.run, (*handed_over(before, lease), *change.events)))
+            self._journal.retire_missions(
+                *((run.mission_id, wanted) for wanted in (run.revision, run.next_revision))
+            )
+        self._unstored.clear()
+        if not known:
+            self._newest_mission = mission
+            self._adopt(run, ordered=run.over)
         return None
 
     def waits(self, mission: Mission) -> bool:
         """Whether the mission is to be followed from the next stop on."""
         run = self._run
         return (run.mission_id, run.next_revision) == (mission.id, mission.revision)
-
-    def _follows(self, mission: Mission) -> bool:
-        """Whether this is the mission to be run already, now or from the next stop on."""
-        run = self._run
-        return run.mission_id == mission.id and mission.revision in (run.revision, run.next_revision)
 
     def _taking(self, mission: Mission) -> Change:
         run = self._run
@@ -237,12 +248,11 @@ class Controller:
             return Refused("replayed", "this commit was taken before, and another mission since; push again")
         return None
 
-    def _unfit(self, mission: Mission) -> Refused | None:
+    def _unfit(self, run: Run, held: Mission | None, mission: Mission) -> Refused | None:
         """Why a mission cannot be taken: by this base, during the present run, or with this battery."""
         unfit = self._base.unfit(mission)
         if unfit:
             return Refused("infeasible", unfit)
-        run, held = self._run, self._mission
         if run.over or held is None:
             return self._too_long(mission, first=0)
         return self._unfit_now(run, held, mission) or self._too_long(mission, first=run.at)
@@ -512,6 +522,17 @@ def _faces(pose: Pose, stop: Stop) -> bool:
 def _label(run: Run, stop: Stop) -> str:
     """Names one scan, and no other, however often the stop is scanned."""
     return f"{run.run_id}-{file_name(stop.id)}-{run.scans}"
+
+
+def _follows(run: Run, mission: Mission) -> bool:
+    """Whether this is the mission to be run already, now or from the next stop on."""
+    return run.mission_id == mission.id and mission.revision in (run.revision, run.next_revision)
+
+
+def _weighed(run: Run) -> tuple[object, ...]:
+    """What of a run decides whether a mission can be taken; a pause changes none of it."""
+    wanted = (run.mission_id, run.revision, run.next_revision)
+    return (*wanted, run.run_id, run.at, run.over, run.homing, run.then)
 
 
 def has_work(run: Run) -> bool:

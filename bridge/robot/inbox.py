@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import sqlite3
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import islice
 
 import msgspec
@@ -26,6 +27,7 @@ from bridge.link.protocol import (
 )
 from bridge.robot.controller import Controller
 from bridge.robot.journal import Journal
+from bridge.robot.mission_reading import read_mission
 from bridge.robot.pages import address_of, part_page
 from mission.document import Mission, digest_of
 from mission.problems import problems_of
@@ -71,12 +73,13 @@ class Inbox:
             return refusal
         if self._holds(manifest):
             return Ready(held=tuple(range(manifest.chunks)))
-        shortage = self._journal.room_for(2 * manifest.size)  # in pieces, and then whole
+        self._journal.drop_pieces()
+        shortage = self._journal.room_for(manifest.size)
         if shortage:
             return _no("storage", shortage)
         if self._journal.transfer(mission_id) != manifest:
             self._journal.begin_transfer(manifest)
-        return Ready(held=self._journal.chunks_held(manifest.sha256))
+        return Ready(held=self._journal.chunks_held(manifest))
 
     def _unwelcome(self, mission_id: str, manifest: Manifest) -> Rejected | None:
         if manifest.mission_id != mission_id:
@@ -107,8 +110,8 @@ class Inbox:
 
     def _holds(self, manifest: Manifest) -> bool:
         """Whether this very mission is stored; its bytes may have been written with other spaces."""
-        stored = self._journal.mission(manifest.mission_id, manifest.revision)
-        return stored is not None and stored[0].digest == manifest.digest
+        held = self._journal.held(manifest.mission_id, manifest.revision)
+        return held is not None and held.digest == manifest.digest
 
     def _chunk(self, mission_id: str, number: int, request: Request) -> Reply:
         manifest = self._journal.transfer(mission_id)
@@ -123,7 +126,7 @@ class Inbox:
         shortage = self._journal.room_for(len(request.payload))
         if shortage:
             return _no("storage", shortage)
-        self._journal.store_chunk(manifest.sha256, number, request.payload)
+        self._journal.store_chunk(manifest, number, request.payload)
         return ChunkHeld(index=number, sha256=hashlib.sha256(request.payload).hexdigest())
 
     def _commit(self, mission_id: str, commit: Commit) -> Reply:
@@ -136,6 +139,8 @@ class Inbox:
         if isinstance(mission, Rejected):
             return mission
         refusal = self._controller.take(commit, mission)
+        with suppress(sqlite3.OperationalError):  # there is no room to forget: another time
+            self._journal.drop_pieces()
         return refusal or Accepted(
             mission_id=mission.id, revision=mission.revision, digest=mission.digest,
             already=already, waits=self._controller.waits(mission),
@@ -148,7 +153,7 @@ class Inbox:
 
     def _received(self, manifest: Manifest) -> Mission | Rejected:
         """The mission that has arrived in chunks, if they are all there and give the right hash."""
-        document = self._journal.chunks(manifest.sha256)
+        document = b"".join(self._journal.pieces(manifest))
         if len(document) != manifest.size:
             return _no("incomplete", f"{len(document)} of {manifest.size} bytes have arrived")
         if hashlib.sha256(document).hexdigest() != manifest.sha256:
@@ -160,7 +165,7 @@ class Inbox:
         # Not mission_json.parse: a tenth of its time, and what it refuses besides (keys given twice) the
         # digest shows, which is of what was read.
         try:
-            mission = msgspec.json.decode(document, type=Mission)
+            mission = read_mission(document)
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             return _no("malformed", f"the document: {error}")
         except RecursionError:

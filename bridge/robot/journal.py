@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sqlite3
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
@@ -18,37 +19,23 @@ from typing import IO, TypeVar
 import msgspec
 
 from bridge.link.protocol import Manifest
+from bridge.robot.journal_format import bring_up_to_date, make_tables, put_pieces
 from bridge.robot.reserve import Reserve
-from bridge.robot.sealed_rows import DamagedRow, NewestTransaction, bring_up_to_date, put, sealed, verify
+from bridge.robot.sealed_rows import DamagedRow, NewestTransaction, put, sealed, verify
 from mission.errors import InputError
 from mission.events import AnyEvent, event_of
 from mission.run.orders import Answer
 from mission.run.states import Change, told_of
 
-TABLES = """
-CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL);
-CREATE TABLE IF NOT EXISTS events (
-    number INTEGER PRIMARY KEY AUTOINCREMENT, kind TEXT NOT NULL, run_id TEXT NOT NULL,
-    mission_id TEXT NOT NULL, revision INTEGER NOT NULL, robot_ns INTEGER NOT NULL, body BLOB NOT NULL,
-    seal BLOB NOT NULL);
-CREATE INDEX IF NOT EXISTS events_of_run ON events (run_id, number);
-CREATE TABLE IF NOT EXISTS answers (
-    cmd_id TEXT PRIMARY KEY, order_sha TEXT NOT NULL, body BLOB NOT NULL, seal BLOB NOT NULL);
-CREATE TABLE IF NOT EXISTS missions (
-    mission_id TEXT NOT NULL, revision INTEGER NOT NULL, manifest BLOB NOT NULL, document BLOB NOT NULL,
-    seal BLOB NOT NULL, PRIMARY KEY (mission_id, revision));
-CREATE TABLE IF NOT EXISTS nonces (nonce TEXT PRIMARY KEY, digest TEXT NOT NULL, seal BLOB NOT NULL);
-CREATE TABLE IF NOT EXISTS transfers (
-    mission_id TEXT PRIMARY KEY, manifest BLOB NOT NULL, seal BLOB NOT NULL);
-CREATE TABLE IF NOT EXISTS chunks (
-    sha256 TEXT NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL, seal BLOB NOT NULL,
-    PRIMARY KEY (sha256, number));
-"""
-
 ANSWERS_KEPT = 10_000
 NONCES_KEPT = 10_000
 MISSIONS_KEPT = 4
 """Of those that are not needed; of older ones their names."""
+AT_ONCE = 8
+"""Pieces that are read or forgotten in one go."""
+LET_PASS_S = 0.0005
+"""Between two goes: who lets go of a lock and takes it again at once never lets anybody else have it."""
+UNNAMED = "document NOT IN (SELECT document FROM missions UNION SELECT document FROM transfers)"
 LOCKED_S = 60.0
 """How long another process's write is waited for; it takes milliseconds, on a machine under load seconds."""
 
@@ -70,7 +57,7 @@ class Journal:
         self._lock = threading.RLock()
         self.edge: Callable[[str], None] = lambda moment: None
         """Called just before and just after every commit; where tests let the power or the disk fail."""
-        connection.executescript(TABLES)
+        make_tables(connection)
 
     def verify(self) -> None:
         """Read everything once, and bring what an older stopgo wrote up to date.
@@ -214,15 +201,59 @@ class Journal:
 
     def mission(self, mission_id: str, revision: int) -> tuple[Manifest, bytes] | None:
         """A stored mission, unless only its name has been kept."""
-        rows = self._sealed("missions", "WHERE mission_id = ? AND revision = ?", mission_id, revision)
-        if not rows or not rows[0][3]:
-            return None
-        return msgspec.json.decode(rows[0][2], type=Manifest), bytes(rows[0][3])
+        manifest = self.held(mission_id, revision)
+        return None if manifest is None else (manifest, b"".join(self.pieces(manifest)))
+
+    def held(self, mission_id: str, revision: int) -> Manifest | None:
+        """The same without its document."""
+        rows = self._sealed(
+            "missions", "WHERE mission_id = ? AND revision = ? AND document != 0", mission_id, revision
+        )
+        return msgspec.json.decode(rows[0][2], type=Manifest) if rows else None
+
+    def part(self, manifest: Manifest, start: int, size: int) -> bytes:
+        """So many bytes of a stored mission's document."""
+        first, last = start // manifest.chunk_bytes, (start + size - 1) // manifest.chunk_bytes
+        data = b"".join(self.pieces(manifest, first, last))
+        return data[start - first * manifest.chunk_bytes :][:size]
+
+    def pieces(self, manifest: Manifest, first: int = 0, last: int = 10**9) -> Iterator[bytes]:
+        """The pieces of a mission's document, stored or as far as it arrived; orders pass between them."""
+        document = self._document(manifest)
+        for number in range(first, min(last + 1, manifest.chunks), AT_ONCE):
+            if number > first:
+                time.sleep(LET_PASS_S)
+            clause = "WHERE document = ? AND number BETWEEN ? AND ? ORDER BY number"
+            until = min(number + AT_ONCE - 1, last)
+            yield from (row[2] for row in self._sealed("chunks", clause, document, number, until))
+
+    def _document(self, manifest: Manifest) -> int:
+        """The number of the mission's document, or of the same that is arriving; 0 if there is neither."""
+        whole = (manifest.mission_id, manifest.revision)
+        rows = self._rows("SELECT document FROM missions WHERE mission_id = ? AND revision = ?", *whole)
+        return next((number for (number,) in rows if number), self._arriving(manifest))
+
+    def _arriving(self, manifest: Manifest) -> int:
+        """The number of the document of which pieces are being received; 0 if they are of another."""
+        rows = self._sealed("transfers", "WHERE mission_id = ?", manifest.mission_id)
+        same = rows and _cut(msgspec.json.decode(rows[0][1], type=Manifest)) == _cut(manifest)
+        return int(rows[0][2]) if same else 0
 
     def store_mission(self, manifest: Manifest, document: bytes) -> None:
         """Keep a mission that came by another way than in pieces."""
+        with self.transaction():
+            number = self._new_document()
+            put_pieces(self._connection, number, document, manifest.chunk_bytes)
+            self._name_mission(manifest, number)
+
+    def _name_mission(self, manifest: Manifest, document: int) -> None:
         encoded = msgspec.json.encode(manifest)
         self._write("missions", manifest.mission_id, manifest.revision, encoded, document)
+
+    def _new_document(self) -> int:
+        newest = "SELECT MAX(document) AS number FROM "
+        tables = " UNION ALL ".join(newest + table for table in ("missions", "transfers", "chunks"))
+        return 1 + int(self._rows(f"SELECT COALESCE(MAX(number), 0) FROM ({tables})")[0][0])
 
     def newest_revision(self, mission_id: str) -> Manifest | None:
         """What was stored of a mission last, also when only its name has been kept."""
@@ -231,10 +262,13 @@ class Journal:
         return msgspec.json.decode(rows[0][0], type=Manifest) if rows else None
 
     def keep_transfer(self, manifest: Manifest) -> None:
-        """What has arrived becomes a stored mission, unless it is one already; the transfer is over."""
+        """What has arrived becomes a stored mission, unless it is one already; the transfer is over.
+
+        Its pieces stay where they are: however long the document is, nothing waits for this.
+        """
         with self.transaction():
-            if self.mission(manifest.mission_id, manifest.revision) is None:
-                self.store_mission(manifest, self.chunks(manifest.sha256))
+            if self.held(manifest.mission_id, manifest.revision) is None:
+                self._name_mission(manifest, self._document(manifest))
             self.end_transfer(manifest)
 
     def retire_missions(self, *needed: tuple[str | None, int | None]) -> None:
@@ -244,11 +278,17 @@ class Journal:
         """
         with self.transaction():
             whole = self._rows(
-                "SELECT mission_id, revision, manifest FROM missions WHERE document != x'' ORDER BY rowid"
+                "SELECT mission_id, revision, manifest FROM missions WHERE document != 0 ORDER BY rowid"
             )
             old = [row for row in whole if row[:2] not in needed]
             for mission_id, revision, manifest in old[:-MISSIONS_KEPT]:
-                self._write("missions", mission_id, revision, manifest, b"")
+                self._write("missions", mission_id, revision, manifest, 0)
+
+    def drop_pieces(self) -> None:
+        """Forget the pieces of documents that nothing names any more; orders pass between them."""
+        while self._rows(f"SELECT 1 FROM chunks WHERE {UNNAMED} LIMIT 1"):
+            self._delete("chunks", f"rowid IN (SELECT rowid FROM chunks WHERE {UNNAMED} LIMIT {AT_ONCE})")
+            time.sleep(LET_PASS_S)
 
     def nonce(self, nonce: str) -> str | None:
         """The digest of the mission that was committed with it before."""
@@ -269,27 +309,23 @@ class Journal:
     def begin_transfer(self, manifest: Manifest) -> None:
         """Receive this and forget what was being received, but for pieces of the same document and size."""
         with self.transaction():
-            before = self.transfer(manifest.mission_id)
+            number = self._arriving(manifest) or self._new_document()
             self._delete("transfers", "TRUE")
-            if before is None or _cut(before) != _cut(manifest):
-                self._delete("chunks", "TRUE")
-            self._write("transfers", manifest.mission_id, msgspec.json.encode(manifest))
+            self._write("transfers", manifest.mission_id, msgspec.json.encode(manifest), number)
 
     def end_transfer(self, manifest: Manifest) -> None:
+        self._delete("transfers", "mission_id = ?", manifest.mission_id)
+
+    def store_chunk(self, manifest: Manifest, number: int, data: bytes) -> None:
+        """Store a piece of what is being received."""
         with self.transaction():
-            self._delete("transfers", "mission_id = ?", manifest.mission_id)
-            self._delete("chunks", "sha256 = ?", manifest.sha256)
+            self._write("chunks", self._arriving(manifest), number, data)
 
-    def store_chunk(self, sha256: str, number: int, data: bytes) -> None:
-        self._write("chunks", sha256, number, data)
-
-    def chunks_held(self, sha256: str) -> tuple[int, ...]:
-        rows = self._rows("SELECT number FROM chunks WHERE sha256 = ? ORDER BY number", sha256)
+    def chunks_held(self, manifest: Manifest) -> tuple[int, ...]:
+        """Numbers of the pieces that have arrived."""
+        document = self._arriving(manifest)
+        rows = self._rows("SELECT number FROM chunks WHERE document = ? ORDER BY number", document)
         return tuple(number for (number,) in rows)
-
-    def chunks(self, sha256: str) -> bytes:
-        rows = self._sealed("chunks", "WHERE sha256 = ? ORDER BY number", sha256)
-        return b"".join(data for _, _, data in rows)
 
     def _rows(self, statement: str, *values: object) -> list[tuple]:
         with self._lock:

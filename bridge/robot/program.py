@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections import Counter
@@ -34,6 +35,8 @@ LOOK_S = 1.5
 GONE_S = 5.0
 """After this a token of a robot that does not answer is not waited for."""
 ASK_AGAIN_S = 0.2
+SWITCH_S = 0.0005
+"""How long one thread computes while another waits to: an order waits for its turn some twenty times."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,7 @@ def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     from bridge.link.zenoh_link import Guard, joining, listening
 
     signal.signal(signal.SIGTERM, _leave)
+    sys.setswitchinterval(SWITCH_S)
     keys = KeyExpressions(options.name, options.site)
     held = None if options.keys is None else robots_keys(options.keys, options.name, options.state)
     boot_id = new_boot_id()

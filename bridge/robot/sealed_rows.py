@@ -13,8 +13,6 @@ from pathlib import Path
 
 import msgspec
 
-FORMAT = 2
-"""Of the journal: 1 had no hashes; a newer one is refused, an older one is brought up to date."""
 SEALED = ("facts", "events", "answers", "missions", "nonces", "transfers", "chunks")
 SLOT_BYTES = 24
 _to_disk = getattr(os, "fdatasync", os.fsync)  # macOS has the second only
@@ -48,34 +46,6 @@ def put(connection: sqlite3.Connection, table: str, *values: object) -> None:
     """Write a row, in place of one with its key."""
     marks = ", ".join("?" * (len(values) + 1))
     connection.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", (*values, seal_of(table, values)))
-
-
-def bring_up_to_date(connection: sqlite3.Connection) -> None:
-    """Give the rows of an older journal their seals; the format is then this program's.
-
-    Raises
-    ------
-    Damaged
-        If the journal is a newer program's.
-    """
-    (found,) = connection.execute("PRAGMA user_version").fetchone()
-    if found > FORMAT:
-        raise DamagedRow(
-            f"a newer stopgo wrote it (format {found}; this one reads up to {FORMAT}); update stopgo"
-        )
-    for table in SEALED:
-        names = [name for _, name, *_ in connection.execute(f"PRAGMA table_info({table})")]
-        if "seal" not in names:
-            _seal_all(connection, table, len(names))
-    if found < FORMAT:
-        connection.execute(f"PRAGMA user_version = {FORMAT}")
-
-
-def _seal_all(connection: sqlite3.Connection, table: str, columns: int) -> None:
-    connection.execute(f"ALTER TABLE {table} ADD COLUMN seal BLOB NOT NULL DEFAULT x''")
-    for row in connection.execute(f"SELECT rowid, * FROM {table}").fetchall():
-        seal = seal_of(table, row[1 : columns + 1])
-        connection.execute(f"UPDATE {table} SET seal = ? WHERE rowid = ?", (seal, row[0]))
 
 
 def verify(connection: sqlite3.Connection) -> None:

@@ -166,7 +166,7 @@ class SaysNothingOfItself(Agent):
 
 class TakesDamage(Inbox):
     def _received(self, manifest: Manifest) -> Mission | Rejected:
-        document = self._journal.chunks(manifest.sha256)
+        document = b"".join(self._journal.pieces(manifest))
         try:
             return self._read(document, manifest)
         except ValueError:
@@ -181,7 +181,7 @@ class TakesOldRevisions(Inbox):
 class WantsPiecesInOrder(Inbox):
     def _chunk(self, mission_id: str, number: int, request: Request) -> Any:
         manifest = self._journal.transfer(mission_id)
-        held = () if manifest is None else self._journal.chunks_held(manifest.sha256)
+        held = () if manifest is None else self._journal.chunks_held(manifest)
         if number > len(held):
             return Rejected(reason="incomplete", messages=("in order, please",))
         return super()._chunk(mission_id, number, request)

@@ -6,22 +6,24 @@ import errno
 import os
 import re
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
 import pytest
 
+from bridge.link.protocol import Manifest
 from bridge.robot.journal import (
     LOCKED_S,
     MISSIONS_KEPT,
-    TABLES,
     Owner,
     memory_journal,
     open_journal,
     shared_journal,
 )
+from bridge.robot.journal_format import FORMAT, TABLES
 from bridge.robot.reserve import LEAST_FREE_BYTES, RESERVE_BYTES, Reserve
-from bridge.robot.sealed_rows import FORMAT, SEALED
+from bridge.robot.sealed_rows import SEALED, put
 from bridge.station.watch import event_line
 from mission.errors import AnswerIsNo, InputError
 from mission.events import Started, UnknownKind, event_of
@@ -96,16 +98,48 @@ def test_a_state_path_that_is_a_file_is_refused(tmp_path: Path) -> None:
         pass
 
 
-def journal_of_the_first_format(folder: Path) -> None:
-    """A journal as it was before rows had seals."""
+FORMER_TABLES = """
+CREATE TABLE missions (
+    mission_id TEXT NOT NULL, revision INTEGER NOT NULL, manifest BLOB NOT NULL, document BLOB NOT NULL,
+    seal BLOB NOT NULL, PRIMARY KEY (mission_id, revision));
+CREATE TABLE transfers (mission_id TEXT PRIMARY KEY, manifest BLOB NOT NULL, seal BLOB NOT NULL);
+CREATE TABLE chunks (
+    sha256 TEXT NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL, seal BLOB NOT NULL,
+    PRIMARY KEY (sha256, number));
+"""
+"""Of format 2, where they differ."""
+
+
+def journal_of_the_second_format(folder: Path) -> None:
+    """A journal as it was when each mission lay in one row; revision 1 is kept by its name only."""
     with open_journal(folder, "r1") as journal:
         field = Field(journal=journal)
-        field.station().push(corridor())
+        field.station().push(corridor(revision=2))
+        stored = journal.mission(corridor().id, 2)
+    assert stored is not None
+    manifest, document = stored
+    connection = sqlite3.connect(folder / "journal.sqlite")
+    for table in ("missions", "transfers", "chunks"):
+        connection.execute(f"DROP TABLE {table}")
+    connection.executescript(FORMER_TABLES)
+    body = msgspec.json.encode(manifest)
+    put(connection, "missions", manifest.mission_id, 1, body, b"")
+    put(connection, "missions", manifest.mission_id, 2, body, document)
+    put(connection, "transfers", "other", body)
+    put(connection, "chunks", manifest.sha256, 0, document[:100])
+    connection.execute("PRAGMA user_version = 2")
+    connection.commit()
+    connection.close()
+
+
+def journal_of_the_first_format(folder: Path) -> None:
+    """A journal as it was before rows had seals."""
+    journal_of_the_second_format(folder)
     connection = sqlite3.connect(folder / "journal.sqlite")
     connection.execute("DROP INDEX events_of_run")
     for table in SEALED:
         connection.execute(f"ALTER TABLE {table} RENAME TO new_{table}")
-    connection.executescript(re.sub(r",\s*seal BLOB NOT NULL", "", TABLES))
+    connection.executescript(re.sub(r",\s*seal BLOB NOT NULL", "", FORMER_TABLES + TABLES))
     for table in SEALED:
         columns = ", ".join(name for _, name, *_ in connection.execute(f"PRAGMA table_info({table})"))
         connection.execute(f"INSERT INTO {table} SELECT {columns} FROM new_{table}")
@@ -117,14 +151,29 @@ def journal_of_the_first_format(folder: Path) -> None:
     (folder / "newest").unlink()
 
 
-def test_a_journal_of_the_first_format_is_brought_up_to_date(tmp_path: Path) -> None:
-    journal_of_the_first_format(tmp_path)
+@pytest.mark.parametrize("former", [journal_of_the_first_format, journal_of_the_second_format])
+def test_a_journal_of_a_former_format_is_brought_up_to_date(
+    tmp_path: Path, former: Callable[[Path], None]
+) -> None:
+    former(tmp_path)
     for state in ("READY", "PAUSED"):
         with open_journal(tmp_path, "r1") as journal:
             field = Field(journal=journal)
             assert field.controller.run.state == state
+            assert journal.mission(corridor().id, 1) is None
+            assert journal.newest_revision(corridor().id) is not None
             verb: Verb = "start" if state == "READY" else "resume"
             assert field.order(verb, cmd_id=verb).outcome == "ok"
+
+
+def test_a_flipped_bit_in_a_mission_of_a_former_format_is_found(tmp_path: Path) -> None:
+    journal_of_the_second_format(tmp_path)
+    connection = sqlite3.connect(tmp_path / "journal.sqlite")
+    connection.execute("UPDATE missions SET document = replace(document, '0.3', '0.8') WHERE revision = 2")
+    connection.commit()
+    connection.close()
+    with pytest.raises(InputError, match="a row of missions"), open_journal(tmp_path, "r1"):
+        pass
 
 
 def test_a_journal_of_a_newer_stopgo_is_refused(tmp_path: Path) -> None:
@@ -166,6 +215,38 @@ def test_missions_that_no_run_needs_are_retired_and_their_names_kept() -> None:
     assert newest.revision == MISSIONS_KEPT + 3
     with pytest.raises(AnswerIsNo, match="older_revision"):
         station.push(corridor(revision=1))
+
+
+def test_of_what_is_retired_or_no_longer_sent_no_piece_stays() -> None:
+    field = Field()
+    station = field.station()
+    for revision in range(1, MISSIONS_KEPT + 4):
+        station.push(corridor(revision=revision))
+    ((held,),) = field.journal._rows("SELECT COUNT(DISTINCT document) FROM chunks")
+    assert held == MISSIONS_KEPT + 1
+
+
+def test_nothing_that_is_announced_touches_a_stored_mission() -> None:
+    """Another manifest that claims the same document has pieces of its own."""
+    field = Field()
+    field.station().push(corridor())
+    stored = field.journal.mission(corridor().id, 1)
+    assert stored is not None
+    claims = msgspec.structs.replace(stored[0], revision=2, digest="0" * 64)
+    field.journal.begin_transfer(claims)
+    field.journal.store_chunk(claims, 0, b"x")
+    assert field.journal.mission(corridor().id, 1) == stored
+
+
+def test_any_part_of_a_document_is_given() -> None:
+    journal = memory_journal()
+    document = bytes(range(256)) * 20
+    manifest = Manifest(
+        mission_id="m", revision=1, digest="d", size=len(document), sha256="s", chunk_bytes=1024
+    )
+    journal.store_mission(manifest, document)
+    for start, size in ((0, 1024), (1000, 2000), (5000, 1000), (6000, 10)):
+        assert journal.part(manifest, start, size) == document[start : start + size]
 
 
 def test_a_push_that_would_take_the_space_kept_for_stops_is_rejected(

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+import threading
 
 import msgspec
 import pytest
 
 from bridge.link.link import Request
 from bridge.link.protocol import CHUNK_BYTES, Accepted, Malformed, Manifest, Ready, Rejected, encode
+from bridge.robot.mission_reading import read_mission
 from mission.document import Mission, canonical, sealed
 from mission.errors import AnswerIsNo, OutcomeUnknown
 from mission.files.mission_json import parse
 from tests.bridge.world import Field, corridor
+
+LAST_NET_S = 60.0
 
 
 def manifest_of(mission: Mission, document: bytes) -> Manifest:
@@ -171,3 +175,50 @@ def test_a_mission_of_any_name_can_be_pushed(mission_id: str) -> None:
     station = field.station()
     assert station.push(named).mission_id == mission_id
     assert station.mission(mission_id, 1) == named
+
+
+def test_a_stop_does_not_wait_until_a_mission_has_been_weighed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long mission takes a second to be weighed; a pause that comes then is carried out meanwhile."""
+    field = Field()
+    station = field.station()
+    station.push(corridor())
+    field.order("start")
+    field.work_until(lambda run: run.stop_state == "NAVIGATING")
+    states: list[str] = []
+
+    def pause_meanwhile(mission: Mission) -> str:
+        pausing = threading.Thread(target=lambda: field.order("pause"), daemon=True)
+        pausing.start()
+        pausing.join(LAST_NET_S)
+        states.append(field.controller.run.state)
+        return ""
+
+    monkeypatch.setattr(field.base, "unfit", pause_meanwhile)
+    assert station.push(corridor(revision=2)).waits
+    assert states == ["PAUSED"]
+
+
+def test_a_mission_is_weighed_again_if_the_run_went_on_meanwhile(monkeypatch: pytest.MonkeyPatch) -> None:
+    field = Field()
+    station = field.station()
+    station.push(corridor())
+    field.order("start")
+    field.work_until(lambda run: run.stop_state == "NAVIGATING")
+    weighed: list[str] = []
+
+    def abort_meanwhile(mission: Mission) -> str:
+        weighed.append(field.controller.run.state)
+        field.order("abort")
+        return ""
+
+    monkeypatch.setattr(field.base, "unfit", abort_meanwhile)
+    assert not station.push(corridor(revision=2)).waits
+    assert weighed == ["RUNNING", "ABORTED"]
+    assert field.controller.run.state == "READY"
+
+
+def test_what_is_wrong_with_a_stop_is_told_with_its_place() -> None:
+    document = msgspec.to_builtins(corridor(stops=2))
+    document["stops"][1]["x"] = "far"
+    with pytest.raises(msgspec.ValidationError, match=r"\$\.stops\[1\]\.x"):
+        read_mission(canonical(document))
