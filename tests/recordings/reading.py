@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,21 @@ Cell = tuple[dict[str, int], Any]
 def cells(path: Path, entity: str, component: str) -> list[Cell]:
     """Every cell of one component of one entity, in the order of the file."""
     found: list[Cell] = []
-    for chunk in chunks(path):
+    for chunk in _chunks(path, _version(path)):
         if str(chunk.entity_path) == entity:
             found += _cells(chunk, component)
     return found
+
+
+def _version(path: Path) -> tuple[int, ...]:
+    told = path.stat()
+    return told.st_ino, told.st_size, told.st_mtime_ns
+
+
+@lru_cache(maxsize=4)
+def _chunks(path: Path, version: tuple[int, ...]) -> list[Any]:
+    """What a file holds, read once for all that a test asks of it."""
+    return list(chunks(path))
 
 
 def static(path: Path, entity: str, component: str) -> Any:
