@@ -23,6 +23,7 @@ from bridge.mavlink.line.messages import (
     on_board_beat,
     set_origin,
 )
+from bridge.mavlink.line.parameter_reading import read_parameters
 from bridge.mavlink.line.peer import Peer, found
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import MessageQueue, Who, wire
@@ -209,7 +210,8 @@ class OnboardAutopilot:
 
     def ask_when_it_gives_up(self) -> None:
         """Learn how long it drives on by a velocity that is not told again."""
-        told = self.peer.parameter(self.kind.driving.gives_up_parameter)
+        name = self.kind.driving.gives_up_parameter
+        told = read_parameters(self.peer, [name]).get(name)
         if told is not None:
             self.gives_up_s = max(SOONEST_GIVEN_UP_S, told)
 
