@@ -80,7 +80,6 @@ KIND_COLOURS: dict[str, Colour] = {
 OUTLINE: Colour = (110, 118, 135, 255)
 HOLE: Colour = (175, 95, 120, 255)
 ROOM: Colour = (58, 64, 78, 255)
-ROOM_NAME: Colour = (118, 122, 130, 255)
 PASSABLE: Colour = (232, 236, 245, 255)
 BLOCKED: Colour = VERMILION
 DRIVE: Colour = (38, 66, 104, 255)
@@ -88,11 +87,8 @@ STOP_AREA: Colour = (50, 120, 85, 255)
 GAP: Colour = (255, 255, 255, 255)
 RAY: Colour = (235, 215, 110, 70)
 EYE: Colour = (255, 235, 120, 255)
-STOP: Colour = GREEN
-RUNNER_UP: Colour = ORANGE
 PAIR: Colour = (60, 190, 150, 160)
 BRIDGE: Colour = VERMILION
-DOORWAY: Colour = (0, 114, 190, 255)
 WITHDRAWN: Colour = (112, 112, 122, 255)
 ROUTE: Colour = YELLOW
 RETURN: Colour = (158, 150, 60, 255)
@@ -101,6 +97,16 @@ DRIVEN: Colour = PURPLE
 ACQUIRED: Colour = SKY
 LOST: Colour = VERMILION
 SLAB: Colour = (62, 68, 80, 255)
+
+LABEL_GROUNDS: tuple[Colour, ...] = ((18, 20, 26, 255), (121, 122, 125, 255))
+"""What Rerun draws the letters of a label on, in its dark and in its light theme, as measured on pictures.
+
+The letters have the colour of what is named: what has a name is light."""
+ROOM_NAME: Colour = (216, 219, 225, 255)
+STOP: Colour = (116, 243, 182, 255)
+RUNNER_UP: Colour = (255, 212, 140, 255)
+DOORWAY: Colour = (190, 225, 255, 255)
+WITHDRAWN_STOP: Colour = (216, 216, 222, 255)
 
 STATE_COLOURS: dict[str, Colour] = {
     "IDLE": (110, 110, 120, 255),

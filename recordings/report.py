@@ -191,7 +191,8 @@ def _findings(nouns: Nouns) -> list[str]:
 _COLOURS = (
     "- targets: blue seen by a stop, light grey not seen, dark grey seen from no candidate, yellow new",
     "- of a run: bold blue was scanned, thick orange-red was planned and lost; a cross is a stop left out",
-    "- stops green with their number, doorway stops blue; route yellow, way back dark yellow; run purple",
+    "- stops light green with their number, doorway stops light blue",
+    "- route yellow, way back dark yellow; run purple",
     "- grey: stops and ways that a revision has withdrawn during a run",
     "- openings: white passable, orange-red not",
     "- candidates: yellow kept, reddish dropped; point at one to see why",

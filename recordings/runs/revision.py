@@ -61,7 +61,7 @@ def draw_change(canvas: Canvas, change: RevisionChange, names: entities.Revision
         _draw_legs(names, draw, entities.NEW_ROUTE, route_lines(canvas, legs, colours, above=high))
     if change.withdrawn:
         labels = [f"{stop.id} until revision {names.number}" for stop in change.withdrawn]
-        marks = stop_marks(canvas, change.withdrawn, colour=palette.WITHDRAWN, labels=labels, above=low)
+        marks = stop_marks(canvas, change.withdrawn, colour=palette.WITHDRAWN_STOP, labels=labels, above=low)
         _draw_stops(names, draw, entities.WITHDRAWN, marks)
     if change.added:
         _draw_stops(names, draw, entities.NEW_STOPS, stop_marks(canvas, change.added, above=high))

@@ -131,8 +131,8 @@ def _plot_coverage(canvas: Canvas, selection: Selection) -> None:
     chosen, required = entities.COVERAGE_CHOSEN, entities.COVERAGE_REQUIRED
     canvas.columns(chosen, index, rr.Scalars.columns(scalars=reached))
     canvas.columns(required, index, rr.Scalars.columns(scalars=np.full(count + 1, selection.required * 100)))
-    canvas.show(chosen, rr.SeriesLines(colors=palette.STOP, names="coverage of the chosen stops", widths=2))
-    canvas.show(required, rr.SeriesLines(colors=palette.ROOM_NAME, names="required", widths=1))
+    canvas.show(chosen, rr.SeriesLines(colors=palette.GREEN, names="coverage of the chosen stops", widths=2))
+    canvas.show(required, rr.SeriesLines(colors=palette.OUTLINE, names="required", widths=1))
     canvas.say(
         f"selection ({selection.method}): {count} stops, coverage {percent(selection.coverage)},"
         f" at least {selection.bound} are needed",

@@ -20,6 +20,10 @@ TOLD_APART = {
     "seen and new": (palette.SEEN.colour, palette.NEW.colour),
     "acquired and lost": (palette.ACQUIRED, palette.LOST),
     "stops and doorways": (palette.STOP, palette.DOORWAY),
+    "a stop and its runners-up": (palette.STOP, palette.RUNNER_UP),
+    "stops and withdrawn ones": (palette.STOP, palette.WITHDRAWN_STOP),
+    "stops and the route": (palette.STOP, palette.ROUTE),
+    "stops and those arrived at": (palette.STOP, palette.ARRIVED.colour),
     "scanned and skipped": (palette.SCANNED.colour, palette.SKIPPED.colour),
     "passable and not": (palette.PASSABLE, palette.BLOCKED),
     "route and way back": (palette.ROUTE, palette.RETURN),
@@ -40,9 +44,19 @@ def test_states_and_runs_are_told_apart_by_every_eye(eye: str) -> None:
         assert min(distance(a, b, eye) for a, b in combinations(colours, 2)) >= APART
 
 
-@pytest.mark.parametrize("colour", [palette.STOP, palette.DOORWAY, palette.ROOM_NAME, palette.WITHDRAWN])
-def test_labels_are_read_on_a_light_and_on_a_dark_ground(colour: palette.Colour) -> None:
-    assert min(contrast(colour, (255, 255, 255, 255)), contrast(colour, BACKGROUND)) >= 3.0
+NAMED = (
+    *(palette.STOP, palette.DOORWAY, palette.WITHDRAWN_STOP, palette.RUNNER_UP),
+    *(palette.ROOM_NAME, palette.EYE),
+)
+"""Colours of what has a name."""
+
+
+@pytest.mark.parametrize("ground", palette.LABEL_GROUNDS)
+@pytest.mark.parametrize("colour", NAMED)
+def test_names_are_read_in_the_light_and_in_the_dark_theme(
+    colour: palette.Colour, ground: palette.Colour
+) -> None:
+    assert contrast(colour, ground) >= 3.0
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ VIEWS: dict[str, dict[str, tuple[tuple[str, dict[str, Any]], dict[str, palette.C
         "Planning": (("stage_step", {"sequence": 4}), {
             "Step by step (timeline: stage_step)": palette.NEW.colour,
             "This step (timeline: stage_step)": None,
-            "Coverage, % (timeline: stage_step)": palette.STOP,
+            "Coverage, % (timeline: stage_step)": palette.GREEN,
         }),
         "Stops": (("stop", {"sequence": 2}), {
             "Why this stop (timeline: stop)": palette.LOST,
