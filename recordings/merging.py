@@ -8,7 +8,7 @@ from pathlib import Path
 from mission.errors import InputError
 from mission.files.atomic import replacing
 from recordings import entities
-from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
+from recordings.canvas import Canvas, Sheet, layout_alone, mission_origin, open_canvas
 from recordings.carried.checking import carry_end
 from recordings.carried.plan import origin_in, planned_extent
 from recordings.carried.reading import Recording
@@ -25,23 +25,34 @@ def merge(recordings: Sequence[Recording], out: Path) -> None:
     InputError
         When they are of several missions or origins, or `out` is one of them or cannot be written.
     """
-    ordered = sorted(recordings, key=lambda item: entities.PROPERTY_PLAN not in item.contents.properties)
+    ordered = _plans_first(recordings)
     _must_fit(ordered, out)
-    missions = missions_of(ordered)
-    if not missions:
-        raise InputError(f"{out}: no recording carries its mission; plan and record again")
-    runs = tuple(dict.fromkeys(str(log.run_id) for item in ordered for log in item.logs))
-    extents = (planned_extent(item) for item in ordered)
-    sheet = Sheet(
-        recording_id=ordered[0].mission_id,
+    with replacing(out) as (temporary,), open_canvas(_sheet(ordered)) as canvas:
+        _fill(canvas, ordered)
+        temporary.write_bytes(canvas.taken())
+
+
+def layout_of(recordings: Sequence[Recording]) -> bytes:
+    """The layout of what `merge` writes: a browser draws what it has so far, and makes a layout of its own
+    for a recording that comes before it.
+    """
+    return layout_alone(_sheet(_plans_first(recordings)))
+
+
+def _plans_first(recordings: Sequence[Recording]) -> list[Recording]:
+    return sorted(recordings, key=lambda item: entities.PROPERTY_PLAN not in item.contents.properties)
+
+
+def _sheet(recordings: Sequence[Recording]) -> Sheet:
+    missions = missions_of(recordings)
+    extents = (planned_extent(item) for item in recordings)
+    return Sheet(
+        recording_id=recordings[0].mission_id,
         name=missions[-1].name,
         origin=mission_origin(missions[0]),
         extent=next((item for item in extents if item is not None), mission_extent(missions[-1])),
-        runs=runs,
+        runs=tuple(dict.fromkeys(str(log.run_id) for item in recordings for log in item.logs)),
     )
-    with replacing(out) as (temporary,), open_canvas(sheet) as canvas:
-        _fill(canvas, ordered)
-        temporary.write_bytes(canvas.taken())
 
 
 def _must_fit(recordings: Sequence[Recording], out: Path) -> None:
@@ -50,6 +61,8 @@ def _must_fit(recordings: Sequence[Recording], out: Path) -> None:
         raise InputError(f"{out}: one recording is of one mission; these are of {len(ids)}: {', '.join(ids)}")
     if len({origin_in(item) for item in recordings}) > 1:
         raise InputError(f"{out}: the recordings' origins differ: their missions begin at different places")
+    if not missions_of(recordings):
+        raise InputError(f"{out}: no recording carries its mission; plan and record again")
     if any(out.resolve() == item.path.resolve() for item in recordings):
         raise InputError(f"{out}: is one of the recordings to be merged; give another name")
 

@@ -21,9 +21,10 @@ from urllib.parse import quote
 
 from mission.errors import InputError
 from mission.figures import percent
+from mission.files.atomic import write_atomic
 from mission.ports import free_port
 from recordings.compact import VIEWER
-from recordings.merging import merge
+from recordings.merging import layout_of, merge
 from recordings.page import report_html, whole_page
 from recordings.page.from_recordings import subject_of
 from recordings.page.words import grid, row, shown, tag
@@ -100,7 +101,9 @@ class RunSite:
         out = self.kept / f"{mission}.rrd"
         newest = max(path.stat().st_mtime_ns for path in paths)
         if not out.exists() or out.stat().st_mtime_ns < newest:
-            merge([item.recording for item in _read(paths).recordings], out)
+            read = [item.recording for item in _read(paths).recordings]
+            merge(read, out)
+            write_atomic(out, layout_of(read) + out.read_bytes())
         return SentPage(out.read_bytes(), "application/octet-stream")
 
     def _report(self, files: Sequence[str]) -> SentPage:

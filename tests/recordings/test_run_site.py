@@ -9,6 +9,7 @@ from http.client import HTTPConnection
 from pathlib import Path
 
 import pytest
+from rerun.chunk import RrdReader
 
 from mission.__main__ import main
 from recordings.read import check
@@ -56,10 +57,15 @@ def test_the_list_leads_to_each_missions_report_and_recording(site: RunSite) -> 
     assert "<b>.rrd" not in page
 
 
-def test_plan_and_run_are_one_recording_that_the_viewer_may_load(site: RunSite, tmp_path: Path) -> None:
+def test_plan_and_run_are_one_recording_behind_its_layout(site: RunSite, tmp_path: Path) -> None:
     status, headers, body = asked(site, f"/{world.MISSION_ID}.rrd")
     assert (status, headers["Access-Control-Allow-Origin"]) == (200, site.viewer)
-    (tmp_path / "merged.rrd").write_bytes(body)
+    head = body[:12]
+    layout, merged = (head + part for part in body.split(head)[1:])
+    (tmp_path / "layout.rbl").write_bytes(layout)
+    kinds = {store.kind for store in RrdReader(tmp_path / "layout.rbl").blueprints()}
+    assert kinds == {"blueprint"} and not RrdReader(tmp_path / "layout.rbl").recordings()
+    (tmp_path / "merged.rrd").write_bytes(merged)
     assert check(tmp_path / "merged.rrd").properties.keys() >= {"plan", "run"}
 
 
