@@ -48,10 +48,6 @@ class Busy:
         weights = np.full(len(points), weight)
         return Busy(np.concatenate([self.xy, points]), np.concatenate([self.weight, weights]))
 
-    def of_weight(self, weight: float) -> Busy:
-        there = self.weight == weight
-        return Busy(self.xy[there], self.weight[there])
-
     def near(self, low: FloatArray, high: FloatArray) -> Busy:
         """Those between two corners, in their order."""
         begin = np.searchsorted(self._sorted_x, low[0], side="right")
@@ -84,7 +80,7 @@ class Label:
 
     @property
     def points(self) -> FloatArray:
-        """Points all over it, for other labels to keep off."""
+        """Points (28, 2) all over it, from corner to corner, for other labels to keep off."""
         grid = np.stack(np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 4)), axis=-1).reshape(-1, 2)
         return self.centre + grid * self.half
 
@@ -96,26 +92,31 @@ def room_labels(rooms: tuple[Room, ...], sheet: PaperSheet, *, avoid: Busy) -> s
     for that has no label here.
     """
     labels: list[Label] = []
-    written = np.empty((0, 2))
+    written = np.empty((0, 28, 2))
     # The smallest rooms first: they have the least choice.
     for room in sorted((room for room in rooms if room.polygons), key=lambda room: room.area):
         label = _label(room, sheet, avoid, written)
         if label is not None:
             labels.append(label)
-            written = np.concatenate([written, label.points])
+            written = np.concatenate([written, label.points[None]])
     style: dict[str, object] = {"paint_order": "stroke", "stroke": "#ffffff", "stroke_width": 0.5}
     drawn = ("".join(_lines(label)) for label in labels)
     return group("names", drawn, text_anchor="middle", fill="#222222", stroke_linejoin="round", **style)
 
 
 def _label(room: Room, sheet: PaperSheet, avoid: Busy, written: FloatArray) -> Label | None:
-    """The fullest that crosses no wall and no other label; they are at the points `written` (n, 2)."""
+    """The fullest that crosses no wall and no other label; they are at the points `written` (n, 28, 2)."""
     rings = [sheet.on_paper(ring) for part in room.polygons for ring in part.rings]
     for layouts in _layouts(room, max(float(np.ptp(np.concatenate(rings)[:, 0])) - 1.0, LEAST)):
-        placed = (_placed(lines, rings, avoid, written) for lines in layouts)
-        clear = [label for label in placed if not label.crosses]
-        if clear:
-            return min(clear, key=lambda label: label.cost)
+        best: Label | None = None
+        for lines in layouts:
+            label = _placed(lines, rings, avoid, written)
+            if not label.crosses and (best is None or label.cost < best.cost):
+                best = label
+            if best is not None and not best.cost:
+                return best
+        if best is not None:
+            return best
     return None
 
 
@@ -166,16 +167,18 @@ def _best_place(
     low, high = corners.min(axis=0), corners.max(axis=0)
     x, y = np.linspace(low, high, _TRIES).T
     tried = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    (wx, wy), (left, bottom), (right, top) = written.T, low - half, high + half
-    close = written[(wx > left) & (wx < right) & (wy > bottom) & (wy < top)]
+    touching = (written[:, -1] > low - half) & (written[:, 0] < high + half)
+    around = written[touching.all(axis=1)].reshape(-1, 2)
+    close = around[((around > low - half) & (around < high + half)).all(axis=1)]
     busy = avoid.near(low - half, high + half).and_also(LABEL, close)
     outside = OUTSIDE * _outside(x, y, half, rings)
     cost = _covered(x, y, half + AROUND, busy) + outside
     far = np.hypot(*((tried - (low + high) / 2) / (high - low + 1e-9)).T)
     order = np.lexsort((np.arange(len(tried)), np.round(far, 6), cost))
     best = order[0]
-    on_way = _covered(x, y, half + AROUND, busy.of_weight(WAY))
-    return float(cost[best]), float(cost[best] - on_way[best]), np.asarray(tried[best])
+    way = busy.xy[busy.weight == WAY]
+    on_way = WAY * np.count_nonzero((np.abs(way - tried[best]) < half + AROUND).all(axis=1))
+    return float(cost[best]), float(cost[best] - on_way), np.asarray(tried[best])
 
 
 def _covered(x: FloatArray, y: FloatArray, half: FloatArray, avoid: Busy) -> FloatArray:
@@ -204,7 +207,8 @@ def inside(x: FloatArray, y: FloatArray, rings: list[FloatArray]) -> BoolArray:
         with np.errstate(divide="ignore", invalid="ignore"):
             at = ring[:, 0] + (level - ring[:, 1]) * (after[:, 0] - ring[:, 0]) / (after[:, 1] - ring[:, 1])
         at = np.where(spans, at, -np.inf)
-        result ^= (x[None, :, None] < at[:, None]).sum(axis=2) % 2 == 1
+        for edge in np.flatnonzero(spans.any(axis=0)):
+            result ^= x < at[:, edge, None]
     return result
 
 
