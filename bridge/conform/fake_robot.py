@@ -61,14 +61,14 @@ class MeddledLink:
     def distrusted(self) -> str:
         return self._link.distrusted
 
-    def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
+    def serve(self, key: str, answer: Answering) -> None:
         def answered(request: Request) -> bytes:
             with self._lock:
                 self.asked.append(Asked(request.key.removeprefix(f"{self._keys.root}/"), request))
             return self.meddle(request, answer)
 
         self.served[key] = answer
-        self._link.serve(key, answered, bulk=bulk)
+        self._link.serve(key, answered)
 
     def serve_beside(self, key: str, answer: Answering) -> None:
         """Answer as another robot of the same name would."""

@@ -14,6 +14,7 @@ from bridge.conform.trial_mission import trial_mission
 from bridge.link.protocol import (
     LOG_PAGE,
     POSE_PAGE,
+    RECORD,
     VERSION,
     Booted,
     Commit,
@@ -21,6 +22,8 @@ from bridge.link.protocol import (
     LogPage,
     Malformed,
     PosePage,
+    RecordIndex,
+    RecordPage,
     Rejected,
     Watching,
     encode,
@@ -112,9 +115,23 @@ def poses_come_in_pages(bench: RobotBench) -> None:
 
 
 def parameters_must_be_numbers(bench: RobotBench) -> None:
-    for key in (bench.keys.log, bench.keys.poses):
+    keys = (bench.keys.log, bench.keys.poses, *((bench.keys.record,) if keeps_a_record(bench) else ()))
+    for key in keys:
         for value in ("-1", "1.5", "many", "9" * 30):
             bench.refuses_to_read(key, b"", f"since={value}", since=value)
+
+
+def keeps_a_record(bench: RobotBench) -> bool:
+    return RECORD in bench.info().capabilities
+
+
+def record_tells_its_runs(bench: RobotBench) -> None:
+    if not keeps_a_record(bench):
+        raise NotTried(f"the robot does not name the capability `{RECORD}`")
+    runs = [kept.run_id for kept in bench.ask_for(RecordIndex, bench.keys.record).runs]
+    must(len(runs) == len(set(runs)), "the record tells a run twice")
+    unknown = bench.ask_for(RecordPage, bench.keys.record, run="not-there", since="0")
+    must(not unknown.entries and not unknown.newest, "there are entries of a run that never was")
 
 
 def a_mission_that_is_not_there_is_no_mission(bench: RobotBench) -> None:
@@ -253,6 +270,7 @@ QUESTIONS: tuple[Requirement[RobotBench], ...] = (
     Requirement("Messages", "what is no JSON is Malformed", what_is_no_json_is_malformed),
     Requirement("Messages", "a state is small, whatever the mission", states_are_bounded),
     Requirement("What zenoh must be told", "a message above 1 MB does no harm", oversize_does_no_harm),
+    Requirement("The record of a run", "it tells the runs it has, each once", record_tells_its_runs),
     Requirement("Events", "numbered from 1 without gaps", log_has_no_gaps),
     Requirement("Why something was refused", "a mission that is not there: `no_mission`",
                 a_mission_that_is_not_there_is_no_mission),

@@ -7,8 +7,8 @@ import msgspec
 from bridge.conform.requirements import NotTried, Requirement, must
 from bridge.conform.robot_bench import OVER, RobotBench, read, rejects, told_of
 from bridge.conform.robot_orders import as_another, ready, refuses_what_means_nothing
-from bridge.conform.robot_questions import states_are_bounded
-from bridge.link.protocol import POSE_PAGE, Accepted, PosePage
+from bridge.conform.robot_questions import keeps_a_record, states_are_bounded
+from bridge.link.protocol import POSE_PAGE, RECORD, RECORD_PAGE, Accepted, PosePage, RecordEntry, RecordPage
 from mission.document import Mission, sealed
 from mission.events import (
     AnyEvent,
@@ -27,6 +27,8 @@ RUN_S = 180.0
 """How long a run of the trial mission may take."""
 MANY_STOPS, MANY_SKIPPED = 110, 105
 """More than a state lists, and more events than a page has."""
+RECORD_S = 10.0
+"""Until the end of a run is written down."""
 NEAR_M = 0.1
 
 
@@ -234,6 +236,50 @@ def _next(bench: RobotBench, mission: Mission, **changes: object) -> Mission:
     return sealed(msgspec.structs.replace(mission, revision=revision, **changes))
 
 
+def the_record_has_no_gaps(bench: RobotBench) -> None:
+    """Every page is believed only where its seal holds, as every answer is."""
+    if not keeps_a_record(bench):
+        raise NotTried(f"the robot does not name the capability `{RECORD}`")
+    _, answer = _started(bench)
+    run_id = answer.run_id or ""
+    bench.wait_for_state(*OVER, within_s=RUN_S)
+    entries = bench.wait(lambda: _record(bench, run_id), RECORD_S, f"the record has no end of run {run_id}")
+    seqs = [pose.seq for entry in entries for pose in entry.poses]
+    must(seqs == list(range(seqs[0], seqs[-1] + 1)), "poses are missing from the record, or are there twice")
+    times = [pose.robot_ns for entry in entries for pose in entry.poses]
+    must(times == sorted(times), "the times of the record's poses go back")
+    middle = len(entries) // 2
+    page = bench.ask_for(RecordPage, bench.keys.record, run=run_id, since=str(middle))
+    again = list(page.entries)
+    must(again == entries[middle:][: len(again)], "an entry is another when it is read again")
+    late = bench.ask_for(RecordPage, bench.keys.record, run=run_id, time=str(times[-1] - 1))
+    must(late.entries and late.entries[0].poses[-1].robot_ns >= times[-1], "`time` is not heeded")
+
+
+def _record(bench: RobotBench, run_id: str) -> list[RecordEntry] | None:
+    """All entries, once the last tells that the run is over."""
+    entries: list[RecordEntry] = []
+    newest = 1
+    while len(entries) < newest:
+        since = entries[-1].number if entries else 0
+        page = bench.ask_for(RecordPage, bench.keys.record, run=run_id, since=str(since))
+        must(page.run_id == run_id and page.since == since, "a page tells another run or number than asked")
+        must(
+            len(page.entries) <= RECORD_PAGE, f"a page has {len(page.entries)} entries; at most {RECORD_PAGE}"
+        )
+        numbers = [entry.number for entry in page.entries]
+        must(
+            numbers == list(range(since + 1, since + 1 + len(numbers))), f"the entries are numbered {numbers}"
+        )
+        must(not page.missing, "the robot has written nothing of the run's end")
+        if not page.entries:
+            return None
+        entries += page.entries
+        newest = page.newest
+    over = any(state.state in OVER for entry in entries for state in entry.states)
+    return entries if over else None
+
+
 def poses_tell_run_and_boot(bench: RobotBench) -> None:
     _, answer = _started(bench)
     bench.pose()
@@ -250,6 +296,7 @@ RUNS: tuple[Requirement[RobotBench], ...] = tuple(
         ("States of a run", "a run goes stop by stop to FINISHED", a_run_goes_to_its_end),
         ("Events", "the way of a run is kept without gaps", the_way_has_no_gaps),
         ("Events", "a pose tells run and boot", poses_tell_run_and_boot),
+        ("The record of a run", "every entry and pose once, and the same again", the_record_has_no_gaps),
         ("Orders", "a start that comes again is carried out once", a_start_is_carried_out_once),
         ("Orders", "RUNNING to ABORTED: orders as in the table", orders_mean_what_the_table_says),
         ("Orders", "an abort that knows nothing ends a run", an_abort_ends_a_run),

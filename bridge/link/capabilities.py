@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
+from bridge.link.protocol import RECORD
+
 WITHOUT: Final[dict[str, str]] = {
-    "record": "of a link lost for longer than its last 3000 poses the way stays unknown",
+    RECORD: "of a link lost for longer than its last 3000 poses the way stays unknown",
 }
 """By the name in `Info.capabilities`: what follows where it is missing."""
 

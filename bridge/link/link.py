@@ -47,11 +47,8 @@ class Link(Protocol):
     def distrusted(self) -> str:
         """Why the last message that was not believed was not; empty if all were."""
 
-    def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
-        """Answer every question on `key` (which may hold wildcards), one at a time.
-
-        `bulk` says that the answers are large; on a full line they give way if they were asked for so.
-        """
+    def serve(self, key: str, answer: Answering) -> None:
+        """Answer every question on `key` (which may hold wildcards), one at a time."""
 
     def publisher(self, key: str, *, bulk: bool = False) -> Publish:
         """A function that sends on `key`; what is `bulk` may be left out on a full line."""

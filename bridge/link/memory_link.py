@@ -79,7 +79,7 @@ class MemoryLink:
     def distrusted(self) -> str:
         return self._seals.distrusted
 
-    def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
+    def serve(self, key: str, answer: Answering) -> None:
         # Whoever serves a key last answers first.
         self._board.serving.insert(0, (self, key, self._seals.answering(answer)))
 

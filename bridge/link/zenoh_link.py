@@ -211,7 +211,7 @@ class ZenohLink:
         with self._lock:
             _undeclare(self._declared)
 
-    def serve(self, key: str, answer: Answering, *, bulk: bool = False) -> None:
+    def serve(self, key: str, answer: Answering) -> None:
         sealed = self._seals.answering(answer)
 
         def answered(query: zenoh.Query) -> None:

@@ -161,10 +161,10 @@ class Agent:
         link.serve(keys.keep, self._keep)
         link.serve(keys.boot, lambda request: encode(Booted(boot_id=self._runner.boot_id)))
         link.serve(keys.log, self._log)
-        link.serve(keys.poses, self._past_poses, bulk=True)
+        link.serve(keys.poses, self._past_poses)
         if self._recorder is not None:
-            link.serve(keys.record, self._record, bulk=True)
-        link.serve(keys.mission("*", "**" if self._inbox else "part/*"), self._mission, bulk=True)
+            link.serve(keys.record, self._record)
+        link.serve(keys.mission("*", "**" if self._inbox else "part/*"), self._mission)
         link.serve(keys.command("*"), self._command)
         link.watch_presence(keys.watcher("*"), self._watcher)
 

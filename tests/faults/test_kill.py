@@ -14,7 +14,8 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -114,6 +115,20 @@ def stubbornly(act: Callable[[], T], outcome: Outcome) -> T:
     raise AssertionError("no answer for a minute")
 
 
+@contextmanager
+def reached(
+    endpoint: str, outcome: Outcome, *, keys: Path | None = None, timeout_s: float = 3.0
+) -> Iterator[Station]:
+    """A station that has reached the robot, however long it takes to be started again."""
+    with ExitStack() as stack:
+        yield stubbornly(
+            lambda: stack.enter_context(
+                connect(endpoint, robot="r1", commander="trial", keys=keys, timeout_s=timeout_s)
+            ),
+            outcome,
+        )
+
+
 def give(station: Station, order: Order, outcome: Outcome) -> bool:
     """Give the order twice, each time until it is answered; whether it was carried out."""
     outcome.orders += 1
@@ -190,7 +205,7 @@ def trial(seed: int, folder: Path, site: Site = OPEN) -> Outcome:
         ]
         for timer in timers:
             timer.start()
-        with connect(endpoint, robot="r1", commander="trial", keys=site.station, timeout_s=3.0) as station:
+        with reached(endpoint, outcome, keys=site.station) as station:
             stubbornly(lambda: station.push(mission()), outcome)
             paused = drive(station, chance, outcome)
         for timer in timers:
@@ -208,7 +223,7 @@ def trial_of_a_revision(seed: int, folder: Path) -> Outcome:
     revised = mission(stops=4, revision=2)
     with (
         Supervisor(folder, faults, speed_up=SPEED_UP / 4) as supervisor,
-        connect(supervisor.endpoint, robot="r1", commander="trial", timeout_s=3.0) as station,
+        reached(supervisor.endpoint, outcome) as station,
     ):
         stubbornly(lambda: station.push(mission()), outcome)
         begin(station, outcome)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from bridge.conform.conform_robot import robot_verdicts
 from bridge.conform.falsified_seals import FalsifiedSeals
@@ -20,6 +21,7 @@ from bridge.robot.bodies import pose_of
 from bridge.robot.controller import Controller, new_boot_id
 from bridge.robot.inbox import Inbox
 from bridge.robot.journal import Journal, memory_journal
+from bridge.robot.recorder import RunRecorder
 from bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from tests.bridge.world import EXACT
 
@@ -30,6 +32,7 @@ class RobotUnderTest:
     controller: type[Controller] = Controller
     agent: type[Agent] = Agent
     inbox: type[Inbox] = Inbox
+    recorder: type[RunRecorder] = RunRecorder
 
     def __init__(self, site: Path | None = None) -> None:
         self.site = site
@@ -41,6 +44,7 @@ class RobotUnderTest:
         self.scanner = SimulatedScanner(clock=self.clock)
         self.controllers: list[Controller] = []
         self._running = ExitStack()
+        self._folder = TemporaryDirectory()
 
     def seals(self, name: str, boot_id: str = "") -> Seals:
         if self.site is None:
@@ -58,7 +62,7 @@ class RobotUnderTest:
         agent = self.agent(
             keys=self.keys, link=link, journal=self.journal, runner=controller,
             inbox=self.inbox(self.journal, controller, ("default",)), clock=self.clock,
-            command_clock=self.clock,
+            command_clock=self.clock, recorder=self.recorder(Path(self._folder.name)),
         )  # fmt: skip
         self._running.callback(link.close)
         self._running.enter_context(on_link(agent))

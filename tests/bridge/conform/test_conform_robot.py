@@ -12,11 +12,12 @@ from bridge.conform.conform_robot import REQUIREMENTS, check_at_rest, robot_verd
 from bridge.conform.requirements import ConformVerdict, tried
 from bridge.conform.robot_bench import OVER
 from bridge.link.link import Answering, Request
-from bridge.link.protocol import LogPage, Manifest, Rejected, decode, encode
+from bridge.link.protocol import LogPage, Manifest, RecordPage, Rejected, decode, encode
 from bridge.link.seals import KeySeals, SealedAnswering, Seals
 from bridge.robot.agent import Agent
 from bridge.robot.controller import Controller
 from bridge.robot.inbox import Inbox
+from bridge.robot.recorder import RunRecorder
 from mission.document import Mission
 from mission.errors import InputError
 from mission.events import StateReport, TakenOver
@@ -75,6 +76,9 @@ def test_a_robot_on_a_run_or_in_others_hands_is_left_alone() -> None:
         bench.obeyed("start")
         with pytest.raises(InputError, match="r1 is RUNNING: a robot on a run is not tried"):
             check_at_rest(bench.info(), "alice", take_over=True)
+
+
+RECORD_WHOLE = "every entry and pose once, and the same again"
 
 
 # Robots that are broken
@@ -178,6 +182,19 @@ class TakesOldRevisions(Inbox):
         return None
 
 
+class LosesPosesOfTheRecord(RunRecorder):
+    def page(self, run_id: str, since: int | None = 0, *, robot_ns: int = 0) -> RecordPage:
+        page = super().page(run_id, since, robot_ns=robot_ns)
+        thinned = (changed(entry, poses=entry.poses[::2]) for entry in page.entries)
+        return changed(page, entries=tuple(thinned))
+
+
+class LosesEntriesOfTheRecord(RunRecorder):
+    def page(self, run_id: str, since: int | None = 0, *, robot_ns: int = 0) -> RecordPage:
+        page = super().page(run_id, since, robot_ns=robot_ns)
+        return changed(page, entries=tuple(entry for entry in page.entries if entry.number != 2))
+
+
 class WantsPiecesInOrder(Inbox):
     def _chunk(self, mission_id: str, number: int, request: Request) -> Any:
         manifest = self._journal.transfer(mission_id)
@@ -212,6 +229,8 @@ class WantsPiecesInOrder(Inbox):
         ("agent", SaysNothingOfItself, "the state is told at least every second", "0 states came"),
         ("inbox", TakesDamage, "a damaged chunk is found at the commit: `digest`", "Rejected malformed"),
         ("inbox", TakesOldRevisions, "a revision before the stored one: `older_revision`", "with Ready"),
+        ("recorder", LosesPosesOfTheRecord, RECORD_WHOLE, "poses are missing from the record"),
+        ("recorder", LosesEntriesOfTheRecord, RECORD_WHOLE, "the entries are numbered [1, 3"),
         ("inbox", WantsPiecesInOrder, "chunks may come in any order", "Rejected incomplete"),
     ],
 )

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from bridge.link.protocol import RECORD_PAGE, PoseRow, RecordPage
+from bridge.link.capabilities import WITHOUT
+from bridge.link.protocol import RECORD, RECORD_PAGE, PoseRow, RecordPage
 from bridge.robot.base import BaseHealth
+from bridge.robot.pages import POSES_KEPT
 from bridge.robot.recorder import RETIRED, RunRecorder
 from bridge.robot.run_record import ANEW, DAMAGED, UNSEEN
 from mission.events import Pose, PoseReport, PosesMissing
@@ -222,3 +224,7 @@ def test_health_is_written_down_when_it_changes(tmp_path: Path) -> None:
     assert {(health.battery, health.localisation, health.safety_field) for health in told} == {
         (0.5, 0.9, None)
     }
+
+
+def test_what_follows_without_a_record_is_told_with_the_number_of_poses_that_are_kept() -> None:
+    assert f"its last {POSES_KEPT} poses" in WITHOUT[RECORD]
