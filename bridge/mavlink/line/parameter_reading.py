@@ -22,7 +22,7 @@ def read_parameters(peer: Peer, names: Collection[str]) -> dict[str, float]:
     found: dict[str, float] = {}
     with peer.waiting("PARAM_VALUE") as waiting:
         for _ in range(ROUNDS):
-            missing = [name for name in names if name not in found]
+            missing = [name for name in names if name and name not in found]
             if not missing:
                 break
             for name in missing:
