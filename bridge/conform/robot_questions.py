@@ -11,10 +11,10 @@ from typing import Any
 from bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
 from bridge.conform.robot_bench import RobotBench, manifest_of, read
 from bridge.conform.trial_mission import trial_mission
+from bridge.link.capabilities import RECORD
 from bridge.link.protocol import (
     LOG_PAGE,
     POSE_PAGE,
-    RECORD,
     VERSION,
     Booted,
     Commit,

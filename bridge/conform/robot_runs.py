@@ -8,7 +8,8 @@ from bridge.conform.requirements import NotTried, Requirement, must
 from bridge.conform.robot_bench import OVER, RobotBench, read, rejects, told_of
 from bridge.conform.robot_orders import as_another, ready, refuses_what_means_nothing
 from bridge.conform.robot_questions import keeps_a_record, states_are_bounded
-from bridge.link.protocol import POSE_PAGE, RECORD, RECORD_PAGE, Accepted, PosePage, RecordEntry, RecordPage
+from bridge.link.capabilities import RECORD
+from bridge.link.protocol import POSE_PAGE, RECORD_PAGE, Accepted, PosePage, RecordEntry, RecordPage
 from mission.document import Mission, sealed
 from mission.events import (
     AnyEvent,

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from bridge.link.protocol import RECORD
+RECORD: Final = "record"
+"""The capability of a robot that keeps a record of its runs."""
 
 WITHOUT: Final[dict[str, str]] = {
     RECORD: "of a link lost for longer than its last 3000 poses the way stays unknown",

@@ -29,8 +29,6 @@ POSE_PAGE: Final = 50
 """Poses in one answer: some 12 kB."""
 RECORD_PAGE: Final = 20
 """Entries of a record in one answer: ten seconds of a run, some 25 kB."""
-RECORD: Final = "record"
-"""The capability of a robot that keeps a record of its runs."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _SITE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}(/[A-Za-z0-9][A-Za-z0-9_.-]{0,63})*")
@@ -94,6 +92,10 @@ class KeyExpressions:
     @property
     def event(self) -> str:
         return f"{self.root}/tel/event"
+
+    @property
+    def health(self) -> str:
+        return f"{self.root}/tel/health"
 
     @property
     def keep(self) -> str:

@@ -12,7 +12,7 @@ import msgspec
 
 from bridge.link.protocol import VERSION, Tagged
 from bridge.link.seals import Seal
-from mission.events import KINDS, AnyEvent, PoseReport, StateReport, UnknownKind
+from mission.events import KINDS, AnyEvent, Health, PoseReport, StateReport, UnknownKind
 from mission.run.orders import Answer, Order
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -23,7 +23,7 @@ def protocol_schema() -> bytes:
 
     Any further field is valid in each of them, and so is an event of a kind that is not known.
     """
-    spoken = (*Tagged.__subclasses__(), Order, Answer, AnyEvent, StateReport, PoseReport, Seal)
+    spoken = (*Tagged.__subclasses__(), Order, Answer, AnyEvent, StateReport, PoseReport, Health, Seal)
     _, defs = msgspec.json.schema_components(spoken)
     command = str(Order.__struct_config__.tag)
     defs[command] = defs.pop(Order.__name__) | {"title": command}

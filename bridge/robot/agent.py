@@ -15,13 +15,13 @@ from typing import TypeVar
 
 import msgspec
 
+from bridge.link.capabilities import RECORD
 from bridge.link.clock import Clock
 from bridge.link.keys import Untrusted, now_utc
 from bridge.link.link import Link, Request
 from bridge.link.protocol import (
     CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
-    RECORD,
     VERSION,
     Booted,
     Commit,
@@ -174,6 +174,7 @@ class Agent:
         keys, link = self._keys, self._link
         self._tell_state = link.publisher(keys.state)
         self._tell_event = link.publisher(keys.event)
+        self._tell_health = link.publisher(keys.health)
         self._tell_pose = link.publisher(keys.pose, bulk=True)
         self._runner.changed = self._news.set
         recording = () if self._recorder is None else (self._write_record,)
@@ -373,7 +374,9 @@ class Agent:
     def _write_record(self) -> None:
         assert self._recorder is not None
         while not self._closing.wait(ENTRY_S):
-            self._recorder.look(battery=self._runner.battery(), robot_ns=self._clock.now_ns())
+            health = self._recorder.look(battery=self._runner.battery(), robot_ns=self._clock.now_ns())
+            if health is not None:
+                self._tell_health(encode(health))
             self._recorder.write()
 
     def _pose_report(self, position: Position, run: Run) -> PoseReport:

@@ -87,18 +87,18 @@ class RunRecorder:
             if self._run is not None and report.run_id == self._run.run_id:
                 self._run.state(report)
 
-    def look(self, *, battery: float, robot_ns: int) -> None:
-        """Take how the base is now."""
+    def look(self, *, battery: float, robot_ns: int) -> Health | None:
+        """Take how the base is now; that, if it is not as it was."""
         base = self.health()
         with self._lock:
-            if self._run is not None:
-                self._run.health(
-                    Health(
-                        robot_ns=robot_ns, run_id=self._run.run_id, battery=battery,
-                        localisation=base.localisation, emergency_stop=base.emergency_stop,
-                        safety_field=base.safety_field,
-                    )
-                )  # fmt: skip
+            if self._run is None:
+                return None
+            told = Health(
+                robot_ns=robot_ns, run_id=self._run.run_id, battery=battery,
+                localisation=base.localisation, emergency_stop=base.emergency_stop,
+                safety_field=base.safety_field,
+            )  # fmt: skip
+            return told if self._run.health(told) else None
 
     def write(self) -> None:
         """Write down what was taken; if there is no room, it is missing."""

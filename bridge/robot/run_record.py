@@ -57,12 +57,14 @@ class RunRecord:
             self._state = same
             self._states.append(report)
 
-    def health(self, told: Health) -> None:
-        """Take what the base tells, if it differs from what it told before."""
+    def health(self, told: Health) -> bool:
+        """Take what the base tells, if it differs from what it told before; whether it does."""
         same = msgspec.structs.replace(told, robot_ns=0)
-        if same != self._told and not self._over:
-            self._told = same
-            self._health.append(told)
+        if same == self._told or self._over:
+            return False
+        self._told = same
+        self._health.append(told)
+        return True
 
     def write(self, shortage: Callable[[int], str]) -> None:
         """Write an entry of what was taken, or note why that was not possible."""

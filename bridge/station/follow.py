@@ -17,6 +17,7 @@ from mission.events import (
     Aborted,
     AnyEvent,
     Finished,
+    Health,
     PoseReport,
     PosesMissing,
     Report,
@@ -38,6 +39,7 @@ class Silence(msgspec.Struct, frozen=True, kw_only=True):
     seconds: float
 
 
+LiveReport = Report | Health
 Followed = Report | Silence | PosesMissing | Past
 """What is told of a run that is followed."""
 
@@ -145,6 +147,8 @@ class RunFollower:
         self.told = -1
         self.end: Finished | Aborted | None = None
         self.last_state: StateReport | None = None
+        self._health: Health | None = None
+        """LiveReport, perhaps before the run it is of was."""
 
     @property
     def ended(self) -> bool:
@@ -152,17 +156,25 @@ class RunFollower:
         state = self.last_state
         return self.end is not None and state is not None and state.last_event >= self.end.number
 
-    def take(self, item: Report) -> Iterator[Followed]:
+    def take(self, item: LiveReport) -> Iterator[Followed]:
         if isinstance(item, StateReport):
             self._settle_on(item)
+            yield from self._tell_health()
             yield from self._missed(item.last_event)
             if self.told >= item.last_event:
                 self.last_state = item
                 yield item
         elif isinstance(item, PoseReport):
             yield from self.poses.take(item)
+        elif isinstance(item, Health):
+            self._health = item
+            yield from self._tell_health()
         elif self.run_id is not None:
             yield from self._missed(item.number)
+
+    def _tell_health(self) -> Iterator[Past]:
+        if self._health is not None and isinstance(self.poses, RecordHistory):
+            yield from self.poses.health(self._health)
 
     def _settle_on(self, state: StateReport) -> None:
         """Follow the robot's present run; without one, the next."""
@@ -200,11 +212,12 @@ def log_page(
 
 def _listen(
     link: Link, keys: KeyExpressions, keep: Callable[[], StateReport | None]
-) -> queue.SimpleQueue[Report]:
+) -> queue.SimpleQueue[LiveReport]:
     """A queue that fills with what the robot tells; listening comes before asking, so no gap is left."""
-    heard: queue.SimpleQueue[Report] = queue.SimpleQueue()
+    heard: queue.SimpleQueue[LiveReport] = queue.SimpleQueue()
     link.hear(keys.event, lambda key, payload: _put(heard, payload, event_of))
     link.hear(keys.pose, lambda key, payload: _put(heard, payload, _POSE))
+    link.hear(keys.health, lambda key, payload: _put(heard, payload, _HEALTH))
     link.hear(keys.state, lambda key, payload: _put(heard, payload, _STATE))
     state = keep()
     if state is not None:
@@ -212,24 +225,25 @@ def _listen(
     return heard
 
 
-def _next(heard: queue.SimpleQueue[Report], wait_s: float) -> Report | None:
+def _next(heard: queue.SimpleQueue[LiveReport], wait_s: float) -> LiveReport | None:
     try:
         return heard.get(timeout=wait_s) if wait_s else heard.get_nowait()
     except queue.Empty:
         return None
 
 
-def _put(heard: queue.SimpleQueue[Report], payload: bytes, read: Callable[[bytes], Report]) -> None:
+def _put(heard: queue.SimpleQueue[LiveReport], payload: bytes, read: Callable[[bytes], LiveReport]) -> None:
     """Take what can be read; anything else on these keys is not the robot's."""
     with suppress(msgspec.DecodeError):
         heard.put(read(payload))
 
 
+_HEALTH = msgspec.json.Decoder(Health).decode
 _POSE = msgspec.json.Decoder(PoseReport).decode
 _STATE = msgspec.json.Decoder(StateReport).decode
 
 
-def _late_poses(heard: queue.SimpleQueue[Report], follower: RunFollower) -> Iterator[Followed]:
+def _late_poses(heard: queue.SimpleQueue[LiveReport], follower: RunFollower) -> Iterator[Followed]:
     """Poses of the run that have not come yet, up to the first after its end."""
     end_ns = follower.end.robot_ns if follower.end else 0
     patience_s = follower.poses.patience_s
@@ -242,10 +256,10 @@ def _late_poses(heard: queue.SimpleQueue[Report], follower: RunFollower) -> Iter
             deadline = time.monotonic() + patience_s
 
 
-def _late(heard: queue.SimpleQueue[Report], follower: RunFollower, wait_s: float) -> Iterator[Followed]:
+def _late(heard: queue.SimpleQueue[LiveReport], follower: RunFollower, wait_s: float) -> Iterator[Followed]:
     """What has come, or what was missed."""
     if follower.poses.behind:
         yield from follower.poses.catch_up()
     item = _next(heard, min(wait_s, AGAIN_S))
-    if isinstance(item, PoseReport):
-        yield from follower.poses.take(item)
+    if isinstance(item, PoseReport | Health):
+        yield from follower.take(item)

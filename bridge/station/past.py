@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from bridge.link.protocol import RECORD
+from bridge.link.capabilities import RECORD
 from bridge.station.follow import Followed
 from bridge.station.record import Past, past_run, read_index
 from bridge.station.station import Station

@@ -27,7 +27,7 @@ BOOT_S = 600.0
 
 
 class Past(msgspec.Struct, frozen=True):
-    """A state, or how the base was, that was not heard when it was told."""
+    """How the base was, or a state that was not heard when it was told."""
 
     report: StateReport | Health
 
@@ -102,6 +102,8 @@ class RecordHistory:
         self._boot_id: str | None = None
         self._told = 0
         self._told_ns = 0
+        self._healths: deque[int] = deque(maxlen=HEARD)
+        """Times of what was told of the base."""
         self.run_id: str | None = None
 
     @property
@@ -119,6 +121,12 @@ class RecordHistory:
         self._heard.append(pose)
         if self._pages is None:
             yield from self._next_heard()
+
+    def health(self, told: Health) -> Iterator[Past]:
+        """Tell how the base was, unless that has been told."""
+        if told.run_id == self.run_id and told.robot_ns not in self._healths:
+            self._healths.append(told.robot_ns)
+            yield Past(told)
 
     def catch_up(self) -> Iterator[Recorded]:
         """A page of what was missed."""
@@ -143,7 +151,7 @@ class RecordHistory:
         fresh = [pose for pose in entry.poses if pose.seq > self._told]
         reports: tuple[StateReport | Health, ...] = (*entry.states, *entry.health)
         for report in reports if fresh else ():
-            yield Past(report)
+            yield from self.health(report) if isinstance(report, Health) else (Past(report),)
         for row in fresh:
             yield self._now_told(
                 PoseReport(

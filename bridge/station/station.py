@@ -20,11 +20,11 @@ from typing import Any, NoReturn
 import msgspec
 
 from bridge.console import Progress
+from bridge.link.capabilities import RECORD
 from bridge.link.keys import HeldKeys, now_utc, read_keys
 from bridge.link.link import Link
 from bridge.link.protocol import (
     CHUNK_BYTES,
-    RECORD,
     VERSION,
     Accepted,
     ChunkHeld,

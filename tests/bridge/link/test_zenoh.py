@@ -14,7 +14,8 @@ import pytest
 from bridge.commands.spawn import end_robot, robot_process, start_robot
 from bridge.link.protocol import PosePage, decode
 from bridge.link.zenoh_link import Guard, check_endpoint
-from bridge.station.follow import Report
+from bridge.station.follow import Followed
+from bridge.station.record import Past
 from bridge.station.station import connect
 from mission.document import sealed
 from mission.errors import InputError, RobotUnreachable
@@ -24,20 +25,20 @@ from tests.called import stopgo
 from tests.ports import free_port
 
 
-def run_of(reports: list[Report]) -> str:
-    return next(report.run_id for report in reports if report.run_id)
+def run_of(reports: list[Followed]) -> str:
+    return next(report.run_id for report in reports if isinstance(report, StateReport) and report.run_id)
 
 
 def test_a_mission_is_pushed_started_and_followed_to_its_end(tmp_path: Path) -> None:
     with robot_process("r1", tmp_path, speed_up=100) as endpoint, connect(endpoint, robot="r1") as station:
         station.push(corridor())
         station.command("start")
-        reports: list[Report] = list(station.reports())
+        reports: list[Followed] = list(station.reports())
         again = list(station.reports())
         kept = station.link.ask(
             station.keys.poses, timeout_s=5.0, parameters={"since": "0", "run": run_of(again)}
         )
-    events = [report for report in reports if not isinstance(report, StateReport | PoseReport)]
+    events = [report for report in reports if not isinstance(report, StateReport | PoseReport | Past)]
     assert [event.stop for event in events if isinstance(event, Scanned)] == ["s1", "s2", "s3"]
     assert isinstance(events[-1], Finished)
     assert [event.number for event in events] == list(range(1, len(events) + 1))

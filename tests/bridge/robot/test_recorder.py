@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from bridge.link.capabilities import WITHOUT
-from bridge.link.protocol import RECORD, RECORD_PAGE, PoseRow, RecordPage
+from bridge.link.capabilities import RECORD, WITHOUT
+from bridge.link.protocol import RECORD_PAGE, PoseRow, RecordPage
 from bridge.robot.base import BaseHealth
 from bridge.robot.pages import POSES_KEPT
 from bridge.robot.recorder import RETIRED, RunRecorder

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import msgspec
+
 from bridge.link.link import Request
 from bridge.link.memory_link import Switchboard
 from bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, encode
-from bridge.station.follow import PoseHistory
-from mission.events import Pose, PoseReport
+from bridge.station.follow import PoseHistory, RunFollower
+from bridge.station.record import Past
+from mission.events import Health, Pose, PoseReport
+from tests.bridge.world import Field, corridor
 
 
 class Trail:
@@ -73,3 +77,16 @@ def test_poses_that_nobody_answers_for_are_not_asked_for_again_at_once() -> None
     assert path.behind
     assert list(path.catch_up()) == []
     assert not path.behind
+
+
+def test_health_that_is_heard_before_its_run_is_told_with_the_run_and_once() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    follower = RunFollower(field.board.link(), field.keys, lambda: True)
+    told = Health(robot_ns=1, run_id=field.controller.run.run_id, battery=0.5, emergency_stop=True)
+    assert not list(follower.take(told))
+    assert Past(told) in list(follower.take(field.report()))
+    assert not [item for item in follower.take(field.report()) if isinstance(item, Past)]
+    later = msgspec.structs.replace(told, robot_ns=2, emergency_stop=False)
+    assert list(follower.take(later)) == [Past(later)]

@@ -8,18 +8,21 @@ from pathlib import Path
 
 import pytest
 
-from bridge.link.link import Request
+from bridge.link.link import Request, Unanswered
 from bridge.link.memory_link import Switchboard
 from bridge.link.protocol import RECORD_PAGE, KeyExpressions, encode
+from bridge.robot.base import BaseHealth
 from bridge.robot.recorder import RunRecorder
 from bridge.robot.run_record import ANEW
 from bridge.station import record
-from bridge.station.record import Recorded, RecordHistory
-from mission.events import PoseReport, PosesMissing
+from bridge.station.record import Past, Recorded, RecordHistory, past_run
+from mission.events import Health, PoseReport, PosesMissing
 from tests.bridge.robot.test_recorder import BEGAN_NS, idle, ns, pose
 
 FAR = 5000
 """More poses than a robot keeps in memory."""
+
+LAST_NET_S = 60.0
 
 
 class Robot:
@@ -31,6 +34,8 @@ class Robot:
         self.board = Switchboard()
         self.keys = KeyExpressions("r1")
         self.asked = 0
+        self.lost: set[int] = set()
+        """Which of the questions find no answer."""
         self.short = ""
         self.boot()
         idle(self.recorder)
@@ -41,6 +46,8 @@ class Robot:
 
     def _answer(self, request: Request) -> bytes:
         self.asked += 1
+        if self.asked in self.lost:
+            raise Unanswered
         return encode(self.recorder.answer(request))
 
     def boot(self) -> None:
@@ -77,6 +84,31 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Robot]:
     robot = Robot(tmp_path, monkeypatch)
     yield robot
     robot.recorder.close()
+
+
+def test_health_is_told_once_whether_it_was_heard_or_is_read_later(robot: Robot) -> None:
+    pressed = [False]
+    robot.recorder.health = lambda: BaseHealth(emergency_stop=pressed[0])
+    robot.drive(range(1, 21), heard=True)
+    heard = robot.recorder.look(battery=0.5, robot_ns=ns(20))
+    assert heard is not None
+    robot.told += robot.history.health(heard)
+    pressed[0] = True
+    robot.drive(range(21, 30), heard=False)
+    assert robot.recorder.look(battery=0.5, robot_ns=ns(29)) is not None
+    robot.drive(range(30, 41), heard=False)
+    pressed[0] = False
+    robot.drive(range(41, 51), heard=True)
+    heard = robot.recorder.look(battery=0.5, robot_ns=ns(50))
+    assert heard is not None
+    robot.told += robot.history.health(heard)
+    robot.catch_up()
+    robot.drive(range(51, 61), heard=True)
+    robot.catch_up()
+    told = [item.report for item in robot.told if isinstance(item, Past) and isinstance(item.report, Health)]
+    assert sorted((one.robot_ns, one.emergency_stop) for one in told) == [
+        (ns(20), False), (ns(29), True), (ns(50), False)
+    ]  # fmt: skip
 
 
 def test_after_a_long_outage_every_pose_comes_once_and_in_order(robot: Robot) -> None:
@@ -139,3 +171,12 @@ def test_what_a_full_disk_had_no_room_for_is_told_as_missing(robot: Robot) -> No
     assert [report.seq for report in robot.poses] == [*range(1, 101), *range(301, 401)]
     times = [report.robot_ns for report in robot.poses]
     assert all(before < after for before, after in pairwise(times))
+
+
+def test_a_past_run_is_read_once_and_in_order_over_a_line_that_is_cut_in_between(robot: Robot) -> None:
+    newest = 10 * RECORD_PAGE * 5
+    robot.drive(range(1, newest + 1), heard=False)
+    robot.lost = {2, 3, 5, 6, 7}
+    told = list(past_run(robot.board.link(), robot.keys, "run", patience_s=LAST_NET_S))
+    assert [item.seq for item in told if isinstance(item, PoseReport)] == list(range(1, newest + 1))
+    assert robot.asked > max(robot.lost)
