@@ -57,6 +57,10 @@ def watch_by(recording: Recorder) -> Callable[..., None]:
         autopilots, and 2 when it brought it and its recording is incomplete, as on a full disk. While a
         vehicle is watched over MAVLink, what its mission says of a stop that failed is done by this command.
 
+        With --run a line that is cut in between is waited for, and reading goes on where it
+        was. A command that was ended and is given again reads the run from its beginning, and writes --rrd
+        anew.
+
         The timeline goes to stdout. With --json that is one object a line for every event, and for the state
         and the comparison at the end.
 
