@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from mission.comparing.compare import compare
@@ -61,7 +62,9 @@ class RecordingReview:
         ]
         if self.plan is not None:
             lines += [f"  {name}: {value}" for name, value in self.plan.items()]
-        return "\n".join([*lines, *(f"\n{comparison_text(item)}" for item in self.comparisons)])
+        for item in self.comparisons:
+            lines += ["", comparison_text(item), *what_next(item, self.recording.path)]
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +91,15 @@ class Review:
     def check_code(self) -> int:
         """1 where a recording contradicts itself or is incomplete, else the exit code."""
         return 1 if any(item.problems for item in self.recordings) else self.exit_code
+
+
+def what_next(run: Comparison, path: Path) -> tuple[str, ...]:
+    """What plans a further mission, where a run that `path` tells of is over and saw less than was asked."""
+    acquired, floor = run.acquired, run.mission.origin.floor
+    if acquired is None or acquired.answer != "no" or not run.log.ended or not floor:
+        return ()
+    command = f"stopgo replay {quote(str(path))} --mission mission.json --floor FLOOR --top-up next.json"
+    return (f"For what is missing, a further mission (FLOOR is the file of {floor}): {command}",)
 
 
 def review(paths: Iterable[Path]) -> Review:

@@ -15,7 +15,7 @@ from recordings.carried.plan import origin_in
 from recordings.carried.reading import Recording
 from recordings.carried.reasons import reasons_in
 from recordings.page.subject import ReportSubject
-from recordings.review import RecordingReview, Review, missions_of, sights_of
+from recordings.review import RecordingReview, Review, missions_of, sights_of, what_next
 
 
 def subject_of(review: Review) -> ReportSubject:
@@ -45,6 +45,12 @@ def subject_of(review: Review) -> ReportSubject:
         reasons=_first(read, _reasons) or (),
         found=_first(read, _found) or CarriedFindings(),
         sources=tuple(_source(item) for item in read),
+        told={
+            run.run_id: (("What to do next", lines),)
+            for item in items
+            for run in item.comparisons
+            if (lines := what_next(run, item.recording.path))
+        },
         problems=tuple(f"{item.recording.path.name}: {text}" for item in items for text in item.problems),
     )
 

@@ -45,7 +45,7 @@ def test_both_for_a_person(plan: Path, field: Path, capsys: pytest.CaptureFixtur
 
 
 def test_a_skipped_stop_is_told_with_what_it_cost(
-    sighted: Path, skipping: Path, capsys: pytest.CaptureFixture[str]
+    sighted: Path, skipping: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Of 14 visible units, S2 alone sees 3; 70 % is asked, and 57 % was scanned."""
     assert main(["review", str(skipping), str(sighted), "--json"]) == 1
@@ -56,6 +56,20 @@ def test_a_skipped_stop_is_told_with_what_it_cost(
     text = capsys.readouterr().out
     assert "Not acquired. 57.1 % of what is visible was scanned; 70.0 % was asked, 78.5 % planned." in text
     assert "skip by ann" in text
+    command = f"stopgo replay {skipping} --mission mission.json --floor FLOOR --top-up next.json"
+    assert text.rstrip().endswith(
+        f"For what is missing, a further mission (FLOOR is the file of small.dxf): {command}"
+    )
+    page = tmp_path / "report.html"
+    assert main(["review", str(sighted), str(skipping), "--html", str(page)]) == 1
+    assert "What to do next" in page.read_text() and command in page.read_text()
+
+
+def test_nothing_is_to_be_done_after_a_run_as_planned(
+    sighted: Path, field: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["review", str(sighted), str(field)]) == 0
+    assert "a further mission" not in capsys.readouterr().out
 
 
 def test_without_its_plan_a_skipped_stop_is_a_no(skipping: Path, capsys: pytest.CaptureFixture[str]) -> None:
