@@ -19,12 +19,14 @@ from bridge.robot.base import Outcome
 from bridge.robot.journal import open_journal
 from bridge.robot.simulator import SHAKE_M, Fault, Faults, SimulatedBase, Wear
 from mission.document import Mission, Point, Scan, Stop
-from mission.events import Pose, PoseReport
+from mission.events import AnyEvent, Pose, PoseReport, RevisionTaken
+from mission.heard_run import RunTaker
 from mission.run.scans import ScanFailed, ScanResult
 from recordings.field import FieldRecording
 from tests.bridge.world import Field
 
 GOES_ON = ("resume", "retry", "skip")
+SILENCE_S = 60.0
 LOOK_S = 0.05
 """How often the witness looks."""
 
@@ -84,6 +86,8 @@ class Witness:
     """How far a shaking robot is from where it stands."""
     began_ns: int = 0
     ended_ns: int = 0
+    events: tuple[AnyEvent, ...] = ()
+    """What the robot's journal came to; the truth is told by all the others."""
 
     def look(self) -> None:
         pose = self.base.pose()
@@ -129,11 +133,11 @@ class Witness:
         return [shot for shot in self.shots if near((shot.pose.x, shot.pose.y), stop, stop.tolerance_m)]
 
     def stood_s(self, verb: str) -> float:
-        """Seconds between each pause, or each time that the robot gave up, and the order to go on."""
+        """Seconds between each pause, or each time the robot gave up, and the order to go on or the end."""
         begin, total = 0, 0.0
-        for ns, what in self.orders:
+        for ns, what in (*self.orders, (self.ended_ns, "end")):
             if what == verb:
-                begin = ns
+                begin = begin or ns
             elif begin:
                 total, begin = total + (ns - begin) / 1e9, 0
         return total
@@ -177,6 +181,10 @@ class Troubles:
     """Left out once the robot is under way to them."""
     gives_up: float = 0.5
     """How likely the operator skips a stop at which the robot is held, and does not try again."""
+    silences: tuple[float, ...] = ()
+    """Seconds at which the robot has heard no station for too long."""
+    revised: tuple[float, Mission] | None = None
+    """A revision, and when it is pushed."""
 
 
 def troubles_of(seed: int, mission: Mission) -> Troubles:
@@ -210,9 +218,17 @@ def run_of(mission: Mission, troubles: Troubles, folder: Path, *, seed: int = 1)
         assert world.order("start").outcome == "ok"
         for seconds in troubles.pauses:
             clock.at(seconds, lambda: _pause(world, witness))
+        for seconds in troubles.silences:
+            clock.at(seconds, lambda: _hear_nothing(world, witness))
+        if troubles.revised is not None:
+            when, revised = troubles.revised
+            clock.at(when, lambda: world.station().push(revised))
         _operate(world, witness, troubles, chance)
         witness.ended_ns = clock.now_ns()
-        _record(folder / "field.rrd", mission, world, witness)
+        witness.events = tuple(world.journal.events())
+        missions = [mission] if troubles.revised is None else [mission, troubles.revised[1]]
+        with FieldRecording(folder / "field.rrd", mission) as recording:
+            tell(recording, missions, witness)
     return witness
 
 
@@ -220,6 +236,14 @@ def _pause(world: Field, witness: Witness) -> None:
     if world.controller.run.state == "RUNNING":
         assert world.order("pause").outcome == "ok"
         witness.orders.append((world.clock.now_ns(), "pause"))
+
+
+def _hear_nothing(world: Field, witness: Witness) -> None:
+    """The robot holds at once, but for a scan: it is not cut short."""
+    if world.controller.run.state == "RUNNING":
+        world.controller.hear_of_link(SILENCE_S)
+        if world.controller.run.state == "HELD":
+            witness.orders.append((world.clock.now_ns(), "held"))
 
 
 def _operate(world: Field, witness: Witness, troubles: Troubles, chance: random.Random) -> None:
@@ -238,6 +262,7 @@ def _operate(world: Field, witness: Witness, troubles: Troubles, chance: random.
             if held:
                 witness.orders.append((world.clock.now_ns(), "held"))
             world.clock.wait(chance.uniform(3, 30))
+            world.controller.hear_of_link(0.0)
             gives_up = held and stop and chance.random() < troubles.gives_up
             _order(world, witness, "skip" if gives_up else "retry" if held else "resume")
 
@@ -261,17 +286,19 @@ def _bring_back(world: Field) -> None:
     world.base.stand_at(Pose(x=place.x, y=place.y, heading=pose.heading))
 
 
-def _record(path: Path, mission: Mission, world: Field, witness: Witness) -> None:
-    """What a station would have heard: all events, and poses 20 times a second."""
-    events = world.journal.events()
-    run = events[-1].run_id
-    with FieldRecording(path, mission) as recording:
-        for event in events:
-            recording.event(event)
-        for number, (ns, x, y, heading) in enumerate(witness.rows, 1):
-            recording.pose(
-                PoseReport(
-                    robot="r1", boot_id=world.controller.boot_id, seq=number, robot_ns=ns, run_id=run,
-                    mission_time_s=witness.seconds(ns), pose=Pose(x=x, y=y, heading=heading), speed=0.0,
-                )
-            )  # fmt: skip
+def tell(taker: RunTaker, missions: Sequence[Mission], witness: Witness) -> None:
+    """Tell what a station would have heard: all events, and poses 20 times a second."""
+    first, *revised = missions
+    taker.mission(first)
+    for event in witness.events:
+        if isinstance(event, RevisionTaken):
+            taker.mission(revised[0])
+        taker.event(event)
+    last = witness.events[-1]
+    for number, (ns, x, y, heading) in enumerate(witness.rows, 1):
+        taker.pose(
+            PoseReport(
+                robot="r1", boot_id=last.boot_id, seq=number, robot_ns=ns, run_id=last.run_id,
+                mission_time_s=witness.seconds(ns), pose=Pose(x=x, y=y, heading=heading), speed=0.0,
+            )
+        )  # fmt: skip
