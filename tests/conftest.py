@@ -7,10 +7,12 @@ import os
 import signal
 import tempfile
 from collections.abc import Iterator
+from contextlib import nullcontext
 
 import pytest
 from hypothesis import settings
 
+from tests.alone import first_alone
 from tests.faults.sizes import FULL, size
 
 # The same examples every time, and no deadline on a shared machine.
@@ -33,6 +35,15 @@ def pytest_configure() -> None:
         os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="stopgo-tests-")
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Let one worker compile what all import; and look for no garbage among modules, which all stay."""
+    gc.disable()
+    with first_alone("collection") if "PYTEST_XDIST_WORKER" in os.environ else nullcontext():
+        yield
+    gc.enable()
 
 
 def pytest_collection_finish() -> None:

@@ -7,13 +7,20 @@ from collections.abc import Iterator
 import pytest
 
 import planner.sight.sight
+from tests.alone import first_alone
 from tests.faults.sizes import FULL
+from tests.planner.worlds import hall, planned
 
 
 @pytest.fixture(scope="package", autouse=True)
 def _compiled() -> Iterator[None]:
-    """In the long form small floors are left to the interpreted one; that both agree has tests of its own."""
+    """One worker compiles it for all.
+
+    In the long form small floors are left to the interpreted one; that both agree has tests of its own.
+    """
     with pytest.MonkeyPatch.context() as patch:
         if not FULL:
             patch.setattr(planner.sight.sight, "COMPILE_ABOVE", -1)
+            with first_alone("kernel"):
+                planned(hall())
         yield
