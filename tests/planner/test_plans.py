@@ -89,7 +89,7 @@ def test_elements_drawn_twice_do_not_change_a_plan(name: str) -> None:
 REAL = ("layered/fzk-haus-eg.dxf", "paper/synthetic_case2_rooms.dxf")
 OTHERS = (
     Settings(d_sec=0.35, edge=0.0, grid=0.7),
-    Settings(robot_radius=0.25, range=10.0, coverage=1.0),
+    Settings(robot_radius=0.25, range=10.0, coverage=1.0, d_dis=0.2),
     Settings(doors="closed", coverage=0.5, tour="closed"),
     Settings(targets=("columns", "walls", "beams"), selector="greedy"),
     Settings(d_sec=1.0, door_access=0.8, d_dis=0.2),

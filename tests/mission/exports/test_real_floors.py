@@ -48,13 +48,19 @@ def planned(name: str) -> tuple[Mission, bytes]:
     return made.mission, coverage_json(made.route, made.mission)
 
 
+@cache
+def metres(source: Path) -> float:
+    """Of one unit of a drawing; most formats ask no more of it."""
+    drawing, _ = open_drawing(source.read_bytes(), source=source)
+    return metres_in(drawing, source=source)
+
+
 def supplements(name: str, folder: Path) -> Supplements:
     mission, coverage = planned(name)
     (folder / "coverage.json").write_bytes(coverage)
     data, source = (LAYERED / f"{name}.dxf").read_bytes(), LAYERED / f"{name}.dxf"
     assert hashlib.sha256(data).hexdigest() == mission.origin.floor_digest
-    drawing, _ = open_drawing(data, source=source)
-    under = FloorDrawing(lambda: open_drawing(data, source=source)[0], metres_in(drawing, source=source))
+    under = FloorDrawing(lambda: open_drawing(data, source=source)[0], metres(source))
     return Supplements(floor=under, coverage=read_stretches(folder / "coverage.json", mission))
 
 
