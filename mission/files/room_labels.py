@@ -124,7 +124,8 @@ def _layouts(room: Room, widest: float) -> Iterator[list[list[tuple[str, float]]
     """What a label may say, the fullest first: on one line or two, with and without the area."""
     area = (f"{room.area:.1f} m²", AREA)
     names = [wrapped(room.label, width=widest), wrapped(room.label, width=0.0, cut=widest)]
-    on_lines = [[(name, NAME) for name in halves] for halves in names]
+    different = names if names[0] != names[1] else names[:1]
+    on_lines = [[(name, NAME) for name in halves] for halves in different]
     yield [[*lines, area] for lines in on_lines]
     yield on_lines
     yield [[(room.label.partition(" ")[0], NAME)]]
