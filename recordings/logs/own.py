@@ -38,7 +38,7 @@ def read_journal(path: Path, reading: Reading) -> FieldLog:
     with _copied(path) as connection:
         try:
             events = tuple(_decoded(connection.execute("SELECT body FROM events ORDER BY number")))
-            missions = tuple(_missions(connection.execute("SELECT document FROM missions ORDER BY revision")))
+            missions = tuple(_missions(_documents(connection)))
         except sqlite3.DatabaseError as error:
             raise InputError(f"{path}: is no journal of stopgo, or damaged ({error})") from None
     if not events:
@@ -72,8 +72,16 @@ def _decoded(rows: Iterable[tuple[bytes]]) -> Iterator[AnyEvent]:
             continue
 
 
-def _missions(rows: Iterable[tuple[bytes]]) -> Iterator[Mission]:
-    for (document,) in rows:
+def _documents(connection: sqlite3.Connection) -> Iterator[bytes]:
+    """Each mission's JSON: in pieces by a number, or whole in journals of formats 1 and 2."""
+    pieces = "SELECT data FROM chunks WHERE document = ? ORDER BY number"
+    for (document,) in connection.execute("SELECT document FROM missions ORDER BY revision").fetchall():
+        whole = isinstance(document, bytes)
+        yield document if whole else b"".join(data for (data,) in connection.execute(pieces, (document,)))
+
+
+def _missions(documents: Iterable[bytes]) -> Iterator[Mission]:
+    for document in documents:
         try:
             yield msgspec.json.decode(document, type=Mission)
         except (msgspec.DecodeError, msgspec.ValidationError):

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 from mission.errors import InputError
+from mission.events import Started
 from recordings.logs import read_log
+from tests.bridge.world import corridor
 
 
 def test_tum_is_read_by_its_quaternions_and_bad_lines_are_counted(tmp_path: Path) -> None:
@@ -65,7 +70,7 @@ def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
 def test_a_journal_is_read_with_what_its_writer_had_not_put_away(tmp_path: Path) -> None:
     """Copied from a robot that was killed: the newest lines are in the file beside it."""
     from bridge.robot.journal import open_journal
-    from mission.events import Arrived, Pose, Started
+    from mission.events import Arrived, Pose
 
     about = {"robot": "r1", "boot_id": "b", "run_id": "run", "mission_id": "m", "revision": 1, "number": 0}
     with open_journal(tmp_path / "state", "r1") as journal:
@@ -80,3 +85,23 @@ def test_a_journal_is_read_with_what_its_writer_had_not_put_away(tmp_path: Path)
     assert [type(event).__name__ for event in log.events] == ["Started", "Arrived"]
     assert log.poses[0].xy.tolist() == [[1.0, 2.0]]
     assert {p.name: p.read_bytes() for p in (tmp_path / "copy").iterdir()} == before
+
+
+@pytest.mark.parametrize("pieces", [0, 3])
+def test_a_journals_missions_are_read_whole_and_in_pieces(tmp_path: Path, pieces: int) -> None:
+    """Journals of formats 1 and 2 hold each mission in one row, later ones in pieces of another table."""
+    mission, begun = corridor(), {"robot": "r1", "boot_id": "b", "run_id": "run", "revision": 1, "number": 1}
+    data = msgspec.json.encode(mission)
+    started = Started(**begun, mission_id=mission.id, robot_ns=10**18, mission_time_s=0.0, commander="me")
+    with closing(sqlite3.connect(tmp_path / "journal.sqlite")) as connection, connection:
+        connection.execute("CREATE TABLE events (number INTEGER, body BLOB)")
+        connection.execute("CREATE TABLE missions (revision INTEGER, document BLOB)")
+        connection.execute("CREATE TABLE chunks (document INTEGER, number INTEGER, data BLOB)")
+        connection.execute("INSERT INTO events VALUES (1, ?)", (msgspec.json.encode(started),))
+        connection.execute("INSERT INTO missions VALUES (0, 0)")  # of this one only the name was kept
+        connection.execute("INSERT INTO missions VALUES (1, ?)", (7 if pieces else data,))
+        step = -(-len(data) // 3)
+        for number in reversed(range(pieces)):
+            piece = data[number * step : (number + 1) * step]
+            connection.execute("INSERT INTO chunks VALUES (7, ?, ?)", (number, piece))
+    assert read_log(tmp_path / "journal.sqlite").missions == (mission,)
