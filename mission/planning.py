@@ -332,6 +332,13 @@ class Selection:
     bound: int
     """No selection that reaches the required coverage has fewer stops."""
     method: str
+    everywhere: bool = False
+    """Whether the bound is over every place where a stop may be, and not only over the candidates."""
+
+    @property
+    def among(self) -> str:
+        """What the bound is over, in words."""
+        return "all places" if self.everywhere else "these candidates"
 
     @property
     def coverage(self) -> float:

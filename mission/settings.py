@@ -95,7 +95,7 @@ class Settings:
     ] = None
     candidates: Annotated[str, _plan("grid, triangulation, or module:function")] = "grid"
     visibility: Annotated[str, _plan("exact or bresenham")] = "exact"
-    selector: Annotated[str, _plan("default, greedy, or exact")] = "default"
+    selector: Annotated[str, _plan("default, greedy, exact, or anywhere")] = "default"
     router: Annotated[str, _plan("default or aco (the paper's ant colony)")] = "default"
     graph: Annotated[str, _plan("exact, or grid (the paper's room grids)")] = "exact"
     den_grid_min: Annotated[float, _plan("Least nodes of a room's grid", "per m²", least=0)] = 0.5

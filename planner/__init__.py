@@ -47,6 +47,7 @@ def plan(
 def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
     """Plan from candidates on; `planned` are all parts of the floor that the plan enters."""
     from mission.plan import PartPlan
+    from planner.anywhere import SELECTOR, anywhere
     from planner.appraisal.figures_of_route import figures_of
     from planner.assemble import assemble
     from planner.refine import refined
@@ -57,7 +58,7 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
     observe(found)
     seen = visibility(found)
     observe(seen)
-    selection = refined(select(seen))
+    selection = (anywhere if found.space.settings.selector == SELECTOR else refined)(select(seen))
     observe(selection)
     driven = route(selection)
     observe(driven)

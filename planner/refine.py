@@ -20,6 +20,7 @@ from planner.candidates.grid import main_axes
 from planner.selection import select
 from planner.shapes import local_origin, to_shape
 from planner.visibility import visibility
+from planner.visibility.runs import ranges
 
 STEPS = (-0.5, -0.25, 0.0, 0.25, 0.5)
 """Where places are offered beside a stop, along both axes of its room, in spacings of the grid."""
@@ -37,7 +38,7 @@ def refined(selection: Selection) -> Selection:
     beside = _beside(selection)
     if beside is None:
         return selection
-    again = select(_joined(selection.visibility, visibility(beside)))
+    again = select(joined(selection.visibility, visibility(beside)))
     return again if len(again.chosen) < len(selection.chosen) else selection
 
 
@@ -51,7 +52,7 @@ def _beside(selection: Selection) -> Candidates | None:
     found = judged(candidates.space, places, room, part=candidates.chosen_part)
     known = {_place(point) for point in candidates.xy}
     new = {_place(found.xy[k]): k for k in found.kept[::-1] if _place(found.xy[k]) not in known}
-    return _taken(found, np.array([new[place] for place in sorted(new)])) if new else None
+    return taken(found, np.array([new[place] for place in sorted(new)])) if new else None
 
 
 def _place(point: FloatArray) -> tuple[float, float]:
@@ -73,13 +74,13 @@ PER_CANDIDATE = ("xy", "room", "reason", "part", "doorway", "must")
 """Arrays of `Candidates` that are joined; headings there are none."""
 
 
-def _taken(found: Candidates, index: IntArray) -> Candidates:
+def taken(found: Candidates, index: IntArray) -> Candidates:
     """Some of the candidates, marked as extra ones."""
     taken: dict[str, Any] = {name: _frozen(getattr(found, name)[index]) for name in PER_CANDIDATE}
     return replace(found, **taken, extra=_frozen(np.ones(len(index), dtype=np.bool_)))
 
 
-def _joined(seen: Visibility, more: Visibility) -> Visibility:
+def joined(seen: Visibility, more: Visibility) -> Visibility:
     """The candidates of both with what they see."""
     one, other = seen.candidates, more.candidates
     both: dict[str, Any] = {name: _frozen(getattr(one, name), getattr(other, name)) for name in PER_CANDIDATE}
@@ -92,6 +93,26 @@ def _joined(seen: Visibility, more: Visibility) -> Visibility:
         segment=_frozen(seen.segment, more.segment),
         first=_frozen(seen.first, more.first),
         last=_frozen(seen.last, more.last),
+    )
+
+
+def with_rows(seen: Visibility, rows: IntArray) -> Visibility:
+    """The visibility where of the reachable candidates only some are left (k,), ascending."""
+    candidates = seen.candidates
+    left_out = np.delete(candidates.kept, rows)
+    index = np.setdiff1d(np.arange(len(candidates.xy)), left_out)
+    some: dict[str, Any] = {name: _frozen(getattr(candidates, name)[index]) for name in PER_CANDIDATE}
+    extra = candidates.extra if len(candidates.extra) else np.zeros(len(candidates.xy), dtype=np.bool_)
+    counts = np.diff(seen.pointer)[rows]
+    run = ranges(seen.pointer[rows], counts)
+    return replace(
+        seen,
+        candidates=replace(candidates, **some, extra=_frozen(extra[index])),
+        pointer=_frozen(np.concatenate([[0], np.cumsum(counts)])),
+        segment=_frozen(seen.segment[run]),
+        first=_frozen(seen.first[run]),
+        last=_frozen(seen.last[run]),
+        in_sight=None if seen.in_sight is None else with_rows(seen.in_sight, rows),
     )
 
 

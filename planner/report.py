@@ -73,6 +73,7 @@ class PlanReport:
                 "stops": len(selection.chosen),
                 "coverage": selection.coverage,
                 "bound": selection.bound,
+                "bound_over": selection.among,
                 "method": selection.method,
             },
             **network_table(self.mission),
@@ -125,7 +126,8 @@ class PlanReport:
             f"{floor['openings']} openings; {floor['reached_m2']:.0f} of {figures.rooms_m2:.0f} m² reached",
             f"  targets     {told['targets']['total']} units, "
             f"{told['visibility']['visible']} visible from {told['candidates']['reachable']} candidates",
-            f"  stops       {chosen['stops']} (of these candidates at least {chosen['bound']} are needed)",
+            f"  stops       {chosen['stops']} "
+            f"(of {chosen['bound_over']} at least {chosen['bound']} are needed)",
             f"  route       {route['length_m']:.1f} m {route['tour']} "
             f"(no route is below {route['bound_m']:.1f} m), from {route['start']}",
             f"  time        {times['total_s'] / 60:.0f} min: drive {times['drive_s']:.0f} s, "

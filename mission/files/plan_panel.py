@@ -65,7 +65,7 @@ def facts_of(route: Route, mission: Mission, *, date: str) -> list[tuple[str, st
             if (told := limits_in_words(mission.limits, brief=True))
             else []
         ),
-        ("Stops", f"{len(mission.stops)}, of these candidates at least {selection.bound}"),
+        ("Stops", f"{len(mission.stops)}, of {selection.among} at least {selection.bound}"),
         (
             "Coverage",
             f"{100 * selection.coverage:.1f} % of what is in sight, {_required(selection.required)}",

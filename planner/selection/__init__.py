@@ -54,11 +54,12 @@ ROUNDS = 6
 EXACT_ROUNDS = 60
 SWAPS_BETWEEN = 120
 """Swaps tried in each of those rounds before a smaller selection is given up."""
-METHODS: dict[str, Selector] = {"default": _default, "greedy": _greedy, "exact": _exact}
+METHODS: dict[str, Selector] = {"default": _default, "greedy": _greedy, "exact": _exact, "anywhere": _default}
 NAMES = {
     "default": "greedy, drop-and-repair",
     "greedy": "greedy",
     "exact": "greedy, drop-and-repair, branch and bound",
+    "anywhere": "greedy, drop-and-repair",
 }
 
 
@@ -70,7 +71,7 @@ def select(visibility: Visibility) -> Selection:
     """
     settings = visibility.candidates.space.settings
     method = variant("selector", settings.selector, METHODS)
-    whole, fixed, problem = _posed(visibility)
+    whole, fixed, problem = posed(visibility)
     if settings.overlap > 0:
         return _select_connected(visibility, whole, fixed, method)
     rows, bound = _solved(method, problem, settings)
@@ -80,13 +81,13 @@ def select(visibility: Visibility) -> Selection:
 
 def quick(visibility: Visibility) -> tuple[int, int]:
     """About how many stops it takes, by few swaps after greedy, and the number that no choice goes below."""
-    _, fixed, problem = _posed(visibility)
+    _, fixed, problem = posed(visibility)
     start, bound = _greedy(problem, visibility.candidates.space.settings)
     rows = improved(problem, start, at_least=bound, swaps=QUICK_SWAPS)
     return len(fixed) + len(rows), len(fixed) + bound
 
 
-def _posed(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
+def posed(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
     """The whole problem, the rows that are chosen in any case, and what is left to choose after them."""
     candidates = visibility.candidates
     settings = candidates.space.settings
@@ -210,4 +211,4 @@ def _coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
     return np.array(steps)
 
 
-__all__ = ["METHODS", "Selector", "quick", "select", "select_further"]
+__all__ = ["METHODS", "Selector", "posed", "quick", "select", "select_further"]

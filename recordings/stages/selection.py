@@ -135,7 +135,7 @@ def _plot_coverage(canvas: Canvas, selection: Selection) -> None:
     canvas.show(required, rr.SeriesLines(colors=palette.OUTLINE, names="required", widths=1))
     canvas.say(
         f"selection ({selection.method}): {count} stops, coverage {percent(selection.coverage)},"
-        f" at least {selection.bound} are needed",
+        f" at least {selection.bound} are needed{' of all places' if selection.everywhere else ''}",
         step=step_of_choice(max(count, 1)),
     )
 
