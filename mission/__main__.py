@@ -29,7 +29,7 @@ EXTRAS = {
     "numba": "plan", "pyproj": "plan", "ifcopenshell": "bim",
     "rerun": "record", "rosbags": "record", "pyulog": "record",
     "laspy": "clouds", "pye57": "clouds", "reportlab": "plan",
-    "embreex": "prove", "small_gicp": "prove", "kiss_matcher": "prove",
+    "embreex": "prove", "small_gicp": "prove", "kiss_matcher": "prove", "pyvrp": "fleet",
 }  # fmt: skip
 """The extra that installs each optional library."""
 

@@ -86,6 +86,16 @@ class LimitsSpec(Document, frozen=True):
     """Stops that must see it."""
 
 
+class MissionShare(Document, frozen=True):
+    """Which of the missions that together see a floor this is."""
+
+    kind: Literal["robot", "tour"]
+    """Of robots that drive at the same time, or of tours that one robot drives one after another."""
+    number: int
+    """From 1."""
+    of: int
+
+
 class Start(Document, frozen=True):
     x: float
     y: float
@@ -166,6 +176,8 @@ class Mission(Document, frozen=True, kw_only=True):
     scanner: ScannerSpec
     limits: LimitsSpec | UnsetType = UNSET
     """Absent where there are none."""
+    share: MissionShare | UnsetType = UNSET
+    """Absent where this mission alone sees its part of the floor."""
     start: Start
     stops: tuple[Stop, ...]
     return_: tuple[Point, ...] | None = msgspec.field(name="return")

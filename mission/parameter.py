@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin
@@ -22,6 +23,18 @@ def numbers(text: str) -> tuple[float, ...]:
 def words(text: str) -> tuple[str, ...]:
     """The words in `walls,columns`."""
     return tuple(part.strip() for part in text.split(","))
+
+
+def seconds(text: str) -> float:
+    """Seconds in `1800`, `90s`, `30min` or `1h30min`."""
+    found = _DURATION.fullmatch(text.replace(" ", ""))
+    if found is None or not found[0]:
+        return float(text)
+    return sum(float(part) * size for part, size in zip(found.groups(), (3600, 60, 1), strict=True) if part)
+
+
+_NUMBER = r"(\d+(?:\.\d+)?)"
+_DURATION = re.compile(f"(?:{_NUMBER}h)?(?:{_NUMBER}min)?(?:{_NUMBER}s)?")
 
 
 @dataclass(frozen=True)
@@ -49,6 +62,8 @@ class Parameter:
     """… and read."""
     known: tuple[str, ...] = ()
     """What such words may be."""
+    further: str = ""
+    """The parameter that holds the option's values from the second on; its own option is this one."""
     option: str = ""
     """The option's name, where it is another. Such an option, as every list of lists, may be repeated."""
     quiet: bool = False

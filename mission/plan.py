@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from mission.document import Mission
 from mission.figures import Figures, percent
 from mission.floor import FloorPlan
 from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
+from mission.schedule import schedule
 from mission.settings import Settings
 
 
@@ -51,11 +52,39 @@ class PartPlan:
         return f"PartPlan({self.mission.name}: {len(self.mission.stops)} stops, {share} seen, {length:.1f} m)"
 
 
+@dataclass(frozen=True, eq=False)
+class DividedPlan:
+    """A part's plan, shared out among robots or tours: a mission for each."""
+
+    kind: Literal["robot", "tour"]
+    whole: PartPlan
+    """The plan of all stops, as one robot would drive them in one tour."""
+    shares: tuple[PartPlan, ...]
+    limit_s: float | None
+    """Seconds that every tour stays within; None for robots."""
+    bound: float
+    """For robots, seconds that the longest takes at least; for tours, how many there are at least."""
+    method: str
+
+    @property
+    def longest_s(self) -> float:
+        """Seconds of the longest mission."""
+        return max(schedule(share.mission).total_s for share in self.shares)
+
+    @property
+    def total_s(self) -> float:
+        """Seconds of all missions together."""
+        return sum(schedule(share.mission).total_s for share in self.shares)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """The plans of a floor's parts; the first is of the part that holds the start, else of the largest."""
 
     parts: tuple[PartPlan, ...]
+    """Each with its mission; of a plan that is shared out, a share each."""
+    divided: DividedPlan | None = None
+    """How the stops are shared out; None where one mission has them all."""
 
     @property
     def first(self) -> PartPlan:
@@ -71,6 +100,11 @@ class Plan:
         return tuple(part.mission for part in self.parts)
 
     @property
+    def shared(self) -> tuple[Mission, ...]:
+        """The missions among which the stops are shared out; none where one mission has them all."""
+        return () if self.divided is None else tuple(share.mission for share in self.divided.shares)
+
+    @property
     def space(self) -> NavigableSpace:
         return self.first.space
 
@@ -83,16 +117,21 @@ class Plan:
         return self.space.settings
 
     @property
+    def whole(self) -> PartPlan:
+        """The first part's plan with all its stops, shared out or not."""
+        return self.first if self.divided is None else self.divided.whole
+
+    @property
     def figures(self) -> Figures:
-        return self.first.figures
+        return self.whole.figures
 
     @property
     def route(self) -> Route:
-        return self.first.route
+        return self.whole.route
 
     @property
     def selection(self) -> Selection:
-        return self.first.selection
+        return self.whole.selection
 
     def __repr__(self) -> str:
         return f"Plan({', '.join(map(repr, self.parts))})"
@@ -101,4 +140,5 @@ class Plan:
         """The printed plan of the first part, for notebooks."""
         from mission.files.plan_svg import plan_svg
 
-        return plan_svg(self.route, self.mission, self.figures, date="").decode()
+        whole = self.whole
+        return plan_svg(whole.route, whole.mission, whole.figures, self.shared, date="").decode()

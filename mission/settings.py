@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal, get_type_hints
 from mission.errors import InputError
 from mission.kinds import KINDS
 from mission.layer_kinds import check_entries, entries_in, kinds_by_name
-from mission.parameter import Parameter, words
+from mission.parameter import Parameter, seconds, words
 from mission.scanners import SCANNERS, ScannerName
 from mission.toml_file import read_toml
 
@@ -183,10 +183,40 @@ class Settings:
     start: Annotated[
         Triple | None,
         _plan(
-            "Where the robot starts",
+            "Where the robot starts; with robots, once for all or once for each",
             "m and degrees counter-clockwise from +x",
             form="X,Y,HEADING",
             example="2.5,3.0,90",
+            further="further_starts",
+        ),
+    ] = None
+    further_starts: Annotated[
+        tuple[Triple, ...] | None,
+        _plan(
+            "Where the second and each further robot starts",
+            "m and degrees",
+            form="X,Y,HEADING",
+            example="2.5,3.0,90",
+            option="start",
+            quiet=True,
+        ),
+    ] = None
+    robots: Annotated[
+        int | None,
+        _plan(
+            "Robots that share the floor, each with a mission", least=1, most=50, undecided="1", quiet=True
+        ),
+    ] = None
+    shift: Annotated[
+        float | None,
+        _plan(
+            "Longest a tour may take until it is back at its start",
+            "s",
+            above=0,
+            form="DURATION",
+            example="1800, 30min or 1h30min",
+            read=seconds,
+            quiet=True,
         ),
     ] = None
     end: Annotated[Pair | None, _plan("Where the robot's way ends", "m", form="X,Y", example="2.5,3.0")] = (
@@ -220,6 +250,18 @@ class Settings:
     ] = None
     speed: Annotated[float, _robot("The robot's speed", "m/s", least=0.001)] = 0.5
     turn_rate: Annotated[float, _robot("How fast it turns", "degrees/s", least=0.01)] = 45.0
+    battery: Annotated[
+        float | None,
+        _robot(
+            "How long it runs on one charge, which limits tours as a shift does",
+            "s",
+            above=0,
+            form="DURATION",
+            example="5400, 90min or 1h30min",
+            read=seconds,
+            quiet=True,
+        ),
+    ] = None
     acceleration: Annotated[float, _robot("How fast it speeds up", "m/s²", least=0.001)] = 0.5
     scanner: Annotated[
         ScannerName | None,
@@ -290,6 +332,22 @@ class Settings:
         if self.coverage_rule == "paper":
             return None
         return LEAST_SHARE if given is None else given
+
+    @property
+    def tour_limit(self) -> tuple[str, float] | None:
+        """The parameter that limits how long a tour may take, and its seconds; None where none does."""
+        limits = [(key, value) for key in ("shift", "battery") if (value := getattr(self, key)) is not None]
+        return min(limits, key=lambda limit: limit[1], default=None)
+
+    @property
+    def divided(self) -> bool:
+        """Whether the stops are shared out among several tours or robots."""
+        return self.tour_limit is not None or self.robots is not None
+
+    @property
+    def starts(self) -> tuple[Triple, ...]:
+        """Every start that is given."""
+        return () if self.start is None else (self.start, *(self.further_starts or ()))
 
     @property
     def radius(self) -> float:
@@ -400,6 +458,7 @@ def check_settings(settings: Settings) -> None:
     for key, parameter in PARAMETERS.items():
         parameter.check(getattr(settings, key))
     _check_together(settings)
+    _check_division(settings)
     _check_days(settings)
     _check_lists(settings)
     _check_region(settings)
@@ -432,6 +491,43 @@ def _check_together(settings: Settings) -> None:
         )
     if settings.tour == "closed" and settings.end is not None:
         raise InputError("tour = closed and end are both given; a closed tour ends where it starts")
+
+
+def _check_division(settings: Settings) -> None:
+    """Refuse robots without a start, and tours that cannot be driven so."""
+    starts = len(settings.starts)
+    if settings.further_starts and settings.start is None:
+        raise InputError("further_starts are given without start; give start, of the first robot")
+    if starts > 1 and starts != (settings.robots or 1):
+        raise InputError(
+            f"robots = {settings.robots or 1}: {starts} starts are given; give --start once for all robots, "
+            "or once for each"
+        )
+    if not settings.divided:
+        return
+    what = "robots" if settings.robots is not None else settings.tour_limit[0]  # type: ignore[index]
+    if settings.robots is not None and settings.tour_limit is not None:
+        raise InputError(f"robots and {settings.tour_limit[0]} are both given; plan for one of them")
+    if settings.robots is not None and not starts:
+        raise InputError(
+            f"robots = {settings.robots}: no robot has a start; give --start X,Y,HEADING once for all, "
+            "or once for each"
+        )
+    if settings.overlap:
+        raise InputError(
+            f"overlap = {settings.overlap:g}: is not done with {what}: pairs of scans are told within one "
+            "mission; leave one of them out"
+        )
+    if settings.end is not None:
+        raise InputError(f"end and {what} are both given; leave one of them out")
+    if settings.tour_limit is not None and settings.tour == "open":
+        raise InputError(f"tour = open: with {what} every tour comes back to its start; leave tour out")
+    least = settings.settle + settings.scan_time
+    if settings.tour_limit is not None and settings.tour_limit[1] < least:
+        raise InputError(
+            f"{what} = {settings.tour_limit[1]:g} s: is shorter than one stop, which takes {least:g} s; "
+            "give more time, or a shorter scan_time"
+        )
 
 
 def _check_days(settings: Settings) -> None:

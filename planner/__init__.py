@@ -32,6 +32,7 @@ def plan(
     InputError
         A start, an end or a variant that does not fit the floor.
     """
+    from mission.errors import InputError
     from mission.plan import Plan
     from planner.candidates import candidates
     from planner.space.navigable import navigable
@@ -39,8 +40,12 @@ def plan(
     observe(floor)
     space = navigable(floor, settings)
     observe(space)
+    if all_parts and settings.divided:
+        raise InputError("--all-parts is not done with robots or shifts; plan each part by its --start")
     found = parts_to_plan(space) if all_parts else [candidates(space)]
     planned = frozenset(part.chosen_part for part in found)
+    if settings.divided:
+        return _plan_divided(found[0], planned, observe)
     return Plan(tuple(_plan_part(part, k, planned, observe) for k, part in enumerate(found)))
 
 
@@ -67,6 +72,30 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
     mission = assemble(driven, part=number)
     observe(mission)
     return PartPlan(driven, figures, mission)
+
+
+UNDIVIDED = -1
+"""Number of the plan that is shared out: its mission is not driven, and has an id of its own."""
+
+
+def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) -> Plan:
+    """Plan one part, and share its stops out among robots or tours."""
+    from mission.document import MissionShare
+    from mission.plan import DividedPlan, PartPlan, Plan
+    from planner.appraisal.figures_of_route import figures_of_share
+    from planner.assemble import assemble
+    from planner.sharing.dividing import divided
+
+    whole = _plan_part(found, UNDIVIDED, planned, observe)
+    out = divided(whole.route)
+    shares = []
+    for k, route in enumerate(out.routes):
+        share = MissionShare(kind=out.kind, number=k + 1, of=len(out.routes))
+        mission = assemble(route, part=k, share=share)
+        shares.append(PartPlan(route, figures_of_share(route, whole.figures), mission))
+    made = DividedPlan(out.kind, whole, tuple(shares), out.limit_s, out.bound, out.method)
+    observe(made)
+    return Plan(made.shares, made)
 
 
 def parts_to_plan(space: NavigableSpace) -> list[Candidates]:

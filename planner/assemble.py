@@ -7,11 +7,13 @@ import math
 import msgspec
 import numpy as np
 import shapely
+from msgspec import UNSET, UnsetType
 
 from mission import __version__
 from mission.document import (
     Frame,
     Mission,
+    MissionShare,
     Point,
     Sees,
     SiteOrigin,
@@ -47,8 +49,13 @@ CLEAR_SLACK = 2e-6
 """What rounding to DECIMALS may cost in clearance."""
 
 
-def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
-    """The mission of a route; `part` numbers the missions of a floor with several parts."""
+def assemble(
+    route: Route, *, part: int = 0, revision: int = 1, share: MissionShare | UnsetType = UNSET
+) -> Mission:
+    """The mission of a route; `part` numbers the missions of a floor that has several.
+
+    `share` says which of the missions it is that together see what the floor's plan promises.
+    """
     space = route.selection.visibility.candidates.space
     settings, floor = space.settings, space.floor
     check_legs(route)
@@ -56,13 +63,14 @@ def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
         Mission(
             id=mission_id(floor.source, settings, __version__, part),
             revision=revision,
-            name=floor.name if part == 0 else f"{floor.name}-{part + 1}",
+            name=_name(floor.name, part, share),
             digest="",
             frame=Frame(name="map", to_map=SAME) if floor.on_robots_map else Frame(name="site"),
             georeference=_georeference(space),
             robot=robot_of(settings),
             scanner=scanner_of(settings),
             limits=limits_spec_of(settings),
+            share=share,
             start=Start(
                 x=rounded(route.start[0]),
                 y=rounded(route.start[1]),
@@ -76,6 +84,12 @@ def assemble(route: Route, *, part: int = 0, revision: int = 1) -> Mission:
             network=registered_pairs(route) if settings.overlap > 0 else msgspec.UNSET,
         )
     )
+
+
+def _name(floor: str, part: int, share: MissionShare | UnsetType) -> str:
+    if share is not UNSET:
+        return f"{floor} {share.kind} {share.number} of {share.of}"
+    return floor if part <= 0 else f"{floor}-{part + 1}"
 
 
 def _georeference(space: NavigableSpace) -> SiteOrigin | None:

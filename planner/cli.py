@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from mission.document import Mission
     from mission.floor import FloorPlan
     from mission.heard_run import HeardRun
-    from mission.plan import PartPlan
+    from mission.plan import PartPlan, Plan
     from mission.plan_proof import PlanProof
     from mission.settings import Settings
     from planner.report import PlanReport
@@ -149,9 +149,13 @@ def plan_files(
     with _telling_findings(read):
         made = plan(read, settings, observe=watch.observe, all_parts=all_parts)
     parts = enumerate(made.parts)
-    reports = [_write_part(part, folder, number, watch, printed or Printed()) for number, part in parts]
+    reports = [_write_part(part, folder, number, watch, printed or Printed(), made) for number, part in parts]
     _set_aside(folder, len(reports), read, settings)
-    return reports
+    if made.divided is None:
+        return reports
+    from planner.sharing.shared_report import shared_report
+
+    return [shared_report(made.divided, reports)]
 
 
 @contextmanager
@@ -188,7 +192,9 @@ def _folder(out: Path) -> Path:
     return out
 
 
-def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch, printed: Printed) -> PlanReport:
+def _write_part(
+    part: PartPlan, folder: Path, number: int, watch: Stopwatch, printed: Printed, plan: Plan
+) -> PlanReport:
     """Write the plan of one part; its files appear together, mission.json last."""
     from dataclasses import replace
 
@@ -198,7 +204,7 @@ def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch, pri
     from mission.files.plan_svg import plan_svg
     from mission.schedule import schedule
     from mission.sight import sight_of
-    from planner.outputs import names, set_aside_sheets
+    from planner.outputs import names, set_aside_file
     from planner.report import PlanReport
 
     files = names(folder, number)
@@ -208,27 +214,32 @@ def _write_part(part: PartPlan, folder: Path, number: int, watch: Stopwatch, pri
         del files["recording"]
     today = datetime.date.today().isoformat()
     sheets = _sheets(part, mission, printed, today, files["sheets"])
-    unwanted = files.pop("sheets") if sheets is None else None
+    unwanted = [files.pop("sheets")] if sheets is None else []
+    unwanted += [files.pop("picture")] if plan.divided and number else []
     with replacing(*(files[key] for key in WRITTEN if key in files)) as (
         *others,
-        coverage,
-        picture,
         document,
     ):
+        written = dict(zip((key for key in WRITTEN if key in files), others, strict=False))
         if recording is not None:
             sight = sight_of(part.route, mission, part.figures)
             for noun in (*part.nouns(), mission, schedule(mission), sight):
                 recording.observe(noun)
-            recording.write(others[0])
+            recording.write(written["recording"])
         watch.lap("recording")
         if sheets is not None:
-            others[-1].write_bytes(sheets)
-        coverage.write_bytes(coverage_json(part.route, mission, part.figures))
-        drawn = plan_svg(part.route, mission, part.figures, date=today, with_range=printed.rings)
-        picture.write_bytes(drawn)
+            written["sheets"].write_bytes(sheets)
+        written["coverage"].write_bytes(coverage_json(part.route, mission, part.figures))
+        if "picture" in written:
+            shown = part if plan.divided is None else plan.divided.whole
+            its = mission if plan.divided is None else shown.mission
+            drawn = plan_svg(
+                shown.route, its, shown.figures, plan.shared, date=today, with_range=printed.rings
+            )
+            written["picture"].write_bytes(drawn)
         document.write_bytes(encode(mission))
-    if unwanted is not None:
-        set_aside_sheets(unwanted)
+    for path in unwanted:
+        set_aside_file(path)
     watch.lap("files")
     return PlanReport(part=replace(part, mission=mission), files=files, times_s=watch.times())
 

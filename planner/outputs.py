@@ -45,8 +45,8 @@ def set_aside(folder: Path, parts: int, source: FloorSource, settings: Settings)
     return moved
 
 
-def set_aside_sheets(path: Path) -> Path | None:
-    """Rename the sheets of an earlier plan, where the plan that was made has none; their new name."""
+def set_aside_file(path: Path) -> Path | None:
+    """Rename a file of an earlier plan that the plan that was made has none of; its new name."""
     return _renamed(path) if path.exists() else None
 
 

@@ -120,7 +120,7 @@ class PlanReport:
     def as_text(self) -> str:
         """What a person reads: the plan, what it sees, what it leaves out, and what is doubtful."""
         told, figures = self.as_json(), self.figures
-        floor, route, times, chosen = told["floor"], told["route"], told["schedule"], told["selection"]
+        floor, times, chosen = told["floor"], told["schedule"], told["selection"]
         lines = [
             f"{printable(floor['name'])}: {floor['area_m2']:.0f} m², {floor['rooms']} rooms, "
             f"{floor['openings']} openings; {floor['reached_m2']:.0f} of {figures.rooms_m2:.0f} m² reached",
@@ -128,8 +128,7 @@ class PlanReport:
             f"{told['visibility']['visible']} visible from {told['candidates']['reachable']} candidates",
             f"  stops       {chosen['stops']} "
             f"(of {chosen['bound_over']} at least {chosen['bound']} are needed)",
-            f"  route       {route['length_m']:.1f} m {route['tour']} "
-            f"(no route is below {route['bound_m']:.1f} m), from {route['start']}",
+            *self._way_lines(told["route"]),
             f"  time        {times['total_s'] / 60:.0f} min: drive {times['drive_s']:.0f} s, "
             f"turn {times['turn_s']:.0f} s, settle {times['settle_s']:.0f} s, scan {times['scan_s']:.0f} s",
             *quality_lines(figures),
@@ -141,7 +140,16 @@ class PlanReport:
             for u in figures.unreached
         ]
         lines += finding_lines(figures.findings)
-        return "\n".join([*lines, *(f"  {key:<11} {path}" for key, path in self.files.items())])
+        return "\n".join([*lines, *self._file_lines()])
+
+    def _way_lines(self, route: dict[str, Any]) -> list[str]:
+        return [
+            f"  route       {route['length_m']:.1f} m {route['tour']} "
+            f"(no route is below {route['bound_m']:.1f} m), from {route['start']}"
+        ]
+
+    def _file_lines(self) -> list[str]:
+        return [f"  {key:<11} {path}" for key, path in self.files.items()]
 
 
 def quality_told(figures: Figures) -> dict[str, Any]:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import UNSET
 
 from mission.document import Mission
 from mission.figures import Figures, Share, percent
 from mission.files import floor_drawing as floor_look
 from mission.files import route_drawing as route_look
+from mission.files.shared_drawing import back, letter, line_of
 from mission.files.sheet import COLUMN, HEADER, ROW, Chunk, PaperBox, PaperSheet
 from mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
+from mission.geometry import polyline_length
 from mission.limits import limits_in_words
 from mission.network import network_of
-from mission.planning import Route
+from mission.planning import Route, Selection
 from mission.schedule import schedule
 from mission.table import duration
 
@@ -49,13 +52,14 @@ def title_block(mission: Mission, facts: list[tuple[str, str]], box: PaperBox) -
     return group("title", (_frame(box), *lines))
 
 
-def facts_of(route: Route, mission: Mission, *, date: str) -> list[tuple[str, str]]:
+def facts_of(
+    route: Route, mission: Mission, shared: Sequence[Mission] = (), *, date: str
+) -> list[tuple[str, str]]:
     """Lines of the title block; the sheet's own (scale, paper) are put in when it is chosen."""
     selection, robot = route.selection, mission.robot
     settings = selection.visibility.candidates.space.settings
     return [
-        ("Mission", f"{mission.id[:12]}, revision {mission.revision}"),
-        ("Digest", mission.digest[:12]),
+        *_whose(mission, shared),
         ("Floor", mission.origin.floor),
         ("Floor digest", mission.origin.floor_digest[:12]),
         ("Date", date),
@@ -65,20 +69,60 @@ def facts_of(route: Route, mission: Mission, *, date: str) -> list[tuple[str, st
             if (told := limits_in_words(mission.limits, brief=True))
             else []
         ),
-        ("Stops", f"{len(mission.stops)}, of {selection.among} at least {selection.bound}"),
-        (
-            "Coverage",
-            f"{100 * selection.coverage:.1f} % of what is in sight, {_required(selection.required)}",
-        ),
+        ("Stops", _stops(mission, selection)),
+        ("Coverage", _coverage(mission, selection)),
         ("Clearances", f"d_sec {settings.d_sec:g} m, robot {robot.radius:g} m, edge {settings.edge:g} m"),
-        ("Route", f"{route.length:.1f} m, {route.tour} tour, {robot.speed:g} m/s"),
-        ("Planned time", _time(schedule(mission).total_s)),
+        ("Route", _way(route, shared) + f", {robot.speed:g} m/s"),
+        ("Planned time", _times([schedule(item).total_s for item in shared or (mission,)])),
         ("Made by", f"stopgo {mission.origin.stopgo}"),
     ]
 
 
 def _time(seconds: float) -> str:
     return f"{duration(seconds)} ({'h:min:s' if seconds >= 3600 else 'min:s'})"
+
+
+def _whose(mission: Mission, shared: Sequence[Mission]) -> list[tuple[str, str]]:
+    """The mission, or those that share its stops."""
+    if shared:
+        return [(letter(k), f"{share_in_words(item)}: {item.id[:12]}") for k, item in enumerate(shared)]
+    own = [] if mission.share is UNSET else [("Share", share_in_words(mission))]
+    return [
+        *own,
+        ("Mission", f"{mission.id[:12]}, revision {mission.revision}"),
+        ("Digest", mission.digest[:12]),
+    ]
+
+
+def share_in_words(mission: Mission) -> str:
+    """Which of the missions that together see a floor it is."""
+    share = mission.share
+    return "" if share is UNSET else f"{share.kind} {share.number} of {share.of}"
+
+
+def _stops(mission: Mission, selection: Selection) -> str:
+    if mission.share is not UNSET:
+        return f"{len(mission.stops)} of this {mission.share.kind}"
+    return f"{len(mission.stops)}, of {selection.among} at least {selection.bound}"
+
+
+def _coverage(mission: Mission, selection: Selection) -> str:
+    seen = f"{100 * selection.coverage:.1f} % of what is in sight"
+    return f"{seen}, {_required(selection.required)}" if mission.share is UNSET else f"{seen}, by these alone"
+
+
+def _way(route: Route, shared: Sequence[Mission]) -> str:
+    if not shared:
+        return f"{route.length:.1f} m, {route.tour} tour"
+    legs = [leg for item in shared for leg in (*(stop.approach for stop in item.stops), item.return_ or ())]
+    metres = sum(polyline_length(np.array(leg)) for leg in legs if len(leg) > 1)
+    return f"{metres:.1f} m together"
+
+
+def _times(seconds: list[float]) -> str:
+    if len(seconds) == 1:
+        return _time(seconds[0])
+    return f"longest {_time(max(seconds))}, together {duration(sum(seconds))}"
 
 
 def _required(share: float) -> str:
@@ -89,7 +133,7 @@ def legend_height(entries: list[tuple[str, str]]) -> float:
     return 7.0 + LINE * math.ceil(len(entries) / 2) + SCALE_AND_AXES
 
 
-def legend_entries(route: Route, mission: Mission) -> list[tuple[str, str]]:
+def legend_entries(route: Route, mission: Mission, shared: Sequence[Mission] = ()) -> list[tuple[str, str]]:
     """(symbol, words) for everything that is on this plan, and nothing else."""
     space = route.selection.visibility.candidates.space
     openings = {state.passable for state in space.openings}
@@ -103,8 +147,10 @@ def legend_entries(route: Route, mission: Mission) -> list[tuple[str, str]]:
         ("stop", "stop, and its heading", bool(mission.stops)),
         ("doorway", "stop in a doorway", any(stop.doorway for stop in mission.stops)),
         ("start", "start", True),
-        ("way", "route", bool(mission.stops)),
-        ("back", _back_words(route), mission.return_ is not None),
+        *((f"way {k}", f"{letter(k)}: {share_in_words(item)}", True) for k, item in enumerate(shared)),
+        ("way", "route", bool(mission.stops) and not shared),
+        ("back", _back_words(route), mission.return_ is not None and not shared),
+        ("thin", "its way back", any(item.return_ is not None for item in shared)),
         *_network_entries(mission),
     ]
     kinds = [(kind, kind) for kind in floor_look.kinds_of(space.floor)]
@@ -141,8 +187,10 @@ def legend(entries: list[tuple[str, str]], mission: Mission, sheet: PaperSheet) 
 
 def _symbol(name: str, x: float, y: float) -> str:
     """A sample 7 mm wide with its middle at height y."""
-    if name in _STROKES:
-        return line(x, y, x + 7, y, **_STROKES[name])
+    kind, _, which = name.partition(" ")
+    strokes = {**_STROKES, **({name: line_of(int(which))} if which and kind == "way" else {})}
+    if name in strokes:
+        return line(x, y, x + 7, y, **strokes[name])
     place = np.array([x + 3.5, y])
     if name == "blocked":
         mark = path([floor_look.cross(place, size=1.1)], fill="none", **floor_look.BLOCKED)
@@ -171,6 +219,7 @@ _STROKES: dict[str, dict[str, object]] = {
     "back": route_look.BACK,
     "pair": route_look.PAIR,
     "bridge": route_look.BRIDGE,
+    "thin": back(0),
 }
 
 
@@ -230,12 +279,22 @@ STOP_HEAD = Row(("no", "x m", "y m", "heading °", "units", "new", "time"), STOP
 SHARE_HEAD = Row(("coverage", "all", "visible", "seen", "seen %"), SHARE_EDGES, bold=True, to_left=True)
 
 
-def stop_rows(mission: Mission) -> list[Row]:
+def shared_rows(missions: Sequence[Mission]) -> list[Row]:
+    """The stops of every mission, below a line that says whose they are."""
+    rows: list[Row] = []
+    for k, mission in enumerate(missions):
+        taken = duration(schedule(mission).total_s)
+        told = f"{letter(k)}: {share_in_words(mission)}, {len(mission.stops)} stops, {taken}"
+        rows += [_words(told, bold=True), *stop_rows(mission, before=letter(k))]
+    return rows
+
+
+def stop_rows(mission: Mission, *, before: str = "") -> list[Row]:
     """A row per stop, as the robot meets them; a doorway stop has a `d` after its number."""
     arrivals = schedule(mission).arrival_s.tolist()
     cells: list[tuple[str, ...]] = [
         (
-            *(f"{number}{'d' if stop.doorway else ''}", f"{stop.x:.3f}", f"{stop.y:.3f}"),
+            *(f"{before}{number}{'d' if stop.doorway else ''}", f"{stop.x:.3f}", f"{stop.y:.3f}"),
             *(f"{math.degrees(stop.heading):.1f}", str(stop.sees.units), str(stop.sees.new_units)),
             duration(arrival),
         )
@@ -281,8 +340,9 @@ def _chunk(rows: list[Row], chunk: Chunk) -> str:
     box = chunk.box
     shown = rows[chunk.first : chunk.first + chunk.count]
     lines = [_frame(box)]
-    head = {STOP_EDGES: STOP_HEAD, SHARE_EDGES: SHARE_HEAD}.get(shown[0].edges)
-    if head is not None and not shown[0].bold:
+    first = shown[1] if len(shown) > 1 and shown[1].edges == STOP_EDGES else shown[0]
+    head = {STOP_EDGES: STOP_HEAD, SHARE_EDGES: SHARE_HEAD}.get(first.edges)
+    if head is not None and not first.bold:
         lines.append(_row(head, box.x, box.y + HEADER - 1.5))
     for index, row in enumerate(shown):
         top = box.y + HEADER + ROW * index

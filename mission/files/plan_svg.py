@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import chain
 
 import numpy as np
@@ -12,6 +13,7 @@ from mission.files import plan_panel as panel
 from mission.files.floor_drawing import building, targets
 from mission.files.room_labels import STOPS, WALLS, WAY, Busy, points_along, room_labels
 from mission.files.route_drawing import STOP, network, rings, route, stops
+from mission.files.shared_drawing import shared_routes, shared_stops
 from mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit
 from mission.files.svg import FONT, attributes, clean, group, number, rect
 from mission.floor import FloorPlan
@@ -23,15 +25,23 @@ PADDING = 8.0
 
 
 def plan_svg(
-    made: Route, mission: Mission, figures: Figures | None = None, *, date: str, with_range: bool = False
+    made: Route,
+    mission: Mission,
+    figures: Figures | None = None,
+    shared: Sequence[Mission] = (),
+    *,
+    date: str,
+    with_range: bool = False,
 ) -> bytes:
     """The plan as SVG, with a table of its figures where they are given.
+
+    Where its stops are `shared` out among several missions, these are drawn in place of its own.
 
     `date` stands in the title block as given, so equal inputs give equal bytes.
 
     `with_range` adds a faint ring of the scanner's range about each stop.
     """
-    content, sheet = overview(made, mission, figures, date=date, with_range=with_range)
+    content, sheet = overview(made, mission, figures, shared, date=date, with_range=with_range)
     return _document(sheet, mission, content)
 
 
@@ -39,81 +49,92 @@ def overview(
     made: Route,
     mission: Mission,
     figures: Figures | None = None,
+    shared: Sequence[Mission] = (),
     *,
     date: str,
     with_range: bool = False,
     with_table: bool = True,
 ) -> tuple[str, PaperSheet]:
     """What stands on the one sheet that shows everything, and the sheet."""
-    rows = [*panel.stop_rows(mission), *(panel.figure_rows(figures) if figures else [])] if with_table else []
-    facts = panel.facts_of(made, mission, date=date)
-    sheet = whole_sheet(made, mission, rows=len(rows))
-    inside = "\n".join(drawing_of(made, mission, sheet, with_range=with_range))
+    stops = panel.shared_rows(shared) if shared else panel.stop_rows(mission)
+    rows = [*stops, *(panel.figure_rows(figures) if figures else [])] if with_table else []
+    facts = panel.facts_of(made, mission, shared, date=date)
+    sheet = whole_sheet(made, mission, shared, rows=len(rows))
+    inside = "\n".join(drawing_of(made, mission, sheet, shared, with_range=with_range))
     drawn = (
         group("drawing", [inside], clip_path="url(#frame)"),
         _outline(sheet.drawing),
         panel.coordinate_ticks(sheet),
         panel.title_block(mission, [*facts, ("Scale", _scale(sheet))], sheet.title),
-        panel.legend(panel.legend_entries(made, mission), mission, sheet),
+        panel.legend(panel.legend_entries(made, mission, shared), mission, sheet),
         panel.table(rows, sheet.table),
     )
     return "\n".join(item for item in drawn if item), sheet
 
 
-def whole_sheet(made: Route, mission: Mission, *, rows: int = 0) -> PaperSheet:
+def whole_sheet(
+    made: Route, mission: Mission, shared: Sequence[Mission] = (), *, rows: int = 0
+) -> PaperSheet:
     """The sheet that shows everything, with so many rows of tables beside it."""
-    entries = panel.legend_entries(made, mission)
-    facts = [*panel.facts_of(made, mission, date=""), ("Scale", "")]
+    entries = panel.legend_entries(made, mission, shared)
+    facts = [*panel.facts_of(made, mission, shared, date=""), ("Scale", "")]
     blocks = (panel.legend_height(entries), panel.title_height(facts), rows)
-    return fit(SheetContents(extent_of(made, mission), PADDING, *blocks))
+    return fit(SheetContents(extent_of(made, *(shared or (mission,))), PADDING, *blocks))
 
 
-def drawing_of(made: Route, mission: Mission, sheet: PaperSheet, *, with_range: bool) -> tuple[str, ...]:
+def drawing_of(
+    made: Route, mission: Mission, sheet: PaperSheet, shared: Sequence[Mission] = (), *, with_range: bool
+) -> tuple[str, ...]:
     """Everything to scale, from the floor up to the numbers."""
+    missions = shared or (mission,)
     space = made.selection.visibility.candidates.space
     parts = chain(
         building(space, sheet),
         targets(made.selection, sheet),
-        [rings(mission, sheet)] if with_range else [],
-        route(mission, sheet),
+        [rings(item, sheet) for item in missions] if with_range else [],
+        shared_routes(shared, sheet) if shared else route(mission, sheet),
         network(mission, sheet),
-        [room_labels(space.floor.rooms, sheet, avoid=_busy(mission, space.floor, sheet))],
-        stops(mission, sheet),
+        [room_labels(space.floor.rooms, sheet, avoid=_busy(missions, space.floor, sheet))],
+        shared_stops(shared, sheet) if shared else stops(mission, sheet),
     )
     return tuple(part for part in parts if part)
 
 
-def _busy(mission: Mission, floor: FloorPlan, sheet: PaperSheet) -> Busy:
+def _busy(missions: Sequence[Mission], floor: FloorPlan, sheet: PaperSheet) -> Busy:
     """What room names keep away from: stops above all, then the route, then elements."""
     turns = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     disc = (STOP + 0.5) * np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    centres = [(mission.start.x, mission.start.y), *((stop.x, stop.y) for stop in mission.stops)]
+    centres = [
+        place
+        for item in missions
+        for place in ((item.start.x, item.start.y), *((stop.x, stop.y) for stop in item.stops))
+    ]
     discs = [place + disc for place in sheet.on_paper(np.array(centres))]
     solids = [solid.exterior for item in floor.elements for solid in item.solids]
     closed = [np.concatenate([ring, ring[:1]]) for ring in solids]
     lines = [line for item in floor.elements for line in item.lines]
     return Busy.of(
         (STOPS, discs),
-        (WAY, list(points_along([sheet.on_paper(leg) for leg in _legs(mission)], spacing=1.0))),
+        (WAY, list(points_along([sheet.on_paper(leg) for leg in _legs(missions)], spacing=1.0))),
         (WALLS, list(points_along([sheet.on_paper(line) for line in (*closed, *lines)], spacing=1.5))),
     )
 
 
-def _legs(mission: Mission) -> list[FloatArray]:
-    legs = [*(stop.approach for stop in mission.stops), mission.return_ or ()]
+def _legs(missions: Sequence[Mission]) -> list[FloatArray]:
+    legs = [leg for item in missions for leg in (*(s.approach for s in item.stops), item.return_ or ())]
     return [np.array(leg, dtype=np.float64).reshape(-1, 2) for leg in legs]
 
 
-def extent_of(made: Route, mission: Mission) -> tuple[float, float, float, float]:
+def extent_of(made: Route, *missions: Mission) -> tuple[float, float, float, float]:
     """Bounds in metres of everything that is drawn to scale."""
     floor = made.selection.visibility.candidates.space.floor
     solids = [solid.exterior for item in floor.elements for solid in item.solids]
     lines = [line for item in floor.elements for line in item.lines]
     rooms = [part.exterior for room in floor.rooms for part in room.polygons]
     openings = [opening.line for opening in floor.openings]
-    start = np.array([[mission.start.x, mission.start.y]])
+    starts = [np.array([[item.start.x, item.start.y]]) for item in missions]
     outline = [part.exterior for part in floor.outline]
-    return bounds([*outline, *rooms, *solids, *lines, *openings, *_legs(mission), start])
+    return bounds([*outline, *rooms, *solids, *lines, *openings, *_legs(missions), *starts])
 
 
 def _scale(sheet: PaperSheet) -> str:

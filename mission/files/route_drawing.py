@@ -37,15 +37,22 @@ def rings(mission: Mission, sheet: PaperSheet) -> str:
     return group("range", circles, fill="none", stroke="#b9a6dd", stroke_width=0.12, stroke_dasharray="1 1.5")
 
 
-def route(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
-    """Legs with direction arrows; the return leg dashed."""
+def route(
+    mission: Mission,
+    sheet: PaperSheet,
+    *,
+    way: dict[str, object] = WAY,
+    back_way: dict[str, object] = BACK,
+    after: str = "",
+) -> Iterator[str]:
+    """Legs with direction arrows; the return leg dashed. `after` stands behind the layers' names."""
     legs = [_on_paper(stop.approach, sheet) for stop in mission.stops]
     back = _on_paper(mission.return_ or (), sheet)
     join: dict[str, object] = {"fill": "none", "stroke_linejoin": "round"}
-    yield group("return", [path([line_data(back)] if len(back) > 1 else [])], **join, **BACK)
-    yield group("route", [path(line_data(leg) for leg in legs if len(leg) > 1)], **join, **WAY)
+    yield group(f"return{after}", [path([line_data(back)] if len(back) > 1 else [])], **join, **back_way)
+    yield group(f"route{after}", [path(line_data(leg) for leg in legs if len(leg) > 1)], **join, **way)
     arrows = [polygon(head) for leg in (*legs, back) for head in _arrows(leg)]
-    yield group("directions", arrows, fill=WAY["stroke"])
+    yield group(f"directions{after}", arrows, fill=way["stroke"])
 
 
 def network(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
@@ -66,15 +73,15 @@ def network(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
         yield group("weakest", [rect(x - 3.6, y - 1.4, 7.2, 2.8, fill="#ffffff", **THIN), held])
 
 
-def stops(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
-    """The start, then each stop's disc with its number and a tick where it faces."""
+def stops(mission: Mission, sheet: PaperSheet, *, letter: str = "") -> Iterator[str]:
+    """The start, then each stop's disc with its number, behind a letter, and a tick where it faces."""
     yield start_mark(sheet.on_paper(np.array([mission.start.x, mission.start.y])))
     places = _stops_on_paper(mission, sheet)
     marks = [
-        stop_mark(place, str(number), heading=stop.heading, doorway=stop.doorway)
+        stop_mark(place, f"{letter}{number}", heading=stop.heading, doorway=stop.doorway)
         for number, (stop, place) in enumerate(zip(mission.stops, places, strict=True), 1)
     ]
-    yield group("stops", marks, font_weight="bold", text_anchor="middle", fill=INK)
+    yield group(f"stops{letter and f'-{letter}'}", marks, font_weight="bold", text_anchor="middle", fill=INK)
 
 
 def start_mark(at: FloatArray) -> str:

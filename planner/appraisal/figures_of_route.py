@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from mission.figures import Figures, Shares
 from mission.floor import Finding, Rank
@@ -10,7 +11,7 @@ from mission.ledger import ledger_of
 from mission.planning import Candidates, Route, Selection
 from mission.seen import seen_units
 from planner.appraisal.plausible import doubts_of, near_legs
-from planner.appraisal.quality import not_met, quality_of
+from planner.appraisal.quality import NOT_MET, not_met, quality_of
 from planner.appraisal.unreached import unreached
 from planner.overlap.registered import scans_apart
 from planner.shapes import local_origin, to_shape
@@ -38,6 +39,22 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
         unreached=left_out,
         findings=ranked(findings, near_legs(findings, route)),
         quality=quality_of(selection),
+    )
+
+
+def figures_of_share(route: Route, whole: Figures) -> Figures:
+    """What one of several missions sees of its own; what is asked for is asked of all of them together."""
+    shares = shares_of(route.selection, why={item.room: item.why for item in whole.unreached})
+    space = route.selection.visibility.candidates.space
+    doubts = doubts_of(route, reached_m2=whole.reached_m2)
+    findings = (*space.findings, *doubts, *(item for item in whole.findings if item.code == NOT_MET))
+    return replace(
+        whole,
+        whole=replace(shares.whole, required=None),
+        rooms=tuple(replace(share, required=None) for share in shares.rooms),
+        kinds=tuple(replace(share, required=None) for share in shares.kinds),
+        findings=ranked(findings, near_legs(findings, route)),
+        quality=None,
     )
 
 

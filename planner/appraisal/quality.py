@@ -19,6 +19,7 @@ from planner.selection import quick
 from planner.visibility import seen_well
 from planner.visibility.limited import without
 
+NOT_MET = "limits_not_met"
 MOST_NAMED = 5
 """Rooms and kinds that a finding names."""
 
@@ -71,7 +72,7 @@ def not_met(selection: Selection) -> Iterator[Finding]:
     if short:
         more = f" and {len(short) - MOST_NAMED} more" if len(short) > MOST_NAMED else ""
         yield Finding(
-            "limits_not_met",
+            NOT_MET,
             f"seen {', '.join(told.values())} can be, of what is in sight, only: "
             f"{', '.join(short[:MOST_NAMED])}{more}; lower --grid or --d-sec, or ask for less",
         )

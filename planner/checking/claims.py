@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from msgspec import UNSET
 
 from mission.document import Mission, Stop
 from mission.errors import AnswerIsNo, InputError
@@ -151,7 +152,8 @@ def overclaims(mission: Mission, counted: Recount, coverage: Coverage | None) ->
     if seen < claimed:
         yield _less("$.stops[*].sees.new_units", claimed, seen, "all stops see")
     least, share = counted.space.settings.coverage, counted.share
-    if claimed and share is not None and share < least - NOISE:
+    alone = mission.share is UNSET  # else the others see the rest of what was asked for
+    if alone and claimed and share is not None and share < least - NOISE:
         yield Problem("$.origin.parameters.coverage", f"is {least:g}, but the stops see {counted.in_words()}")
     if coverage is not None:
         yield from _coverage_overclaims(coverage, counted)

@@ -15,7 +15,7 @@ import numpy as np
 
 from mission.errors import AnswerIsNo, InputError
 from mission.geometry import FloatArray, IntArray, frozen, polyline_length
-from mission.planning import NavigableSpace, Route, Selection
+from mission.planning import Candidates, NavigableSpace, Route, Selection
 from mission.plugins import Variant, variant
 from planner.routing.colony import ant_colony
 from planner.routing.grid_graph import grid_ways
@@ -53,14 +53,19 @@ def route(selection: Selection) -> Route:
     space = selection.visibility.candidates.space
     settings = space.settings
     router = variant("router", settings.router, ROUTERS)
-    graph = variant("graph", settings.graph, GRAPHS)
     points, ends = _points_and_ends(selection)
-    ways = Legs(graph, graph.noun(graph.called(space, points), Ways), points)
+    ways = legs_between(space, points)
     if not np.isfinite(ways.lengths).all():
         raise AnswerIsNo(f"{space.floor.name}: the route's end is not connected with its stops")
     sequence, bound, method = _ordered(ways.lengths, ends, router, seed=settings.seed)
     method += "" if settings.graph == "exact" else f", over the ways of --graph {settings.graph}"
     return _assembled(selection, points, ways, sequence, ends, bound, method)
+
+
+def legs_between(space: NavigableSpace, points: FloatArray) -> Legs:
+    """The ways between all pairs of points (n, 2), by the graph of the settings."""
+    graph = variant("graph", space.settings.graph, GRAPHS)
+    return Legs(graph, graph.noun(graph.called(space, points), Ways), points)
 
 
 def _points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:
@@ -71,7 +76,7 @@ def _points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:
         first = len(points)
         points.append(np.array(settings.start[:2]))
     if settings.end is not None:
-        _check_end(selection)
+        check_place(selection.visibility.candidates, "end", settings.end)
         last = len(points)
         points.append(np.array(settings.end))
     closed = settings.tour == "closed" or (
@@ -83,15 +88,14 @@ def _points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:
     return np.array(points), Ends(nearest, last, closed, reason)
 
 
-def _check_end(selection: Selection) -> None:
-    candidates = selection.visibility.candidates
-    space, end = candidates.space, candidates.space.settings.end
-    assert end is not None
-    origin = local_origin(space.floor)
-    found = int(reach_of(space).part_at(np.array([end]) - origin)[0])
+def check_place(candidates: Candidates, name: str, place: tuple[float, ...]) -> None:
+    """Refuse a place where the robot does not fit, or that is in another part of the floor than the plan."""
+    space = candidates.space
+    x, y = place[:2]
+    found = int(reach_of(space).part_at(np.array([[x, y]]) - local_origin(space.floor))[0])
     if found != candidates.chosen_part:
         why = "the robot does not fit there" if found < 0 else "it is in another part of the floor"
-        raise InputError(f"end = {end[0]:g},{end[1]:g}: {why}; choose a place clear of walls and floor edges")
+        raise InputError(f"{name} = {x:g},{y:g}: {why}; choose a place clear of walls and floor edges")
 
 
 def _stop_at_door(selection: Selection) -> tuple[int | None, str]:
@@ -126,6 +130,14 @@ def _ordered(
     bound = proof.bound / NANOMETRES - far_edge(lengths, ends)
     method = METHODS.get(router.name, router.name) + (", proved optimal" if proof.closed else "")
     return _sequence(proof.order, ends, len(lengths)), max(0.0, bound), method
+
+
+def tour_bound(lengths: FloatArray, sequence: list[int], ends: Ends) -> float:
+    """Metres below which no route between these ends over all points is; `sequence` is one such route."""
+    matrix = tour_matrix(lengths, ends)
+    tour = [*sequence, *([] if len(matrix) == len(lengths) else [len(lengths)])]
+    proof = proved(nanometres(matrix), np.array(tour, dtype=np.int64), improve=False)
+    return max(0.0, proof.bound / NANOMETRES - far_edge(lengths, ends))
 
 
 def tour_matrix(lengths: FloatArray, ends: Ends) -> FloatArray:
@@ -209,4 +221,15 @@ def _heading(space: NavigableSpace, approaches: list[FloatArray]) -> float:
     return 0.0
 
 
-__all__ = ["GRAPHS", "ROUTERS", "Graph", "Router", "route", "tour_matrix"]
+__all__ = [
+    "GRAPHS",
+    "ROUTERS",
+    "Ends",
+    "Graph",
+    "Router",
+    "check_place",
+    "legs_between",
+    "route",
+    "tour_bound",
+    "tour_matrix",
+]

@@ -184,7 +184,7 @@ def _selection(
     visibility: Visibility, whole: Cover, chosen: IntArray, bound: int, method: Variant[Selector]
 ) -> Selection:
     settings = visibility.candidates.space.settings
-    steps = _coverage_steps(whole, chosen)
+    steps = coverage_steps(whole, chosen)
     if whole.missing(whole.covered_by(chosen))[0] > 0:
         name, reached = visibility.candidates.space.floor.name, steps[-1] if len(steps) else 0.0
         raise AnswerIsNo(
@@ -202,7 +202,7 @@ def _selection(
     )
 
 
-def _coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
+def coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
     """Coverage of the whole after each row."""
     counted, steps = np.zeros(cover.columns, dtype=np.int64), []
     for row in rows:
@@ -211,4 +211,4 @@ def _coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
     return np.array(steps)
 
 
-__all__ = ["METHODS", "Selector", "posed", "quick", "select", "select_further"]
+__all__ = ["METHODS", "Selector", "coverage_steps", "posed", "quick", "select", "select_further"]

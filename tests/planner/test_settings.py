@@ -52,13 +52,19 @@ OTHER: dict[str, Any] = {
     "blind_cone": 60.0,
     "scanner_height": 1.8,
     "wall_height": 2.7,
+    "further_starts": ((5.0, 6.0, 0.0),),
+    "robots": 2,
+    "shift": 1800.0,
+    "battery": 5400.0,
 }
 NEEDS = {
-    **dict.fromkeys(("since", "schedule", "in_progress"), "date"),
-    "density": "angular_step",
-    "wall_height": "max_incidence",
+    **dict.fromkeys(("since", "schedule", "in_progress"), ("date",)),
+    "density": ("angular_step",),
+    "wall_height": ("max_incidence",),
+    "robots": ("start",),
+    "further_starts": ("start", "robots"),
 }
-"""What says nothing without another parameter."""
+"""What says nothing without others."""
 
 
 def other(name: str) -> Any:
@@ -78,7 +84,8 @@ def typed(name: str, value: Any) -> list[str]:
     option = "--" + (PARAMETERS[name].option or name).replace("_", "-")
     if isinstance(value, bool):
         return [option if value else f"--no-{option[2:]}"]
-    many = value if PARAMETERS[name].repeatable else (value,)
+    further = name in {item.further for item in PARAMETERS.values()}
+    many = value if PARAMETERS[name].repeatable or further else (value,)
     return [f"{option}={','.join(map(str, one)) if isinstance(one, tuple) else one}" for one in many]
 
 
@@ -86,7 +93,7 @@ def typed(name: str, value: Any) -> list[str]:
 def test_a_parameter_is_the_same_as_option_in_the_file_and_in_python(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    told = {one: other(one) for one in (name, NEEDS.get(name, name))}
+    told = {one: other(one) for one in (*NEEDS.get(name, ()), name)}
     facts = SCANNERS[told["scanner"]].values() if "scanner" in told else {}
     expected = replace(Settings(), **facts, **told)
     assert expected != Settings()
