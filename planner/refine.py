@@ -112,7 +112,6 @@ def with_rows(seen: Visibility, rows: IntArray) -> Visibility:
         segment=_frozen(seen.segment[run]),
         first=_frozen(seen.first[run]),
         last=_frozen(seen.last[run]),
-        in_sight=None if seen.in_sight is None else with_rows(seen.in_sight, rows),
     )
 
 

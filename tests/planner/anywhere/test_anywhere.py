@@ -126,3 +126,10 @@ def test_one_stop_is_proved_fewest_of_all_places() -> None:
 def test_what_cells_do_not_know_is_refused(other: dict[str, float], told: str) -> None:
     with pytest.raises(InputError, match=f"selector = anywhere: is not done with {told}"):
         plan(hall(6, 4), replace(ANYWHERE, **other))  # type: ignore[arg-type]
+
+
+def test_limits_on_views_hold_at_new_places_too() -> None:
+    limits: dict[str, float] = {"max_incidence": 70.0, "near": 0.6}
+    settings = replace(ANYWHERE, range=3.0, **limits)  # type: ignore[arg-type]
+    made = plan(hall(9, 6, column("c", 4, 3)), settings).first
+    assert made.selection.bound <= len(made.selection.chosen)
