@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from msgspec import UNSET
 from msgspec.structs import replace as changed
 
 from mission.as_driven import AsDriven
@@ -142,7 +143,15 @@ def top_up(
     ------
     AnswerIsNo
         When what is asked for cannot be reached any more.
+    InputError
+        When the mission is one of several that share a floor: what it leaves is for the others to see.
     """
+    share = planned.mission.share
+    if share is not UNSET:
+        raise InputError(
+            f"{planned.mission.name}: shares its floor with {share.of - 1} more; a further mission is "
+            "planned for a floor that one mission sees alone"
+        )
     known = replace(planned, floor=_with(planned.floor, obstacles)) if obstacles else planned
     seen, done = _with_places(known, places)
     selection = select_further(seen, done)

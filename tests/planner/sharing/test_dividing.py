@@ -25,6 +25,7 @@ from mission.problems import problems_of
 from mission.schedule import schedule
 from mission.settings import Settings, read_settings, told_of
 from planner import plan
+from planner.further import PlannedFloor, top_up
 from planner.sharing.least_times import least_makespan, least_tours
 from planner.sharing.tour_times import TourTimes, tour_times
 from tests.planner.worlds import column, hall, planned, two_rooms
@@ -247,3 +248,10 @@ def test_the_coverage_of_a_mission_is_its_own() -> None:
     share = settled("hall", robots=2).shares[1]
     told = json.loads(coverage_json(share.route, share.mission, share.figures))
     assert 0 < told["total"]["coverage"] < settled("hall", robots=2).whole.figures.whole.coverage
+
+
+def test_no_further_mission_is_planned_for_one_share() -> None:
+    share = settled("hall", robots=2).shares[1]
+    known = PlannedFloor(share.floor, share.space.settings, share.mission)
+    with pytest.raises(InputError, match="shares its floor with 1 more"):
+        top_up(known, np.empty((0, 3)))
