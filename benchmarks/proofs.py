@@ -46,7 +46,10 @@ def row(name: str, path, options) -> list[str]:
     told = msgspec.json.decode(coverage_json(made.route, made.mission, made.figures), type=Coverage)
     begin = time.process_time()
     proof = prove(
-        made.mission, made.space, Simulation(range_m=settings.range, joining_m=settings.overlap_range), told
+        made.mission,
+        made.space,
+        Simulation(range_m=settings.range, joining_m=settings.farthest_overlap),
+        told,
     )
     return [name, str(len(made.mission.stops)), *_cells(proof), f"{time.process_time() - begin:.0f}"]
 

@@ -28,6 +28,8 @@ _floor, _plan, _robot, _scanner, _policy = (
     partial(Parameter, table) for table in ("floor", "plan", "robot", "scanner", "policy")
 )
 _share = partial(_plan, least=0, most=1, why="0.7 is 70 %", undecided=f"{LEAST_SHARE:g}; none by units")
+OVERLAP_RANGE_M = 20.0
+"""Scanners reach much farther than the range within which targets are seen well enough."""
 _limit = partial(_plan, quiet=True)
 
 Pair = tuple[float, float]
@@ -129,15 +131,20 @@ class Settings:
         _plan("Count metres; or, as the paper does, units of the whole"),
     ] = "length"
     overlap: Annotated[
-        float,
+        float | None,
         _plan(
             "Least share of a scan that its neighbour sees too, so that all register; 0: not asked for",
             least=0,
             below=1,
             why="0.1 is 10 %",
+            undecided="0",
+            quiet=True,
         ),
-    ] = 0.0
-    overlap_range: Annotated[float, _plan("Farthest boundary that counts for overlap", "m", above=0)] = 20.0
+    ] = None
+    overlap_range: Annotated[
+        float | None,
+        _plan("Farthest boundary that counts for overlap", "m", above=0, undecided="20", quiet=True),
+    ] = None
     d_sec: Annotated[float, _plan("Stop to element", "m", least=0)] = 0.7
     d_dis: Annotated[
         float, _plan("Length of a unit", "m", least=1e-3, why="units below 1 mm are not planned")
@@ -322,6 +329,16 @@ class Settings:
     def least_of_kind(self) -> float | None:
         """Least share of what is visible of each kind of element; None where none is asked for."""
         return self._least(self.kind_coverage)
+
+    @property
+    def least_overlap(self) -> float:
+        """Least share of a scan that its neighbour sees too; 0 where scans need not register."""
+        return self.overlap or 0.0
+
+    @property
+    def farthest_overlap(self) -> float:
+        """Farthest boundary that counts for overlap, metres."""
+        return OVERLAP_RANGE_M if self.overlap_range is None else self.overlap_range
 
     @property
     def least_views(self) -> int:

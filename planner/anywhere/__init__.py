@@ -63,7 +63,7 @@ def anywhere(selection: Selection) -> Selection:
 def _check(settings: Settings) -> None:
     """Refuse what changes what a stop sees or needs in ways that cells do not know."""
     wrong = {
-        f"overlap = {settings.overlap:g}": settings.overlap > 0,
+        f"overlap = {settings.least_overlap:g}": settings.least_overlap > 0,
         f"views = {settings.views}": settings.least_views > 1,
         f"fov = {settings.fov:g}": settings.fov < 360,
         f"visibility = {settings.visibility}": settings.visibility != "exact",

@@ -17,7 +17,7 @@ from planner.space.opening_joins import widest_clear
 def doorways(space: NavigableSpace) -> Proposals:
     """The middle of every opening the robot drives through, where that is asked for or may join scans."""
     settings = space.settings
-    if not (settings.door_scan or settings.door_candidates or settings.overlap > 0):
+    if not (settings.door_scan or settings.door_candidates or settings.least_overlap > 0):
         return Proposals.of(np.empty((0, 2)), [])
     index = {item.room: k for k, item in enumerate(space.rooms) if item.room is not None}
     obstacles = to_shape(space.obstacles, local_origin(space.floor))

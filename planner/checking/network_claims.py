@@ -33,7 +33,7 @@ def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Prob
         return
     overlaps = _overlaps(mission, space)
     row = {stop.id: k for k, stop in enumerate(mission.stops)}
-    least = {**LEAST, "share": space.settings.overlap}
+    least = {**LEAST, "share": space.settings.least_overlap}
     for index, pair in enumerate(mission.network):
         pairs = overlaps.of(row[pair.a])
         at = np.flatnonzero(pairs.other == row[pair.b])
@@ -65,7 +65,7 @@ class _Looking:
         self._space, self._edges = space, np.stack([a, b], axis=1)
         faces = np.ones(len(a), dtype=bool)
         self._midpoints = Midpoints.of(a, b, boundary.pieces, faces)
-        self._reach = space.settings.overlap_range
+        self._reach = space.settings.farthest_overlap
         whole = self._midpoints.pieces[:, None]
         odd = self._midpoints.odd[:, None]
         middles = ((whole - odd) * self._midpoints.a + odd * self._midpoints.b) / whole * GRID

@@ -31,7 +31,7 @@ def registers(pairs: Pairs, *, share: float) -> IntArray:
 
 def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register with one another, by the share in the settings (rows, rows)."""
-    overlaps, share = overlaps_of(candidates), candidates.space.settings.overlap
+    overlaps, share = overlaps_of(candidates), candidates.space.settings.least_overlap
     near = [(pairs := overlaps.of(row)).other[registers(pairs, share=share)] for row in range(overlaps.rows)]
     pointer = np.cumsum([0, *map(len, near)])
     columns = np.concatenate([np.empty(0, np.int64), *near])

@@ -69,7 +69,7 @@ def shown(candidates: Candidates) -> Shown:
     places, row = viewpoints_of(candidates)
     faces = np.ones(len(boundary.a), dtype=bool)
     scene = scene_of(open_space(candidates), boundary.a, boundary.b, boundary.pieces, faces)
-    runs = sight(scene, to_grid(places - origin), reach=space.settings.overlap_range)
+    runs = sight(scene, to_grid(places - origin), reach=space.settings.farthest_overlap)
     start = (np.cumsum(boundary.pieces) - boundary.pieces)[runs.segment]
     stretches = _Stretches(np.repeat(row, np.diff(runs.pointer)), start + runs.low, start + runs.high)
     xy, kept = candidates.xy[candidates.kept] - origin, candidates.kept

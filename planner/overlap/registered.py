@@ -22,7 +22,7 @@ from planner.shapes import local_origin
 def registered_pairs(route: Route) -> tuple[Overlap, ...]:
     """Pairs of the route's stops that register with one another, in the order of driving."""
     candidates = route.selection.visibility.candidates
-    overlaps, share = overlaps_of(candidates), candidates.space.settings.overlap
+    overlaps, share = overlaps_of(candidates), candidates.space.settings.least_overlap
     rows = route.selection.chosen[route.order]
     names = stop_names(len(rows))
     found = []
@@ -39,7 +39,7 @@ def registered_pairs(route: Route) -> tuple[Overlap, ...]:
 def scans_apart(route: Route) -> Iterator[Finding]:
     """For each piece of the network that lies apart: what would join it."""
     settings = route.selection.visibility.candidates.space.settings
-    if settings.overlap == 0 or len(route.order) < 2:
+    if settings.least_overlap == 0 or len(route.order) < 2:
         return
     names = stop_names(len(route.order))
     network = Network(tuple(names), registered_pairs(route))

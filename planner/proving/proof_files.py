@@ -78,7 +78,7 @@ def _as_modelled(simulation: Simulation, planned: PlannedFloor) -> Simulation:
     simulation = replace(
         simulation,
         height_m=scanner_height(settings),
-        joining_m=max(settings.overlap_range, simulation.range_m),
+        joining_m=max(settings.farthest_overlap, simulation.range_m),
         **{name: value for name, value in known.items() if value is not None},
     )
     return simulation if ceiling is None else replace(simulation, ceiling_m=ceiling, ceiling_known=True)

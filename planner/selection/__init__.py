@@ -72,7 +72,7 @@ def select(visibility: Visibility) -> Selection:
     settings = visibility.candidates.space.settings
     method = variant("selector", settings.selector, METHODS)
     whole, fixed, problem = posed(visibility)
-    if settings.overlap > 0:
+    if settings.least_overlap > 0:
         return _select_connected(visibility, whole, fixed, method)
     rows, bound = _solved(method, problem, settings)
     chosen = np.concatenate([fixed, in_greedy_order(problem, rows)]).astype(np.int64)

@@ -20,6 +20,7 @@ from mission.specs import robot_of
 
 OTHER: dict[str, Any] = {
     "overlap": 0.25,
+    "overlap_range": 15.0,
     "room_coverage": 0.5,
     "kind_coverage": 0.5,
     "targets": ("walls",),

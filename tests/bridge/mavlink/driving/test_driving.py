@@ -235,7 +235,8 @@ def test_a_blocked_leg_is_held_and_driven_once_the_way_is_free(
         reports = station.reports()
         held = until(reports, lambda report: isinstance(report, Held))
         assert held.reason.startswith("the way to s2 is blocked at (")
-        assert re.search(r"stands (0\.9|1\.0)\d m from where it was sent", held.reason)
+        # It presses against the wall: by its estimate, which wanders, it stands there or moves about.
+        assert re.search(r"(stands|getting nearer than) (0\.9|1\.0)\d m", held.reason)
         monkeypatch.setattr(Chassis, "move", taken_away)
         station.command("retry")
         until(reports, is_state("FINISHED"))
