@@ -18,7 +18,7 @@ PAGE_S = 10.0
 """How long a page is waited for: on a slow line it takes a second, and others lie before it."""
 AGAIN_S = 0.5
 """How soon the robot is asked again for what it has not written down yet."""
-GIVEN_UP_S = 5.0
+GIVEN_UP_S = 20.0
 """How long a pose that was missed is waited for while the robot answers."""
 HEARD = 1000
 """Poses that were heard and wait for those before them: twenty seconds."""
