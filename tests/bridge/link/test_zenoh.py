@@ -15,7 +15,6 @@ from bridge.commands.spawn import end_robot, robot_process, start_robot
 from bridge.link.protocol import PosePage, decode
 from bridge.link.zenoh_link import Guard, check_endpoint
 from bridge.station.follow import Followed
-from bridge.station.record import Past
 from bridge.station.station import connect
 from mission.document import sealed
 from mission.errors import InputError, RobotUnreachable
