@@ -170,6 +170,8 @@ class Agent:
 
     def open(self) -> None:
         """Answer, begin to work and to tell, and announce the robot."""
+        if self._recorder is not None and self._runner.snapshot()[0].over:
+            self._recorder.idle()
         self.serve()
         keys, link = self._keys, self._link
         self._tell_state = link.publisher(keys.state)

@@ -70,6 +70,10 @@ class RunRecorder:
             self._open.close()
             self._reading.close()
 
+    def idle(self) -> None:
+        """No run is under way: the begin of the next is seen."""
+        self._idle = True
+
     def pose(self, report: PoseReport, *, began_ns: int, over: bool) -> None:
         """Take a pose, if it is of a run; of one that is `over` only the first."""
         with self._lock:
