@@ -51,12 +51,14 @@ def _stop(number: int, body: msgspec.Raw) -> Stop:
 
 @contextmanager
 def _nothing_collected() -> Iterator[None]:
-    """What is read meanwhile is not looked through later either: it goes when nobody refers to it."""
+    """What is read meanwhile counts as old at once, so that the next quick collection passes it over."""
     collects = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        gc.freeze()
+        if not gc.get_freeze_count():  # unfreezing is of all or nothing
+            gc.freeze()
+            gc.unfreeze()
         if collects:
             gc.enable()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import threading
+import weakref
 
 import msgspec
 import pytest
@@ -222,3 +224,18 @@ def test_what_is_wrong_with_a_stop_is_told_with_its_place() -> None:
     document["stops"][1]["x"] = "far"
     with pytest.raises(msgspec.ValidationError, match=r"\$\.stops\[1\]\.x"):
         read_mission(canonical(document))
+
+
+def test_what_is_let_go_after_a_mission_was_read_is_collected() -> None:
+    class Ring:
+        def __init__(self) -> None:
+            self.itself = self
+
+    ring = Ring()
+    gone = weakref.ref(ring)
+    frozen = gc.get_freeze_count()
+    read_mission(msgspec.json.encode(corridor()))
+    del ring
+    gc.collect()
+    assert gone() is None
+    assert gc.get_freeze_count() == frozen
