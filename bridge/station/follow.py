@@ -11,8 +11,9 @@ from contextlib import suppress
 import msgspec
 
 from bridge.link.link import Link
-from bridge.link.protocol import POSE_PAGE, KeyExpressions, LogPage, PosePage, decode
+from bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage
 from bridge.station.record import AGAIN_S, Past, RecordHistory
+from bridge.station.robot_replies import PastEvents, read_events, read_reply
 from mission.events import (
     Aborted,
     AnyEvent,
@@ -130,7 +131,8 @@ class PoseHistory:
     def _page(self) -> PosePage | None:
         parameters = {"since": str(self.told)} | ({"run": self.run_id} if self.run_id else {})
         reply = self._link.ask(self._keys.poses, timeout_s=PAGE_S, parameters=parameters, bulk=True)
-        return None if reply is None else decode(reply, PosePage)
+        what = "reading past poses"
+        return None if reply is None else read_reply(reply, PosePage, robot=self._keys.robot, what=what)
 
 
 class RunFollower:
@@ -203,11 +205,11 @@ class RunFollower:
 
 def log_page(
     link: Link, keys: KeyExpressions, *, since: int, run_id: str | None, timeout_s: float
-) -> LogPage | None:
+) -> PastEvents | None:
     """One page of the journal, or `None` if no answer came."""
     parameters = {"since": str(since)} | ({"run": run_id} if run_id else {})
     reply = link.ask(keys.log, timeout_s=timeout_s, parameters=parameters)
-    return None if reply is None else decode(reply, LogPage)
+    return None if reply is None else read_events(reply, since=since, robot=keys.robot)
 
 
 def _listen(

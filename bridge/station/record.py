@@ -9,7 +9,8 @@ from collections.abc import Iterator
 import msgspec
 
 from bridge.link.link import Link
-from bridge.link.protocol import RECORD_PAGE, KeyExpressions, RecordEntry, RecordIndex, RecordPage, decode
+from bridge.link.protocol import RECORD_PAGE, KeyExpressions, RecordEntry, RecordIndex, RecordPage
+from bridge.station.robot_replies import read_reply
 from bridge.station.window import Window, windowed
 from mission.errors import OutcomeUnknown
 from mission.events import Health, Pose, PoseReport, PosesMissing, StateReport
@@ -24,6 +25,7 @@ HEARD = 1000
 """Poses that were heard and wait for those before them: twenty seconds."""
 BOOT_S = 600.0
 """How far back a record is read after a reboot: the clock of a sped-up robot may have been set back."""
+READING = "reading its record"
 
 
 class Past(msgspec.Struct, frozen=True):
@@ -39,13 +41,13 @@ def read_page(link: Link, keys: KeyExpressions, run_id: str, **since: int) -> Re
     """A page of a run's record, `since` a number or from a `time` (ns) on; none if no answer came."""
     parameters = {"run": run_id} | {name: str(value) for name, value in since.items()}
     reply = link.ask(keys.record, timeout_s=PAGE_S, parameters=parameters, bulk=True)
-    return None if reply is None else decode(reply, RecordPage)
+    return None if reply is None else read_reply(reply, RecordPage, robot=keys.robot, what=READING)
 
 
 def read_index(link: Link, keys: KeyExpressions, *, timeout_s: float) -> RecordIndex | None:
     """The runs that the robot keeps records of; none if no answer came."""
     reply = link.ask(keys.record, timeout_s=timeout_s)
-    return None if reply is None else decode(reply, RecordIndex)
+    return None if reply is None else read_reply(reply, RecordIndex, robot=keys.robot, what=READING)
 
 
 def pages(
@@ -66,7 +68,7 @@ def past_run(link: Link, keys: KeyExpressions, run_id: str, *, patience_s: float
     Raises
     ------
     OutcomeUnknown
-        If the robot did not answer for so long.
+        If the robot did not answer for so long, or tells of more than it gives.
     """
     history = RecordHistory(link, keys)
     history.run_id, since, newest = run_id, 0, 1
@@ -81,6 +83,8 @@ def past_run(link: Link, keys: KeyExpressions, run_id: str, *, patience_s: float
             continue
         newest, missing = first.newest, first.missing
         for page in pages(link, keys, run_id, first, time.monotonic() - began):
+            if not page.entries and since < newest:
+                raise OutcomeUnknown(f"{keys.robot} tells of {newest} entries of the run and gives {since}")
             for entry in page.entries:
                 yield from history.told(entry)
             since, went_on_at = since + len(page.entries), time.monotonic()

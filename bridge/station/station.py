@@ -31,17 +31,15 @@ from bridge.link.protocol import (
     Commit,
     Info,
     KeyExpressions,
-    Malformed,
     Manifest,
     MissionPart,
     Ready,
-    Rejected,
-    Reply,
     Watching,
     encode,
 )
 from bridge.link.tls_probe import why_no_link
 from bridge.station import follow
+from bridge.station.robot_replies import read_reply
 from bridge.station.window import Window, windowed
 from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
@@ -447,23 +445,11 @@ class Station:
         return []
 
     def _answered(self, reply: bytes | None, kind: type[Any], what: str) -> Any:
-        """The reply if it is of `kind`; every other is an error that says what it means."""
+        """The reply if it is of `kind`; every other, and none, is an error that says what it means."""
         robot = self.keys.robot
         if reply is None:
             raise OutcomeUnknown(
                 f"{robot} did not answer {what} in time: whether it was carried out is unknown;"
                 f" see stopgo status{self._distrusted()}"
             )
-        try:
-            message: Reply = msgspec.json.decode(reply, type=Reply)
-        except msgspec.DecodeError as error:
-            raise OutcomeUnknown(
-                f"{robot} answered {what} in words this stopgo does not know ({error}); update the older one"
-            ) from None
-        if isinstance(message, Rejected):
-            why = f"{message.reason}: {'; '.join(message.messages)}"
-            raise AnswerIsNo(f"{robot} rejected {what}: {why}", reason=message.reason)
-        if not isinstance(message, kind):
-            said = message.message if isinstance(message, Malformed) else type(message).__name__
-            raise AnswerIsNo(f"{robot} could not make sense of {what}: {said}")
-        return message
+        return read_reply(reply, kind, robot=robot, what=what)

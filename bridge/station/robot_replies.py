@@ -1,0 +1,65 @@
+"""What a robot's answer means: what was asked for, a no, or words that this stopgo does not know."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeVar
+
+import msgspec
+
+from bridge.link.protocol import LogPage, Malformed, Rejected, Reply
+from mission.errors import AnswerIsNo, OutcomeUnknown
+from mission.events import AnyEvent
+
+UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+
+M = TypeVar("M")
+
+
+class PastEvents(NamedTuple):
+    """Events of a page of the journal, and the number of the newest of all."""
+
+    events: tuple[AnyEvent, ...]
+    newest: int
+
+
+def read_reply(reply: bytes, kind: type[M], *, robot: str, what: str) -> M:
+    """The answer if it is of `kind`.
+
+    Raises
+    ------
+    AnswerIsNo
+        If the robot says no, or that it was asked for nonsense.
+    OutcomeUnknown
+        If it cannot be read.
+    """
+    try:
+        message: Reply = msgspec.json.decode(reply, type=Reply)
+    except UNREADABLE as error:
+        raise _unknown(robot, what, str(error)) from None
+    if isinstance(message, Rejected):
+        why = f"{message.reason}: {'; '.join(message.messages)}"
+        raise AnswerIsNo(f"{robot} rejected {what}: {why}", reason=message.reason)
+    if not isinstance(message, kind):
+        said = message.message if isinstance(message, Malformed) else type(message).__name__
+        raise AnswerIsNo(f"{robot} could not make sense of {what}: {said}")
+    return message
+
+
+def read_events(reply: bytes, *, since: int, robot: str) -> PastEvents:
+    """Events with numbers above `since`, each above the one before; raises as `read_reply` does."""
+    page = read_reply(reply, LogPage, robot=robot, what="reading its log")
+    try:
+        events = page.events
+    except UNREADABLE as error:
+        raise _unknown(robot, "reading its log", str(error)) from None
+    for event in events:
+        if event.number <= since:
+            raise _unknown(robot, "reading its log", f"event {event.number} after {since}")
+        since = event.number
+    return PastEvents(events, page.newest)
+
+
+def _unknown(robot: str, what: str, why: str) -> OutcomeUnknown:
+    return OutcomeUnknown(
+        f"{robot} answered {what} in words this stopgo does not know ({why}); update the older one"
+    )

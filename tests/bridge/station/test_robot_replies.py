@@ -1,0 +1,70 @@
+"""A robot that answers nonsense, or tells of more than it gives, ends a command with one line and in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import msgspec
+import pytest
+
+from bridge.link.protocol import LogPage, Malformed, RecordPage, encode
+from bridge.station.record import past_run, read_index
+from bridge.station.station import Station
+from mission.errors import AnswerIsNo, OutcomeUnknown
+from mission.events import Started
+from tests.bridge.world import Field
+
+READS: dict[str, Callable[[Station], object]] = {
+    "log": lambda station: station.log(),
+    "record": lambda station: list(past_run(station.link, station.keys, "run", patience_s=0.0)),
+    "index": lambda station: read_index(station.link, station.keys, timeout_s=0.0),
+}
+
+
+def lying(answer: bytes) -> Station:
+    """A station of a robot that answers so whatever it is asked."""
+    field = Field()
+    station = field.station()
+    liar = field.board.link()
+    for key in (field.keys.log, field.keys.record):
+        liar.serve(key, lambda request: answer)
+    return station
+
+
+@pytest.mark.parametrize("read", READS)
+@pytest.mark.parametrize("answer", [b"", b"\xff", b'{"is": "Later"}', b'{"is": "Info", "a":' + b"[" * 20_000])
+def test_an_answer_that_cannot_be_read_is_unknown(read: str, answer: bytes) -> None:
+    with pytest.raises(OutcomeUnknown, match="words this stopgo does not know"):
+        READS[read](lying(answer))
+
+
+@pytest.mark.parametrize("read", READS)
+def test_a_robot_that_makes_no_sense_of_a_question_is_quoted(read: str) -> None:
+    with pytest.raises(AnswerIsNo, match=r"r1 could not make sense of reading its .*: since is a word"):
+        READS[read](lying(encode(Malformed(message="since is a word"))))
+
+
+def started(number: int) -> msgspec.Raw:
+    event = Started(
+        robot="r1", boot_id="b", number=number, run_id="run", mission_id="m", revision=1, robot_ns=1,
+        mission_time_s=0.0, commander="me",
+    )  # fmt: skip
+    return msgspec.Raw(encode(event))
+
+
+@pytest.mark.parametrize("numbers", [(0,), (1, 1), (2, 1)])
+def test_a_log_that_does_not_go_on_is_not_read_for_ever(numbers: tuple[int, ...]) -> None:
+    page = LogPage(bodies=tuple(map(started, numbers)), newest=9)
+    with pytest.raises(OutcomeUnknown, match=f"event {numbers[-1]} after"):
+        lying(encode(page)).log()
+
+
+def test_an_event_that_is_none_is_unknown() -> None:
+    with pytest.raises(OutcomeUnknown, match="words this stopgo does not know"):
+        lying(encode(LogPage(bodies=(msgspec.Raw(b'{"event": "Started"}'),), newest=1))).log()
+
+
+def test_a_record_that_tells_of_more_than_it_gives_is_not_read_for_ever() -> None:
+    page = RecordPage(run_id="run", since=0, entries=(), newest=10**12)
+    with pytest.raises(OutcomeUnknown, match="tells of 1000000000000 entries of the run and gives 0"):
+        list(past_run((liar := lying(encode(page))).link, liar.keys, "run", patience_s=0.0))
