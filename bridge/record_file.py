@@ -18,14 +18,16 @@ from pathlib import Path
 _HEAD = struct.Struct(">4sIII")
 """Mark, number, length and checksum of what follows."""
 _MARK = b"\x91sg\n"
+_AT_ONCE = 1 << 20
+"""Bytes that are searched for the next entry in one go."""
 _to_disk = getattr(os, "fdatasync", os.fsync)  # macOS has the second only
 
 
 class RecordFile:
     """Numbered entries; the methods may be called from any thread."""
 
-    def __init__(self, handle: int) -> None:
-        """`handle` is of a file that is open for reading and writing."""
+    def __init__(self, handle: int, *, writing: bool = True) -> None:
+        """`handle` is of a file that is open; what is unfinished is cut off if it is for `writing` too."""
         self._handle = handle
         self._lock = threading.Lock()
         self._places: dict[int, int] = {}  # read once, so that what is damaged is not among them
@@ -34,7 +36,8 @@ class RecordFile:
         for number, at, size in _entries(handle):
             self._places[number] = at
             self.size = at + size
-        os.ftruncate(handle, self.size)
+        if writing:
+            os.ftruncate(handle, self.size)
         self.newest = max(self._places, default=0)
 
     def append(self, number: int, body: bytes) -> None:
@@ -77,6 +80,16 @@ def open_record_file(path: Path) -> Iterator[RecordFile]:
         os.close(handle)
 
 
+@contextmanager
+def read_record_file(path: Path) -> Iterator[RecordFile]:
+    """The file at `path` as it is, also while it grows; raises OSError if there is none."""
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_CLOEXEC", 0))
+    try:
+        yield RecordFile(handle, writing=False)
+    finally:
+        os.close(handle)
+
+
 def _entries(handle: int) -> Iterator[tuple[int, int, int]]:
     """Number, place and size of every sound entry; what lies between two is passed over."""
     at, end = 0, os.fstat(handle).st_size
@@ -92,8 +105,11 @@ def _entries(handle: int) -> Iterator[tuple[int, int, int]]:
 
 def _next_mark(handle: int, at: int, end: int) -> int:
     """Where the next entry may begin; the end if there is none."""
-    found = os.pread(handle, end - at, at).find(_MARK)
-    return end if found < 0 else at + found
+    for start in range(at, end, _AT_ONCE):
+        found = os.pread(handle, _AT_ONCE + len(_MARK) - 1, start).find(_MARK)
+        if found >= 0:
+            return start + found
+    return end
 
 
 def _entry_at(handle: int, at: int) -> tuple[int, bytes] | None:
@@ -101,8 +117,10 @@ def _entry_at(handle: int, at: int) -> tuple[int, bytes] | None:
     if len(head) < _HEAD.size:
         return None
     mark, number, length, checksum = _HEAD.unpack(head)
+    if mark != _MARK or length > os.fstat(handle).st_size - at - _HEAD.size:  # a length that is none
+        return None
     packed = os.pread(handle, length, at + _HEAD.size)
-    sound = mark == _MARK and len(packed) == length and _checksum(number, packed) == checksum
+    sound = len(packed) == length and _checksum(number, packed) == checksum
     return (number, packed) if sound else None
 
 

@@ -6,14 +6,15 @@ may not. There is a file for each run. Whatever is not in it is told as missing,
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from bridge.link.link import Request
-from bridge.link.protocol import Malformed, RecordIndex, RecordPage, Reply, RunKept, count_of
-from bridge.record_file import open_record_file
+from bridge.link.protocol import Malformed, RecordIndex, RecordPage, Rejected, Reply, RunKept, count_of
+from bridge.record_file import open_record_file, read_record_file
 from bridge.robot.base import BaseHealth
 from bridge.robot.run_record import RunRecord
 from mission.errors import InputError
@@ -28,6 +29,7 @@ MOST_RUNS = 1000
 """Of older ones not even the name is kept."""
 RETIRED = "let go for want of room, as the oldest run that was over"
 KEPT, GONE = ".record", ".retired"
+_NAME = re.compile(r"[0-9]+-.*\.(record|retired)", re.ASCII)
 
 
 class RunRecorder:
@@ -51,8 +53,13 @@ class RunRecorder:
         self._lock = threading.RLock()
         self._open = ExitStack()
         self._run: RunRecord | None = None
+        self._past_lock = threading.Lock()
+        """Held while other runs are read, which takes long; the robot's own threads never wait for it."""
         self._reading = ExitStack()
         self._read: RunRecord | None = None
+        self._read_size = 0
+        self._counted: dict[Path, tuple[int, int]] = {}
+        """Size and entries of files of other runs."""
         self._older: dict[Path, int] = {}
         """Files of other runs, oldest first, and their sizes."""
         self._idle = False
@@ -63,12 +70,17 @@ class RunRecorder:
             raise InputError(f"{folder}: cannot be used for the record ({error.strerror})") from None
 
     def close(self) -> None:
-        """Write what is left, and close the file."""
+        """Write what is left, and close the files."""
+        self._end_run()
+        with self._past_lock:
+            self._read = None
+            self._reading.close()
+
+    def _end_run(self) -> None:
         with self._lock:
             self.write()
-            self._run = self._read = None
+            self._run = None
             self._open.close()
-            self._reading.close()
 
     def idle(self) -> None:
         """No run is under way: the begin of the next is seen."""
@@ -117,7 +129,7 @@ class RunRecorder:
             paths = self._paths()
             if not paths:
                 return 0
-            with open_record_file(paths[-1]) as file:
+            with read_record_file(paths[-1]) as file:
                 return RunRecord(_run_in(paths[-1]), file).newest_ns
 
     def answer(self, request: Request) -> Reply:
@@ -128,39 +140,50 @@ class RunRecorder:
             robot_ns = count_of(told.get("time", "0"), digits=19)
         except ValueError as error:
             return Malformed(message=f"since or time: {error}")
-        return self.index() if "run" not in told else self.page(told["run"], since, robot_ns=robot_ns)
+        run_id = told.get("run")
+        try:
+            return self.index() if run_id is None else self.page(run_id, since, robot_ns=robot_ns)
+        except OSError as error:
+            why = f"the robot's record cannot be read: {error.strerror}"
+            return Rejected(reason="storage", messages=(why,)) if run_id is None else _nothing(run_id, why)
 
     def page(self, run_id: str, since: int | None = 0, *, robot_ns: int = 0) -> RecordPage:
         """The entries of a run above a number, or of what is later than a time."""
         with self._lock:
             if self._is_of(run_id) and self._run is not None:
                 return _page(self._run, since, robot_ns)
+        with self._past_lock:
             path = next((path for path in self._paths() if _run_in(path) == file_name(run_id)), None)
             if path is None:
                 return RecordPage(run_id=run_id, since=0, entries=(), newest=0)
             if path.suffix == GONE:
-                gone = PosesMissing(run_id=run_id, robot_ns=0, until_ns=0, mission_time_s=0.0, reason=RETIRED)
-                return RecordPage(run_id=run_id, since=0, entries=(), newest=0, missing=(gone,))
+                return _nothing(run_id, RETIRED)
             return _page(self._past(run_id, path), since, robot_ns)
 
     def _past(self, run_id: str, path: Path) -> RunRecord:
-        """The record of another run, which stays open for its next page."""
-        if self._read is None or self._read.run_id != run_id:
+        """The record of another run, which stays open for its next page unless it grows meanwhile."""
+        size = path.stat().st_size
+        if self._read is None or (self._read.run_id, self._read_size) != (run_id, size):
             self._reading.close()
-            self._read = RunRecord(run_id, self._reading.enter_context(open_record_file(path)))
+            self._read = RunRecord(run_id, self._reading.enter_context(read_record_file(path)))
+            self._read_size = size
         return self._read
 
     def index(self) -> RecordIndex:
         """The runs that there are records of."""
         with self._lock:
-            return RecordIndex(runs=tuple(map(self._kept, self._paths())))
+            run = self._run
+        with self._past_lock:
+            return RecordIndex(runs=tuple(self._kept(path, run) for path in self._paths()))
 
-    def _kept(self, path: Path) -> RunKept:
+    def _kept(self, path: Path, run: RunRecord | None) -> RunKept:
         run_id, size = _run_in(path), path.stat().st_size
-        if self._run is not None and file_name(self._run.run_id) == run_id:
-            return RunKept(run_id=self._run.run_id, entries=self._run.file.newest, bytes=size, retired=False)
-        with open_record_file(path) as file:
-            return RunKept(run_id=run_id, entries=file.newest, bytes=size, retired=path.suffix == GONE)
+        if run is not None and file_name(run.run_id) == run_id:
+            return RunKept(run_id=run.run_id, entries=run.file.newest, bytes=size, retired=False)
+        if self._counted.get(path, (-1, 0))[0] != size:
+            with read_record_file(path) as file:
+                self._counted[path] = size, file.newest
+        return RunKept(run_id=run_id, entries=self._counted[path][1], bytes=size, retired=path.suffix == GONE)
 
     def _is_of(self, run_id: str) -> bool:
         return self._run is not None and self._run.run_id == run_id
@@ -169,7 +192,7 @@ class RunRecorder:
         """The run's own, opened; the one before is over then."""
         if self._run is not None and self._run.run_id == run_id:
             return self._run
-        self.close()
+        self._end_run()
         paths = self._paths()
         number = int(paths[-1].name.partition("-")[0]) + 1 if paths else 1
         fresh = self._folder / f"{number:06}-{file_name(run_id)}{KEPT}"
@@ -198,7 +221,6 @@ class RunRecorder:
 
     def _retire(self, path: Path) -> None:
         """Keep no more of a run than that it was."""
-        self._read = None
         with path.open("wb"):
             gone = path.with_suffix(GONE)
         path.rename(gone)
@@ -207,12 +229,17 @@ class RunRecorder:
 
     def _paths(self) -> list[Path]:
         """The files, oldest run first."""
-        return sorted(path for path in self._folder.iterdir() if path.suffix in (KEPT, GONE))
+        return sorted(path for path in self._folder.iterdir() if _NAME.fullmatch(path.name))
 
 
 def _run_in(path: Path) -> str:
     """The run whose record a file is."""
     return path.stem.partition("-")[2]
+
+
+def _nothing(run_id: str, why: str) -> RecordPage:
+    gone = PosesMissing(run_id=run_id, robot_ns=0, until_ns=0, mission_time_s=0.0, reason=why)
+    return RecordPage(run_id=run_id, since=0, entries=(), newest=0, missing=(gone,))
 
 
 def _page(run: RunRecord, since: int | None, robot_ns: int) -> RecordPage:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 
 import msgspec
 
@@ -128,7 +129,9 @@ class RunRecord:
 
     def _entry(self, number: int) -> RecordEntry | None:
         body = self.file.read(number)
-        return None if body is None else msgspec.json.decode(body, type=RecordEntry)
+        with suppress(msgspec.DecodeError):  # a newer stopgo's
+            return None if body is None else msgspec.json.decode(body, type=RecordEntry)
+        return None
 
     def _damaged(self, number: int) -> RecordEntry:
         before = next(self._sound(range(number - 1, 0, -1)), None)
