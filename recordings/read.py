@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,8 +37,8 @@ class Contents:
         return sum(self.rows.values())
 
 
-def check(path: Path) -> Contents:
-    """Read every chunk of the file.
+def check(path: Path, *, take: Callable[[Chunk], None] = lambda chunk: None) -> Contents:
+    """Read every chunk of the file, and hand each to `take`.
 
     Raises
     ------
@@ -53,6 +53,7 @@ def check(path: Path) -> Contents:
     properties: dict[str, dict[str, Any]] = {}
     fixed: set[str] = set()
     for chunk in chunks(path, reader):
+        take(chunk)
         entity = str(chunk.entity_path)
         if not chunk.is_static:
             counts[entity] += chunk.num_rows

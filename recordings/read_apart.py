@@ -29,7 +29,7 @@ for number, path in enumerate(paths):
 def fatal_faults(paths: Sequence[Path]) -> dict[Path, str]:
     """The files at which a reader ends, each with a line that says so.
 
-    One process reads all, and after such a file another one those behind it.
+    One process reads all, and after a file at which it ended another one those behind it.
     """
     faults: dict[Path, str] = {}
     left = [path for path in paths if looks_like_one(path)]
@@ -39,9 +39,10 @@ def fatal_faults(paths: Sequence[Path]) -> dict[Path, str]:
             [sys.executable, "-c", CHILD], input=told, capture_output=True, text=True, check=False
         )
         begun = len(reader.stdout.split())
-        if reader.returncode >= 0 or not begun:  # what it refuses in words is refused here, too
+        if reader.returncode == 0 or not begun:
             return faults
         path = left[begun - 1]
-        faults[path] = f"{path}: damaged (reading it ended with signal {-reader.returncode})"
+        if reader.returncode < 0:  # what it refuses in words is refused here, too
+            faults[path] = f"{path}: damaged (reading it ended with signal {-reader.returncode})"
         left = left[begun:]
     return faults

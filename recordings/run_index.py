@@ -131,8 +131,12 @@ def _stamps(folder: Path) -> Iterator[tuple[str, Stamp]]:
         for name in names:
             path = Path(place, name)
             if name.endswith(SUFFIX) and path.is_file():
-                state = path.stat()
-                yield str(path.relative_to(folder)), (state.st_size, state.st_mtime_ns)
+                yield str(path.relative_to(folder)), stamp_of(path)
+
+
+def stamp_of(path: Path) -> Stamp:
+    state = path.stat()
+    return state.st_size, state.st_mtime_ns
 
 
 def _is(file: IndexedFile | None, stamp: Stamp) -> bool:
@@ -212,34 +216,35 @@ def _run(comparison: Comparison) -> IndexedRun:
     )
 
 
-RUN_HEADER = (
-    *("began (UTC)", "mission", "revision", "run", "robot", "ended", "took", "stops", "worst mm", "coverage"),
-    *("acquired", "file"),
-)
-
-
 def index_text(index: RunIndex) -> str:
     """Runs, the newest first, and plans, as tables."""
-    runs = [_run_cells(name, run) for name, run in index.runs()]
+    runs = [{**run_cells(run), "file": name} for name, run in index.runs()]
     plans = [
         (plan.name, plan.mission_id[:12], str(plan.revision), str(plan.stops), percent(plan.coverage), name)
         for name, plan in index.plans()
     ]
-    told = [table(RUN_HEADER, runs)] if runs else ["no runs"]
+    told = [table(tuple(runs[0]), [tuple(run.values()) for run in runs])] if runs else ["no runs"]
     if plans:
         told += ["", table(("plan", "mission id", "revision", "stops", "coverage", "file"), plans)]
     return "\n".join(told)
 
 
-def _run_cells(name: str, run: IndexedRun) -> tuple[str, ...]:
+def run_cells(run: IndexedRun) -> dict[str, str]:
+    """What a table of runs tells of one, by column."""
     moment = datetime.datetime.fromtimestamp(run.began_ns / 1e9, tz=datetime.UTC)
-    return (
-        *(f"{moment:%Y-%m-%d %H:%M}", run.name, " ".join(map(str, run.revisions)), run.run_id, run.robot),
-        *(run.ended or "not ended", "-" if run.driven_s is None else duration(run.driven_s)),
-        f"{run.scanned}/{run.asked}",
-        "-" if run.deviation_m is None else f"{1000 * run.deviation_m:.1f}",
-        *(percent(run.coverage), run.answer, name),
-    )
+    return {
+        "began (UTC)": f"{moment:%Y-%m-%d %H:%M}",
+        "mission": run.name,
+        "revision": " ".join(map(str, run.revisions)),
+        "run": run.run_id,
+        "robot": run.robot,
+        "ended": run.ended or "not ended",
+        "took": "-" if run.driven_s is None else duration(run.driven_s),
+        "stops": f"{run.scanned}/{run.asked}",
+        "worst mm": "-" if run.deviation_m is None else f"{1000 * run.deviation_m:.1f}",
+        "coverage": percent(run.coverage),
+        "acquired": run.answer,
+    }
 
 
 def index_json(index: RunIndex) -> dict[str, Any]:

@@ -6,8 +6,9 @@ somebody else's that the same browser shows gets nothing.
 
 from __future__ import annotations
 
-import datetime
+import hashlib
 import subprocess
+import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -20,7 +21,6 @@ from tempfile import TemporaryDirectory
 from urllib.parse import quote
 
 from mission.errors import InputError
-from mission.figures import percent
 from mission.files.atomic import write_atomic
 from mission.ports import free_port
 from recordings.compact import VIEWER
@@ -29,11 +29,15 @@ from recordings.page import report_html, whole_page
 from recordings.page.from_recordings import subject_of
 from recordings.page.words import grid, row, shown, tag
 from recordings.review import Review, review
-from recordings.run_index import IndexedRun, RunIndex, index_of
+from recordings.run_index import IndexedRun, RunIndex, index_of, run_cells, stamp_of
 
 HERE = "127.0.0.1"
 END_S = 5.0
 NAME = "stopgo runs"
+
+
+MergedFiles = tuple[tuple[str, int, int], ...]
+"""Files, with the size and the last change of each."""
 
 
 @dataclass(frozen=True)
@@ -57,22 +61,29 @@ class RunSite:
     address: str = ""
     """Where these pages are."""
     _one_at_a_time: threading.Lock = field(default_factory=threading.Lock)
+    _merged: dict[str, MergedFiles] = field(default_factory=dict)
+    """What each merged recording was made of."""
 
     def answer(self, path: str) -> SentPage:
         """The page, report or recording at a path."""
-        with self._one_at_a_time:
-            index = index_of(self.folder)
-            if path == "/":
-                return SentPage(self._list(index))
-            mission, _, form = path.removeprefix("/").partition(".")
-            files = files_of(index).get(mission)
-            if files is None or form not in ("rrd", "html"):
-                return SentPage(b"not found\n", "text/plain", HTTPStatus.NOT_FOUND)
-            try:
-                return self._recording(mission, files) if form == "rrd" else self._report(files)
-            except InputError as error:
-                page = whole_page(NAME, tag("p", shown(str(error))))
-                return SentPage(page, status=HTTPStatus.CONFLICT)
+        try:
+            with self._one_at_a_time:
+                return self._answer(path)
+        except InputError as error:
+            told = str(error)
+        except OSError as error:  # a file that has just gone, a full disk
+            told = f"{error.filename or self.folder}: {error.strerror}"
+        return SentPage(whole_page(NAME, tag("p", shown(told))), status=HTTPStatus.CONFLICT)
+
+    def _answer(self, path: str) -> SentPage:
+        index = index_of(self.folder)
+        if path == "/":
+            return SentPage(self._list(index))
+        name, _, form = path.removeprefix("/").partition(".")
+        files = next((files for mission, files in files_of(index).items() if name_of(mission) == name), None)
+        if files is None or form not in ("rrd", "html"):
+            return SentPage(b"not found\n", "text/plain", HTTPStatus.NOT_FOUND)
+        return self._recording(name, files) if form == "rrd" else self._report(files)
 
     def _list(self, index: RunIndex) -> bytes:
         missions = files_of(index)
@@ -84,30 +95,36 @@ class RunSite:
             parts.append(tag("h2", shown(names[mission])))
             parts.append(tag("p", self._links(mission), f" mission {shown(mission[:12])}"))
             if runs:
-                parts.append(grid(HEADER, (row(map(shown, _cells(run))) for run in runs)))
+                parts.append(grid(COLUMNS, (row(map(shown, _cells(run))) for run in runs)))
         if not missions:
             parts.append(tag("p", "No plan and no run in it."))
         parts += [tag("p", shown(fault)) for fault in index.faults()]
         return whole_page(NAME, "".join(parts))
 
     def _links(self, mission: str) -> str:
-        recording = quote(f"{self.address}/{mission}.rrd", safe="")
+        name = name_of(mission)
+        recording = quote(f"{self.address}/{name}.rrd", safe="")
         opened = tag("a", "open in the viewer", href=f"{self.viewer}/?url={recording}", target="_blank")
-        return f"{opened} · {tag('a', 'report', href=f'/{mission}.html')} ·"
+        return f"{opened} · {tag('a', 'report', href=f'/{name}.html')} ·"
 
-    def _recording(self, mission: str, files: Sequence[str]) -> SentPage:
-        """The mission's plan and runs as one; merged anew where a file has changed since."""
-        paths = [self.folder / name for name in files]
-        out = self.kept / f"{mission}.rrd"
-        newest = max(path.stat().st_mtime_ns for path in paths)
-        if not out.exists() or out.stat().st_mtime_ns < newest:
+    def _recording(self, name: str, files: Sequence[str]) -> SentPage:
+        """The mission's plan and runs as one; merged anew where a file has come, gone or changed."""
+        paths = [self.folder / file for file in files]
+        out, stamps = self.kept / f"{name}.rrd", tuple((str(path), *stamp_of(path)) for path in paths)
+        if self._merged.get(name) != stamps:
             read = [item.recording for item in _read(paths).recordings]
             merge(read, out)
             write_atomic(out, layout_of(read) + out.read_bytes())
+            self._merged[name] = stamps
         return SentPage(out.read_bytes(), "application/octet-stream")
 
     def _report(self, files: Sequence[str]) -> SentPage:
         return SentPage(report_html(subject_of(_read([self.folder / name for name in files]))))
+
+
+def name_of(mission_id: str) -> str:
+    """What a mission's pages are called: its id may be any text."""
+    return hashlib.sha256(mission_id.encode()).hexdigest()[:32]
 
 
 def files_of(index: RunIndex) -> dict[str, list[str]]:
@@ -128,16 +145,19 @@ def _read(paths: Sequence[Path]) -> Review:
     return found
 
 
-HEADER = ("began (UTC)", "run", "robot", "ended", "stops", "worst mm", "coverage", "as planned")
+COLUMNS = ("began (UTC)", "run", "robot", "ended", "stops", "worst mm", "coverage", "acquired")
 
 
 def _cells(run: IndexedRun) -> tuple[str, ...]:
-    moment = datetime.datetime.fromtimestamp(run.began_ns / 1e9, tz=datetime.UTC)
-    worst = "-" if run.deviation_m is None else f"{1000 * run.deviation_m:.1f}"
-    return (
-        *(f"{moment:%Y-%m-%d %H:%M}", run.run_id, run.robot, run.ended or "not ended"),
-        *(f"{run.scanned}/{run.asked}", worst, percent(run.coverage), run.answer),
-    )
+    told = run_cells(run)
+    return tuple(told[column] for column in COLUMNS)
+
+
+class _Server(ThreadingHTTPServer):
+    def handle_error(self, request: object, client_address: object) -> None:
+        """A browser that goes away in the middle of an answer is none."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)  # type: ignore[arg-type]
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -210,7 +230,7 @@ def listening(site: RunSite, port: int) -> ThreadingHTTPServer:
         When the port is taken, or is none.
     """
     try:
-        server = ThreadingHTTPServer((HERE, port), partial(_Handler, site))
+        server = _Server((HERE, port), partial(_Handler, site))
     except (OSError, OverflowError) as error:
         why = getattr(error, "strerror", None) or error
         told = f"--port {port}: cannot listen there ({why}); leave it out, or give a free one"

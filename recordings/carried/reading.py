@@ -15,7 +15,7 @@ from recordings.carried.missions import missions_in
 from recordings.carried.run_logs import logs_in
 from recordings.carried.sight import sights_in
 from recordings.carried.values import Values
-from recordings.read import Contents, check, chunks
+from recordings.read import Contents, check
 from recordings.read_apart import fatal_faults
 
 
@@ -62,12 +62,10 @@ def read_each(paths: Sequence[Path]) -> Iterator[tuple[Path, Recording | InputEr
 
 
 def _read(path: Path) -> Recording:
-    contents = check(path)
+    values = Values()
+    contents = check(path, take=values.take)
     if contents.application != entities.APPLICATION:
         raise InputError(f"{path}: is a recording of {contents.application}, not of {entities.APPLICATION}")
-    values = Values()
-    for chunk in chunks(path):
-        values.take(chunk)
     return Recording(
         path=path,
         contents=contents,

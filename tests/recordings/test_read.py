@@ -57,6 +57,8 @@ for number, path in enumerate(json.load(sys.stdin)[1]):
     print(number, flush=True)
     if "fatal" in path:
         os.abort()
+    if "unforeseen" in path:
+        sys.exit(1)
 """
 
 
@@ -68,7 +70,7 @@ def test_a_file_that_ends_its_reader_hides_no_other(
     run = subprocess.run
     monkeypatch.setattr(subprocess, "run", lambda *a, **k: started.append(a) or run(*a, **k))
     monkeypatch.setattr(read_apart, "CHILD", ENDING)
-    names = ("a.rrd", "fatal-1.rrd", "b.rrd", "fatal-2.rrd", "c.rrd")
+    names = ("a.rrd", "fatal-1.rrd", "unforeseen.rrd", "fatal-2.rrd", "c.rrd")
     for name in names:
         shutil.copy(plan, tmp_path / name)
     (tmp_path / "junk.rrd").write_bytes(b"hello")
@@ -76,7 +78,7 @@ def test_a_file_that_ends_its_reader_hides_no_other(
     refused = {name: str(item) for name, item in found.items() if isinstance(item, InputError)}
     assert sorted(refused) == ["fatal-1.rrd", "fatal-2.rrd", "junk.rrd"]
     assert refused["fatal-2.rrd"].endswith("fatal-2.rrd: damaged (reading it ended with signal 6)")
-    assert len(started) == 3
+    assert len(started) == 4
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:

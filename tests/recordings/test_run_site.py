@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import socket
+import struct
 import threading
 from collections.abc import Iterator
 from http.client import HTTPConnection
 from pathlib import Path
 
+import msgspec
 import pytest
 from rerun.chunk import RrdReader
 
 from mission.__main__ import main
 from recordings.read import check
-from recordings.run_site import RunSite, listening
+from recordings.run_index import INDEX, VERSION, IndexedFile, IndexedPlan, RunIndex, stamp_of
+from recordings.run_site import RunSite, listening, name_of
 from tests.ports import free_port
 from tests.recordings import run, world
+
+MISSION = name_of(world.MISSION_ID)
 
 
 @pytest.fixture(scope="module")
@@ -50,15 +57,15 @@ def test_the_list_leads_to_each_missions_report_and_recording(site: RunSite) -> 
     assert status == 200
     page = body.decode()
     assert run.RUN in page
-    assert f'href="/{world.MISSION_ID}.html"' in page
-    recording = f"http%3A%2F%2F127.0.0.1%3A{site.address.rpartition(':')[2]}%2F{world.MISSION_ID}.rrd"
+    assert f'href="/{MISSION}.html"' in page
+    recording = f"http%3A%2F%2F127.0.0.1%3A{site.address.rpartition(':')[2]}%2F{MISSION}.rrd"
     assert f'href="{site.viewer}/?url={recording}"' in page
     assert "&lt;b&gt;.rrd" in page
     assert "<b>.rrd" not in page
 
 
 def test_plan_and_run_are_one_recording_behind_its_layout(site: RunSite, tmp_path: Path) -> None:
-    status, headers, body = asked(site, f"/{world.MISSION_ID}.rrd")
+    status, headers, body = asked(site, f"/{MISSION}.rrd")
     assert (status, headers["Access-Control-Allow-Origin"]) == (200, site.viewer)
     head = body[:12]
     layout, merged = (head + part for part in body.split(head)[1:])
@@ -70,7 +77,7 @@ def test_plan_and_run_are_one_recording_behind_its_layout(site: RunSite, tmp_pat
 
 
 def test_the_report_is_that_of_review(site: RunSite) -> None:
-    status, _, body = asked(site, f"/{world.MISSION_ID}.html")
+    status, _, body = asked(site, f"/{MISSION}.html")
     assert status == 200
     assert b"57.1" in body
 
@@ -87,6 +94,57 @@ def test_who_calls_it_by_another_name_gets_nothing(site: RunSite) -> None:
         asked(site, "/", host=site.address.removeprefix("http://").replace("127.0.0.1", "localhost"))[0]
         == 200
     )
+
+
+def indexed(folder: Path, mission_id: str) -> None:
+    """Let the folder's index tell that its plan is of a mission of this id."""
+    size, changed_ns = stamp_of(folder / "plan.rrd")
+    plan = IndexedPlan(mission_id=mission_id, revision=1, name="plan", stops=1, coverage=None)
+    file = IndexedFile(size=size, changed_ns=changed_ns, plans=(plan,))
+    (folder / INDEX).write_bytes(msgspec.json.encode(RunIndex(VERSION, {"plan.rrd": file})))
+
+
+@pytest.mark.parametrize("mission_id", ["my mission", "site.v2", "../../up", "/etc/x", "a?b", "Größe"])
+def test_a_mission_of_any_id_has_its_pages_and_stays_in_its_folder(
+    sighted: Path, tmp_path: Path, mission_id: str
+) -> None:
+    for name in ("runs", "kept"):
+        (tmp_path / name).mkdir()
+    shutil.copy(sighted, tmp_path / "runs" / "plan.rrd")
+    indexed(tmp_path / "runs", mission_id)
+    site = RunSite(tmp_path / "runs", "http://127.0.0.1:1", tmp_path / "kept")
+    assert f'href="/{name_of(mission_id)}.html"' in site.answer("/").body.decode()
+    assert site.answer(f"/{name_of(mission_id)}.html").status == 200
+    assert site.answer(f"/{name_of(mission_id)}.rrd").status == 200
+    assert {path.name for path in tmp_path.iterdir()} == {"runs", "kept"}
+
+
+def test_a_run_that_is_copied_with_its_old_date_is_in_the_recording(
+    sighted: Path, skipping: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "runs").mkdir()
+    shutil.copy(sighted, tmp_path / "runs" / "plan.rrd")
+    site = RunSite(tmp_path / "runs", "http://127.0.0.1:1", tmp_path / "kept")
+    alone = site.answer(f"/{MISSION}.rrd").body
+    shutil.copy(skipping, tmp_path / "runs" / "run.rrd")
+    os.utime(tmp_path / "runs" / "run.rrd", (1e9, 1e9))
+    assert site.answer(f"/{MISSION}.rrd").body != alone
+
+
+def test_a_folder_that_goes_away_is_told_on_the_page(tmp_path: Path) -> None:
+    answer = RunSite(tmp_path / "gone", "http://127.0.0.1:1", tmp_path).answer("/")
+    assert answer.status == 409
+    assert b"is no folder" in answer.body
+
+
+def test_a_browser_that_goes_away_is_no_error(site: RunSite, capsys: pytest.CaptureFixture[str]) -> None:
+    host, port = site.address.removeprefix("http://").split(":")
+    with socket.create_connection((host, int(port))) as browser:
+        browser.sendall(b"GET / HTTP")
+        browser.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    assert asked(site, "/")[0] == 200
+    assert not capsys.readouterr().err
 
 
 def test_a_port_needs_web_and_must_be_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
