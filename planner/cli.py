@@ -383,8 +383,13 @@ def prove_command(
     assumed |= {"poses": not without_poses, "seed": seed}
     given = {"step_deg": step, "height_m": height, "ceiling_m": ceiling}
     heights = {key: value for key, value in given.items() if value is not None}
-    proof, planned = prove_file(mission, floor, coverage, {**assumed, **heights}, say=_progress)
+    warnings: list[str] = []
+    proof, planned = prove_file(
+        mission, floor, coverage, {**assumed, **heights}, say=_progress, warn=warnings.append
+    )
     _progress("")
+    for warning in warnings:
+        typer.echo(f"stopgo: {printable(warning)}", err=True)
     written = _write_proof(proof, planned.floor, files)
     if as_json:
         told = {**proof_json(proof), "files": {key: str(path) for key, path in written.items()}}

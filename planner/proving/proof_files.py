@@ -41,8 +41,11 @@ def prove_file(
     assumed: dict[str, Any],
     *,
     say: Callable[[str], None] = lambda line: None,
+    warn: Callable[[str], None] = lambda line: None,
 ) -> tuple[PlanProof, PlannedFloor]:
     """The proof of a mission's file, and the floor it is about; `assumed` are fields of Simulation.
+
+    `say` is told how far it is, `warn` what makes it prove less.
 
     Raises
     ------
@@ -64,7 +67,7 @@ def prove_file(
             f"--height {simulation.height_m:g}: the scanner must be below the ceiling at "
             f"{simulation.ceiling_m:g} m; give --ceiling"
         )
-    return prove(mission, planned.space, simulation, _coverage(path, coverage, mission), say), planned
+    return prove(mission, planned.space, simulation, _coverage(path, coverage, mission, warn), say), planned
 
 
 def _as_modelled(simulation: Simulation, planned: PlannedFloor) -> Simulation:
@@ -84,8 +87,10 @@ def _as_modelled(simulation: Simulation, planned: PlannedFloor) -> Simulation:
     return simulation if ceiling is None else replace(simulation, ceiling_m=ceiling, ceiling_known=True)
 
 
-def _coverage(path: Path, given: Path | None, mission: Mission) -> Coverage | None:
-    """The coverage.json that is given; else the one beside the mission, if it is the mission's."""
+def _coverage(
+    path: Path, given: Path | None, mission: Mission, warn: Callable[[str], None]
+) -> Coverage | None:
+    """The coverage.json that is given; else the one beside the mission, if it is the mission's and whole."""
     if given is not None:
         return read_coverage(given, mission)
     beside = path.with_name(f"coverage{_part_of(path)}.json")
@@ -93,5 +98,6 @@ def _coverage(path: Path, given: Path | None, mission: Mission) -> Coverage | No
         return None
     try:
         return read_coverage(beside, mission)
-    except InputError:
+    except InputError as error:
+        warn(f"{error}; without it only the mission's counts are held against the scans")
         return None

@@ -51,6 +51,17 @@ def test_a_proof_is_written_read_back_and_told(planned: Path) -> None:
     assert "proof by simulation" in page and mission["digest"] in page
 
 
+def test_a_damaged_coverage_beside_the_mission_is_told(planned: Path, tmp_path: Path) -> None:
+    whole = (planned / "coverage.json").read_bytes()
+    for name in ("mission.json", "floor.dxf"):
+        (tmp_path / name).write_bytes((planned / name).read_bytes())
+    (tmp_path / "coverage.json").write_bytes(whole[: len(whole) // 2])
+    told = prove(tmp_path)
+    assert told.returncode in (0, 1)
+    assert "coverage.json: not a coverage.json" in told.stderr and told.stderr.count("\n") == 1
+    assert "only the mission's counts are held against the scans" in told.stderr
+
+
 def test_another_floor_is_refused(planned: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.dxf"
     other.write_bytes((planned / "floor.dxf").read_bytes() + b"999\nanother\n")
