@@ -94,6 +94,7 @@ def _selection(selection: Selection) -> dict[str, Any]:
     return {
         "stops": len(selection.chosen),
         "stops_bound": int(selection.bound),
+        **({"stops_bound_over": selection.among} if selection.everywhere else {}),
         "coverage": round(selection.coverage, 4),
         "coverage_required": float(selection.required),
         "selector": selection.method,

@@ -81,8 +81,9 @@ def _plan_tiles(subject: ReportSubject) -> str:
 
 
 def _bound(subject: ReportSubject) -> str:
-    bound = subject.results.get("stops_bound")
-    return "" if bound is None else f"at least {bound} are needed"
+    bound, over = (subject.results.get(name) for name in ("stops_bound", "stops_bound_over"))
+    among = f"of {over} " if over else ""  # else of the plan's candidates
+    return "" if bound is None else f"{among}at least {bound} are needed"
 
 
 def _plan_tables(subject: ReportSubject) -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from mission.plan import PartPlan
+from mission.planning import Selection
 from planner.appraisal.figures_of_route import figures_of
 from planner.report import PlanReport
 from recordings.carried.reading import read_recording
@@ -50,3 +52,13 @@ def test_candidates_stops_and_coverage_agree_wherever_they_are_told(tmp_path: Pa
     log = [line for _, (line,) in cells(path, "/log/plan", "TextLog:text")]
     assert "selection (greedy): 2 stops, coverage 78.5 %, at least 2 are needed" in log
     assert any("5 positions" in line or "3 reachable" in line for line in log)
+
+
+def test_a_page_says_where_its_bound_is_over_all_places(tmp_path: Path) -> None:
+    path = tmp_path / "plan.rrd"
+    recording = PlanRecording(world.MISSION_ID)
+    for noun in (*world.nouns_at(), figures_of(world.nouns_at()[5]), planned()[1]):
+        recording.observe(replace(noun, everywhere=True) if isinstance(noun, Selection) else noun)
+    recording.write(path)
+    page = report_html(subject_of(reviewed([read_recording(path)]))).decode()
+    assert "of all places at least 2 are needed" in page
