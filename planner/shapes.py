@@ -17,6 +17,7 @@ from shapely.geometry.base import BaseGeometry
 from mission.errors import InputError, StopgoError
 from mission.floor import FloorPlan
 from mission.geometry import FloatArray, Polygon, bounds, frozen
+from mission.problems import FAR
 from planner.kept import kept
 
 GRID = 1e-5
@@ -35,7 +36,7 @@ FARTHEST_STEPS = 2**29
 
 @kept
 def local_origin(floor: FloorPlan) -> FloatArray:
-    """The lower left corner of everything on the floor (2,); refuses floors too large to be exact."""
+    """The lower left corner of everything on the floor (2,); refuses floors too large or too far."""
     drawn = {"its outline": [ring for polygon in floor.outline for ring in polygon.rings]}
     drawn |= {room.id: [ring for polygon in room.polygons for ring in polygon.rings] for room in floor.rooms}
     drawn |= {item.id: [item.line] for item in floor.openings}
@@ -45,6 +46,12 @@ def local_origin(floor: FloorPlan) -> FloatArray:
     if extent > LARGEST:
         raise InputError(
             f"{floor.name}: {extent:.0f} m across with {_farthest(drawn)}, more than {LARGEST:.0f} m; "
+            "check it, and the drawing's units"
+        )
+    away = max(-low_x, -low_y, high_x, high_y)
+    if away > FAR:
+        raise InputError(
+            f"{floor.name}: lies {away:.3g} m from its origin, and no mission reaches beyond {FAR:g} m; "
             "check it, and the drawing's units"
         )
     return frozen([low_x, low_y])

@@ -322,6 +322,16 @@ def test_a_folder_as_the_floor_is_2(run: Callable[..., Run], tmp_path: Path) -> 
     assert "directory" in refused(run, 2, tmp_path / "out", tmp_path / "floor.dxf")
 
 
+def test_a_floor_farther_away_than_any_mission_may_be_is_2(run: Callable[..., Run], tmp_path: Path) -> None:
+    drawing = Drawing()
+    for layer in ("FLOOR", "WALLS"):
+        drawing.box(layer, 1e9, 0, 1e9 + 8, 4)
+    drawing.document.saveas(tmp_path / "far.dxf")
+    code, out, error = run("plan", tmp_path / "far.dxf", "-o", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert "far: lies 1e+09 m from its origin, and no mission" in error.splitlines()[-1]
+
+
 @pytest.mark.parametrize("layer", ["FLOOR", "ROOMS", "WALLS"])
 def test_a_shape_a_million_kilometres_away_is_2(run: Callable[..., Run], layer: str, tmp_path: Path) -> None:
     far = drawn(tmp_path / "far.dxf", lambda d: d.box(layer, 1e9, 0, 1e9 + 5, 5))
