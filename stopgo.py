@@ -50,7 +50,7 @@ def settings(parameters: str | Path | None = None, **changes: Any) -> Settings:
     InputError
         Naming the file or parameter, its value and what would be right.
     """
-    from mission.settings import read_settings
+    from mission.files.plan_toml import read_settings
 
     return read_settings(None if parameters is None else Path(parameters), changes)
 

@@ -10,8 +10,8 @@ from typing import Any
 from benchmarks.shares import FLOORS
 from benchmarks.table import put, table, versions
 from mission.figures import percent
+from mission.files.plan_toml import read_settings
 from mission.planning import Selection, Visibility
-from mission.settings import read_settings
 from planner import plan
 from planner.floors import options_of, read_floor
 

@@ -259,7 +259,7 @@ def _supplements(
 def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
     """The drawing the mission was planned on, in the unit it was planned in."""
     from mission.files.exports.format import FloorDrawing
-    from mission.settings import read_settings
+    from mission.files.plan_toml import read_settings
     from planner.floors import options_of
     from planner.floors.drawing import open_drawing
     from planner.floors.dxf import metres_in
@@ -321,7 +321,8 @@ def import_command(
     from mission.files.atomic import write_checked
     from mission.files.imports import read_mission
     from mission.files.mission_json import encode, next_revision, read
-    from mission.settings import PARAMETERS, read_settings
+    from mission.files.plan_toml import read_settings
+    from mission.settings import PARAMETERS
 
     given = {"origin": origin, "start": start}
     settings = read_settings(parameters, {key: PARAMETERS[key].given(text) for key, text in given.items()})

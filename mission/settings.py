@@ -9,10 +9,8 @@ docs/background/planning.md tells what each one does.
 from __future__ import annotations
 
 import datetime
-import json
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from pathlib import Path
 from typing import Annotated, Any, Literal, get_type_hints
 
 from mission.errors import InputError
@@ -20,7 +18,6 @@ from mission.kinds import KINDS
 from mission.layer_kinds import check_entries, entries_in, kinds_by_name
 from mission.parameter import Parameter, seconds, words
 from mission.scanners import SCANNERS, ScannerName
-from mission.toml_file import read_toml
 
 LEAST_SHARE = 0.7
 """Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""
@@ -400,76 +397,6 @@ def told_of(settings: Settings) -> dict[str, Any]:
     return {name: value for name, value in told.items() if value is not None or not PARAMETERS[name].quiet}
 
 
-def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
-    """Settings from plan.toml (if given) and then `overrides`; both are checked.
-
-    Raises
-    ------
-    InputError
-        Naming the file or option, the key, the value and what would be right.
-    """
-    import msgspec
-
-    values = {} if path is None else _values_of(path)
-    values.update({key: value for key, value in overrides.items() if value is not None})
-    for key in values:
-        if key not in PARAMETERS:
-            raise InputError(f"{key}: no such parameter; known: {', '.join(PARAMETERS)}")
-    try:
-        typed = msgspec.convert(values, Settings)
-    except msgspec.ValidationError as error:
-        raise InputError(_said(str(error), values, path)) from None
-    given = {key: getattr(typed, key) for key in values}  # typed itself lacks the defaults
-    facts = {} if given.get("scanner") is None else SCANNERS[given["scanner"]].values()
-    settings = Settings(**{**facts, **given})
-    check_settings(settings)
-    return settings
-
-
-def _said(error: str, values: dict[str, Any], path: Path | None) -> str:
-    """A refused value as one line: key, value, and what would be right."""
-    what, _, where = error.partition(" - at `$.")
-    key = where.rstrip("`").partition("[")[0]
-    return f"{f'{path}: ' if path else ''}{key} = {_shown(values[key])}: {PARAMETERS[key].right or what}"
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, tuple | list):
-        return ",".join(_shown(item) for item in value)
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _values_of(path: Path) -> dict[str, Any]:
-    document = read_toml(path)
-    tables = _tables()
-    known = ", ".join(f"[{table}]" for table in tables)
-    values: dict[str, Any] = {}
-    for table, content in document.items():
-        if not isinstance(content, dict):
-            raise InputError(f"{path}: {table} = {content} stands in no table; known: {known}")
-        if table not in tables:
-            raise InputError(f"{path}: unknown table [{table}]; known: {known}")
-        for key in content:
-            if key not in PARAMETERS or PARAMETERS[key].section != table:
-                raise InputError(f"{path}: unknown key {key} in [{table}]; {_home_of(key, table)}")
-        values.update(content)
-    return values
-
-
-def _tables() -> dict[str, list[Parameter]]:
-    """The tables of plan.toml and the parameters in each."""
-    found: dict[str, list[Parameter]] = {}
-    for parameter in PARAMETERS.values():
-        found.setdefault(parameter.section, []).append(parameter)
-    return found
-
-
-def _home_of(key: str, table: str) -> str:
-    if key in PARAMETERS:
-        return f"it belongs in [{PARAMETERS[key].section}]"
-    return f"known there: {', '.join(parameter.name for parameter in _tables()[table])}"
-
-
 def check_settings(settings: Settings) -> None:
     """Refuse values that no plan can be made with, naming key and value."""
     for key, parameter in PARAMETERS.items():
@@ -590,35 +517,5 @@ def _check_region(settings: Settings) -> None:
         return
     x0, y0, x1, y1 = settings.region
     if not (x0 < x1 and y0 < y1):
-        told = _shown(settings.region)
+        told = ",".join(f"{number:g}" for number in settings.region)
         raise InputError(f"region = {told}: the second corner must lie right of and above the first")
-
-
-def settings_toml(settings: Settings) -> str:
-    """The settings as a plan.toml that reads back the same; what is undecided stands as a comment."""
-    lines: list[str] = []
-    for table, parameters in _tables().items():
-        lines.append(f"[{table}]")
-        for parameter in parameters:
-            value = getattr(settings, parameter.name)
-            undecided = f"# {parameter.name} = ({parameter.undecided})"
-            lines.append(f"# {parameter.meaning}")
-            lines.append(undecided if value is None else f"{parameter.name} = {_toml(value)}")
-        lines.append("")
-    return "\n".join(lines)
-
-
-def settings_json(settings: Settings) -> dict[str, dict[str, Any]]:
-    """The settings by their table in plan.toml; what is undecided is null."""
-    return {
-        table: {parameter.name: getattr(settings, parameter.name) for parameter in parameters}
-        for table, parameters in _tables().items()
-    }
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, tuple):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)

@@ -80,7 +80,7 @@ def plan_command(
     Exit code 1: no plan can be made, or the robot would drive over lines that were not read; with --strict
     also where floor is left out or the plan is doubtful.
     """
-    from mission.settings import read_settings, settings_json, settings_toml
+    from mission.files.plan_toml import read_settings, settings_json, settings_toml
     from planner.options import values_of
 
     settings = read_settings(parameters, values_of(given))
@@ -448,7 +448,7 @@ def demo_command(
 
     from bridge.commands.spawn import robot_process
     from bridge.station.station import connect
-    from mission.settings import read_settings
+    from mission.files.plan_toml import read_settings
 
     with as_file(files("recordings") / "samples" / "office.dxf") as floor:
         report = plan_files(floor, out, read_settings(None, {}))[0]

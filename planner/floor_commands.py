@@ -43,7 +43,7 @@ def floors_command(
     Exit code 1: no floor can be made of it as it is; the last line says why, and the way out.
     """
     from mission.files.atomic import must_not_replace, write_atomic
-    from mission.settings import read_settings
+    from mission.files.plan_toml import read_settings
     from mission.table import printable_lines
     from planner.floors import options_of, survey_floor
     from planner.floors.layer_map import layer_map
@@ -74,7 +74,7 @@ def convert_command(
     """Write a floor as a layered DXF in metres, which plans to the same stops and may be drawn on before."""
     from mission.files.atomic import must_not_replace, write_atomic
     from mission.files.layered_dxf import layered_dxf
-    from mission.settings import read_settings
+    from mission.files.plan_toml import read_settings
     from planner.floors import options_of, read_floor
     from planner.options import values_of
 

@@ -19,11 +19,12 @@ from msgspec.structs import replace as changed
 from mission.as_driven import AsDriven
 from mission.document import Mission, sealed
 from mission.errors import AnswerIsNo, InputError
+from mission.files.plan_toml import read_settings
 from mission.floor import Element, FloorPlan
 from mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
 from mission.ledger import Ledger, ledger_of
 from mission.planning import KEPT, Candidates, NavigableSpace, Visibility
-from mission.settings import Settings, read_settings
+from mission.settings import Settings
 from mission.specs import limits_spec_of
 from planner.assemble import assemble
 from planner.candidates import candidates

@@ -8,8 +8,8 @@ from pathlib import Path
 from mission.document import Mission
 from mission.errors import AnswerIsNo, InputError
 from mission.files.coverage_json import Coverage
+from mission.files.plan_toml import read_settings
 from mission.problems import Problem
-from mission.settings import read_settings
 from planner.checking.claims import Recount, overclaims, recount
 from planner.checking.fit import misfits_on, other_machine
 from planner.checking.network_claims import network_overclaims

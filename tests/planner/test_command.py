@@ -13,7 +13,8 @@ import pytest
 
 from mission.__main__ import main
 from mission.files.mission_json import read
-from mission.settings import Settings, read_settings
+from mission.files.plan_toml import read_settings
+from mission.settings import Settings
 from planner.cli import plan_files
 from tests.disk import small_disk
 from tests.planner.worlds import FLOORS, SHARED

@@ -14,8 +14,9 @@ import pytest
 import stopgo
 from mission.__main__ import main
 from mission.errors import InputError
+from mission.files.plan_toml import read_settings, settings_toml
 from mission.scanners import SCANNERS, ScannerName
-from mission.settings import PARAMETERS, Settings, check_settings, read_settings, settings_toml, told_of
+from mission.settings import PARAMETERS, Settings, check_settings, told_of
 from mission.specs import robot_of
 
 OTHER: dict[str, Any] = {

@@ -8,9 +8,10 @@ import msgspec
 
 from mission.document import Frame, Mission, SiteOrigin, Transform
 from mission.errors import InputError
+from mission.files.plan_toml import read_settings
 from mission.parameter import numbers
 from mission.problems import FAR
-from mission.settings import PARAMETERS, read_settings
+from mission.settings import PARAMETERS
 
 MAP = "write X,Y,HEADING in metres and degrees, such as 1.5,2,90"
 

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from mission.errors import InputError
+from mission.files.plan_toml import read_settings
 from mission.floor import Element, FloorPlan
 from mission.geometry import Polygon
 from mission.planning import NavigableSpace, Selection, weights_of
-from mission.settings import Settings, read_settings
+from mission.settings import Settings
 from planner.space.navigable import navigable
 from tests.planner.worlds import (
     box,

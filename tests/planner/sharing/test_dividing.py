@@ -18,12 +18,13 @@ from mission.document import MissionShare
 from mission.errors import AnswerIsNo, InputError
 from mission.files.coverage_json import coverage_json
 from mission.files.plan_svg import plan_svg
+from mission.files.plan_toml import read_settings
 from mission.parameter import seconds
 from mission.plan import DividedPlan, Plan
 from mission.planning import Route
 from mission.problems import problems_of
 from mission.schedule import schedule
-from mission.settings import Settings, read_settings, told_of
+from mission.settings import Settings, told_of
 from planner import plan
 from planner.further import PlannedFloor, top_up
 from planner.sharing.least_times import least_makespan, least_tours
