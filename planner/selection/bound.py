@@ -61,7 +61,7 @@ def multiplier_bound(cover: Cover, *, found: int) -> int:
         waited = 0 if value > best + 1e-4 else waited + 1
         best = max(best, value)
         direction = slope if not direction.any() else SMOOTHING * slope + (1 - SMOOTHING) * direction
-        norm = float(direction @ direction)
+        norm = float((direction * direction).sum())  # no BLAS: its threads wait for each other for longer
         if best > found - 1 + 1e-6 or norm == 0.0:
             break
         if waited >= PATIENCE:
@@ -87,7 +87,7 @@ class _Priced:
         cost = cover.asks * column - self._rest.T @ demand
         bought = self._cheapest(cost)
         whole = float(np.minimum(spare, 0.0).sum() + demand @ self._needed[1:])
-        value = whole + float(cost @ bought)
+        value = whole + float((cost * bought).sum())
         seen = cover.seen_by @ (spare < 0).astype(float)
         return value, np.concatenate([cover.asks * bought - seen, self._needed[1:] - self._rest @ bought])
 
