@@ -32,10 +32,12 @@ def registers(pairs: Pairs, *, share: float) -> IntArray:
 def links_of(candidates: Candidates) -> csr_array:
     """1 where two kept candidates register with one another, by the share in the settings (rows, rows)."""
     overlaps, share = overlaps_of(candidates), candidates.space.settings.least_overlap
-    near = [(pairs := overlaps.of(row)).other[registers(pairs, share=share)] for row in range(overlaps.rows)]
+    every = (overlaps.after(row) for row in range(overlaps.rows))
+    near = [pairs.other[registers(pairs, share=share)] for pairs in every]
     pointer = np.cumsum([0, *map(len, near)])
     columns = np.concatenate([np.empty(0, np.int64), *near])
-    return csr_array((np.ones(len(columns), np.int64), columns, pointer), shape=(overlaps.rows,) * 2)
+    later = csr_array((np.ones(len(columns), np.int64), columns, pointer), shape=(overlaps.rows,) * 2)
+    return (later + later.T).tocsr()
 
 
 __all__ = ["LEAST_COMMON_M", "LEAST_HOLD_M", "Overlaps", "Pairs", "links_of", "overlaps_of", "registers"]

@@ -46,7 +46,8 @@ class Overlaps:
         self._by_row: dict[int, Pairs] = {}
         self._row = np.repeat(np.arange(len(seen.xy)), np.diff(seen.pointer))
         self._order = np.lexsort((seen.begin, self._row, seen.face))
-        self._on_face = np.searchsorted(seen.face[self._order], np.arange(len(seen.boundary.a) + 1))
+        self._place = seen.face[self._order] * self.rows + self._row[self._order]
+        """Ascending: faces, and on each the rows that see some of it."""
 
     @property
     def rows(self) -> int:
@@ -59,10 +60,14 @@ class Overlaps:
         return np.asarray(np.bincount(self._row, length, self.rows), np.float64)
 
     def of(self, row: int) -> Pairs:
-        """A row with every other."""
+        """A row with every other; kept."""
         if row not in self._by_row:
-            self._by_row[row] = self._pairs(row)
+            self._by_row[row] = self._pairs(row, first=0)
         return self._by_row[row]
+
+    def after(self, row: int) -> Pairs:
+        """A row with every later one; not kept, since all of a large floor's would take gigabytes."""
+        return self._pairs(row, first=row + 1)
 
     def middle_of_common(self, row: int, other: int) -> FloatArray:
         """The middle of the longest stretch of boundary that two rows see, local metres (2,)."""
@@ -75,21 +80,21 @@ class Overlaps:
         middle: FloatArray = a + (b - a) / np.hypot(*(b - a)) * (begin[longest] + end[longest]) / 2
         return middle
 
-    def _common(self, row: int) -> tuple[IntArray, FloatArray, FloatArray]:
-        """What a row and others both see: the others' stretches, and from where to where on the face."""
+    def _common(self, row: int, *, first: int = 0) -> tuple[IntArray, FloatArray, FloatArray]:
+        """What a row and others (from `first` on) both see: the others' stretches, from where to where."""
         seen = self._seen
         own = np.arange(seen.pointer[row], seen.pointer[row + 1])
-        first = self._on_face[seen.face[own]]
-        counts = self._on_face[seen.face[own] + 1] - first
-        there, mine = self._order[ranges(first, counts)], np.repeat(own, counts)
-        begin = np.maximum(seen.begin[mine], seen.begin[there])
-        end = np.minimum(seen.end[mine], seen.end[there])
-        both = (end > begin) & (self._row[there] != row)
-        return there[both], begin[both], end[both]
+        begin = np.searchsorted(self._place, seen.face[own] * self.rows + first)
+        counts = np.searchsorted(self._place, (seen.face[own] + 1) * self.rows) - begin
+        there, mine = self._order[ranges(begin, counts)], np.repeat(own, counts)
+        low = np.maximum(seen.begin[mine], seen.begin[there])
+        high = np.minimum(seen.end[mine], seen.end[there])
+        both = (high > low) & (self._row[there] != row)
+        return there[both], low[both], high[both]
 
-    def _pairs(self, row: int) -> Pairs:
+    def _pairs(self, row: int, *, first: int) -> Pairs:
         seen = self._seen
-        there, begin, end = self._common(row)
+        there, begin, end = self._common(row, first=first)
         other, index = np.unique(self._row[there], return_inverse=True)
         moments = self._moments(seen.face[there], begin, end, index, len(other))
         common = np.bincount(index, end - begin, len(other))
