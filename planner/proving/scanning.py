@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,9 @@ from planner.proving.extrusion import NONE, ExtrudedFloor
 from planner.proving.strips import CELL_M, Strips
 
 CLOUD_DEG = 0.4
-"""Between the rays that are kept as a cloud."""
+"""Between the rays that are kept as a cloud, where their points lie dense enough."""
+SPARSE_M = 0.03
+"""Where points of these rays lie farther apart on a surface, far or flatly seen, all rays are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +70,8 @@ def scanned(solids: ExtrudedFloor, strips: Strips, stand: Stand, simulation: Sim
         if more is not None:
             beyond = more.cast(ways)
             counting.take(np.where(_passed(solids, beyond), beyond, NONE), turn, block, ways)
-        columns = slice(-block.start % every, None, every)
-        few, towards = met[columns, ::every].ravel(), ways[columns, ::every].reshape(-1, 3)
-        cloud.append(_points(solids, stand.place, few, towards, simulation, random))
+        kept = _kept(solids, stand.place, met, ways, -block.start % every, every)
+        cloud.append(_points(solids, stand.place, met[kept], ways[kept], simulation, random))
     cell = np.flatnonzero(counting.points)
     return ScanCount(
         cell=frozen(cell, np.int64),
@@ -83,6 +85,27 @@ def scanned(solids: ExtrudedFloor, strips: Strips, stand: Stand, simulation: Sim
 
 def _passed(solids: ExtrudedFloor, met: Met) -> Met:
     return np.append(solids.passed, False)[met]
+
+
+def _kept(
+    solids: ExtrudedFloor, place: FloatArray, met: Met, ways: FloatArray, first: int, every: int
+) -> BoolArray:
+    """Which rays (columns, rows) the cloud keeps: few where these lie dense, all where they do not.
+
+    `first` is the first column of which some are kept in any case.
+    """
+    few, towards = met[first::every, ::every], ways[first::every, ::every]
+    hit = few != NONE
+    far = distances(solids, place, few[hit], towards[hit])
+    slope = np.abs(np.einsum("ij,ij->i", towards[hit], solids.normal[few[hit]]))
+    sparse = np.zeros(few.shape, dtype=bool)
+    sparse[hit] = far * math.radians(CLOUD_DEG) > SPARSE_M * slope
+    kept: BoolArray = np.zeros(met.shape, dtype=bool)
+    if len(few):
+        columns, rows = (np.arange(count) for count in met.shape)
+        kept[:] = sparse[np.maximum(columns - first, 0) // every][:, rows // every]
+        kept[first::every, ::every] = True
+    return kept
 
 
 def _points(

@@ -159,6 +159,18 @@ def pair_of(floor: FloorPlan, a: tuple[float, float], b: tuple[float, float], si
     return [item.pair for item in found]
 
 
+def test_a_cloud_has_all_rays_where_few_would_lie_too_far_apart() -> None:
+    """A hall 30 m long: rays every 0.4° lie 2 cm apart on the near end and 18 cm on the far one."""
+    simulation = Simulation(range_m=5.0, joining_m=40.0, step_deg=0.2)
+    (cloud,) = clouds_of(hall(30, 4), [(3.0, 2.0)], simulation)
+    level = np.abs(cloud[:, 2]) < 0.3
+    for end, step in ((27.0, 1), (-3.0, 2)):
+        there = level & (np.abs(cloud[:, 0] - end) < 0.1)
+        azimuth = np.degrees(np.arctan(cloud[there, 1] / end)) / simulation.step_deg
+        ray = np.unique(np.rint(azimuth[np.abs(azimuth) < 15] - 0.5))
+        assert (np.diff(ray) == step).all()
+
+
 def test_two_scans_of_one_room_register_from_a_given_error() -> None:
     (pair,) = pair_of(hall(6, 4, column("c", 2, 2)), (1.5, 1.0), (4.5, 3.0), COARSEST)
     assert pair.registered
