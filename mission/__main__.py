@@ -14,8 +14,11 @@ from mission.json_answer import answering
 from mission.process import PIPE_CLOSED, Signals, drop_output, have_output, reader_is_gone
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import typer
     from typer.exceptions import TyperException
+    from typer.models import CommandInfo
 
 FOLDERS = ("planner.cli", "bridge.cli", "recordings.cli", "mission.cli")
 """Each folder's commands; each module has `add_commands(app)` and imports slow libraries where used."""
@@ -97,19 +100,34 @@ def build_app() -> typer.Typer:
 
 
 @cache
-def front_door() -> Any:
-    """The same, ready to run; made once, however many commands a process runs."""
-    import typer
+def front_door(verb: str = "") -> Any:
+    """The same, ready to run; made once, however many commands a process runs.
 
-    return typer.main.get_command(build_app())
+    Where `verb` is one of its words it has no other: to make them all takes longer than most of them do.
+    """
+    from typer.main import get_command, get_command_name
+
+    app = build_app()
+    commands = [made for made in app.registered_commands if _word_of(made, get_command_name) == verb]
+    groups = [made for made in app.registered_groups if made.name == verb]
+    if not commands and not groups:
+        return front_door() if verb else get_command(app)
+    app.registered_commands, app.registered_groups = commands, groups
+    return get_command(app)
+
+
+def _word_of(made: CommandInfo, get_command_name: Callable[[str], str]) -> str:
+    """The word that a person types for a command."""
+    assert made.callback is not None
+    return made.name or get_command_name(made.callback.__name__)
 
 
 def _run(arguments: list[str]) -> int:
     """The command's own exit code, if it does not raise."""
     _must_be_text(arguments)
-    command = front_door()
     if COMPLETING in os.environ:  # a shell asks what the words typed so far may become
-        command.main(list(arguments), prog_name="stopgo")
+        front_door().main(list(arguments), prog_name="stopgo")
+    command = front_door(arguments[0] if arguments else "")
     with command.make_context("stopgo", list(arguments) or ["--help"]) as context:
         result = command.invoke(context)
     return result if isinstance(result, int) else 0

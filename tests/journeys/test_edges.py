@@ -7,6 +7,7 @@ import os
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -92,6 +93,18 @@ def test_what_cannot_be_written_is_one_line(
 
 def names() -> list[str]:
     return sorted(front_door().commands)
+
+
+def test_the_front_door_of_one_command_offers_what_the_whole_one_does() -> None:
+    def offered(command: Any) -> object:
+        options = [(option.name, option.opts, option.required) for option in command.params]
+        return options, {name: offered(verb) for name, verb in getattr(command, "commands", {}).items()}
+
+    for name in names():
+        assert list(front_door(name).commands) == [name]
+        assert offered(front_door(name).commands[name]) == offered(front_door().commands[name])
+    for word in ("", "--version", "plann"):
+        assert sorted(front_door(word).commands) == names()
 
 
 @pytest.mark.parametrize("command", [name for name in names() if name not in ("demo", "status", "doctor")])
