@@ -37,5 +37,6 @@ def runs_of(units: IntArray, segments: IntArray) -> tuple[IntArray, IntArray]:
 
 def ranges(first: IntArray, counts: IntArray) -> IntArray:
     """`first[k]`, `first[k] + 1`, …, `counts[k]` of each, one after the other."""
-    offsets = np.repeat(first - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
-    return np.arange(int(counts.sum())) + offsets
+    ends = np.cumsum(counts)
+    total = int(ends[-1]) if len(ends) else 0
+    return np.arange(total) + np.repeat(first - (ends - counts), counts)
