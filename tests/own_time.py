@@ -478,13 +478,12 @@ def stepped_into() -> Iterator[World]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(transport.OPENING, "udpin", lambda url: UdpIn(world, url))
         patch.setitem(transport.OPENING, "udpout", lambda url: UdpOut(world, url))
-        shims = [(real, shim) for real, shim in world.shims.items() if shim is not None]
+        shims = {id(real): shim for real, shim in world.shims.items() if shim is not None}
         for name, module in list(sys.modules.items()):
             if f"{name}.".startswith(INSIDE):
                 for attribute, value in list(vars(module).items()):
-                    for real, shim in shims:
-                        if value is real:
-                            patch.setattr(module, attribute, shim)
+                    if id(value) in shims:
+                        patch.setattr(module, attribute, shims[id(value)])
         try:
             yield world
         finally:

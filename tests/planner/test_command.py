@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -59,9 +60,14 @@ def drawn(path: Path, *more: Draw, door: float = 0.9) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def two_rooms(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return drawn(tmp_path_factory.mktemp("floor") / "floor.dxf")
+
+
 @pytest.fixture
-def floor(tmp_path: Path) -> Path:
-    return drawn(tmp_path / "floor.dxf")
+def floor(two_rooms: Path, tmp_path: Path) -> Path:
+    return shutil.copy(two_rooms, tmp_path / "floor.dxf")
 
 
 Run = tuple[int, str, str]
