@@ -11,14 +11,12 @@ from bridge.mavlink.line.peer import Peer
 from mission.mavlink.autopilots.kind import Autopilot, ParameterRule, why_no_rover
 from mission.mavlink.enums import MessageId
 from mission.mavlink.items import Command
-from mission.mavlink.telemetry import charge_of
+from mission.mavlink.telemetry import charge_of, complains
 
 PREARM_BIT = 0x10000000
 """MAV_SYS_STATUS_PREARM_CHECK."""
 LEVEL, NEAR, FAR, FIXED = 1, 8, 16, 128
 """Flags of an estimator's report: attitude, place from its start, place on earth, and place only held."""
-COMPLAINTS = ("PreArm:", "Preflight Fail:", "Arm:")
-"""What a vehicle's texts begin with that say why it does not arm."""
 COMPLAIN_S = 2.0
 LEAST_CHARGE = 0.2
 
@@ -40,7 +38,7 @@ def vehicle_checks(peer: Peer, *, any_origin: bool) -> Iterator[Check]:
     yield _pose(peer)
     yield from _battery(peer)
     wanted = [rule for rule in kind.parameters if rule.when == "always" or not any_origin]
-    names = {name for rule in wanted for name in rule.names}
+    names = {name for rule in wanted for either in _either(rule) for name in either.names}
     yield from parameter_checks(kind, read_parameters(peer, names) if names else {}, any_origin=any_origin)
 
 
@@ -50,16 +48,23 @@ def parameter_checks(kind: Autopilot, values: Mapping[str, float], *, any_origin
     for rule in kind.parameters:
         if rule.when == "indoors" and any_origin:
             continue
-        name = next((name for name in rule.names if name in values), None)
-        if name is None:
+        told = [(name, either) for either in _either(rule) for name in either.names if name in values]
+        if not told:
             untold.append(rule.names[0])
-        elif rule.right(values[name]):
+            continue
+        name, either = told[0]
+        if either.right(values[name]):
             right += 1
         else:
-            yield _to_set(rule, name, values[name])
+            yield _to_set(either, name, values[name])
     if right or untold:
         more = f"; not told by the vehicle: {', '.join(untold)}" if untold else ""
         yield Check("params", True, f"{right} of those that a mission needs are right{more}")
+
+
+def _either(rule: ParameterRule) -> tuple[ParameterRule, ...]:
+    """The rule, and that of older releases."""
+    return (rule,) if rule.before is None else (rule, rule.before)
 
 
 def _to_set(rule: ParameterRule, name: str, value: float) -> Check:
@@ -76,7 +81,7 @@ def _arming(peer: Peer) -> Iterator[Check]:
         until = time.monotonic() + (COMPLAIN_S if accepted else 0.0)
         while (message := waiting.get(until - time.monotonic())) is not None:
             words = "".join(letter for letter in message.text if letter.isprintable()).strip()
-            if words.startswith(COMPLAINTS) and words not in said:
+            if complains(words) and words not in said:
                 said.append(words)
     for words in said:
         yield Check("arming", False, f'it says "{words}"', "see to that first: it does not arm like this")

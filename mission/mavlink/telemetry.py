@@ -21,6 +21,8 @@ BACK_MS = 1_000
 """A clock that goes back by more was started again; by less, two messages changed places."""
 LOST_S = 3.0
 """Three heartbeats: one or two are lost on any bad line."""
+COMPLAINTS = ("PreArm:", "Preflight Fail:", "Arm:")
+"""What a vehicle's texts begin with that say why it does not arm."""
 
 
 def stands_still(*, speed: float, yaw_rate: float) -> bool:
@@ -36,6 +38,11 @@ def is_lost(silent_s: float) -> bool:
 def began_again(before_ms: int, now_ms: int) -> bool:
     """Whether a vehicle was started anew between two of its times since boot."""
     return now_ms + BACK_MS < before_ms
+
+
+def complains(text: str) -> bool:
+    """Whether a STATUSTEXT says why the vehicle does not arm."""
+    return text.startswith(COMPLAINTS)
 
 
 def charge_of(remaining: int) -> float | None:

@@ -122,6 +122,7 @@ HABITS = Habits(
     speed_parameter="WP_SPEED", system_parameter="SYSID_THISMAV",
 )  # fmt: skip
 
+LEFT_OUT = "checks before arming that are left out are not made up for here"
 PARAMETERS = (
     ParameterRule(
         ("FRAME_CLASS",), lambda v: v == 1, "1 (rover)", "other frames drive in other ways", must=False
@@ -185,11 +186,12 @@ PARAMETERS = (
         must=False,
     ),
     ParameterRule(
-        ("ARMING_CHECK",),
-        lambda v: v == 1,
-        "1",
-        "checks before arming that are left out are not made up for here",
+        ("ARMING_SKIPCHK",),
+        lambda v: v == 0,
+        "0",
+        LEFT_OUT,
         must=False,
+        before=ParameterRule(("ARMING_CHECK",), lambda v: v == 1, "1", LEFT_OUT, must=False),  # until 4.6
     ),
 )
 

@@ -172,6 +172,8 @@ class ParameterRule:
     """Indoors the vehicle finds its place by somebody else's localisation, not by satellites."""
     must: bool = True
     """Whether a mission fails without it; else it is worth knowing."""
+    before: ParameterRule | None = None
+    """What older releases had in its stead, with another meaning."""
 
 
 @dataclass(frozen=True)

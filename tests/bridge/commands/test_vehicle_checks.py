@@ -60,6 +60,20 @@ def test_a_parameter_may_have_the_name_of_an_older_release() -> None:
     assert wrong.do == "set GPS_TYPE to 0"
 
 
+@pytest.mark.parametrize(
+    ("name", "all_checks", "none"), [("ARMING_SKIPCHK", 0.0, -1.0), ("ARMING_CHECK", 1.0, 0.0)]
+)
+def test_a_parameter_may_have_meant_something_else_in_an_older_release(
+    name: str, all_checks: float, none: float
+) -> None:
+    def told(value: float) -> list[str]:
+        checks = parameter_checks(ARDUPILOT, {**INDOORS, name: value}, any_origin=False)
+        return [check.do for check in checks if check.do]
+
+    assert told(all_checks) == []
+    assert told(none) == [f"set {name} to {all_checks:g}"]
+
+
 def test_who_finds_its_place_by_satellites_needs_no_localisation() -> None:
     outdoors = {"GPS1_TYPE": 1.0, "EK3_SRC1_POSXY": 3.0, "WP_RADIUS": 0.05, "MIS_RESTART": 0.0}
     assert all(check.ok for check in parameter_checks(ARDUPILOT, outdoors, any_origin=True))
