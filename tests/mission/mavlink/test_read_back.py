@@ -67,6 +67,19 @@ def test_the_line_tells_sent_predicted_and_read():
     )
 
 
+def test_the_frame_of_an_item_without_a_place_means_nothing():
+    """ArduPilot 4.7-dev gives it back as MISSION, 4.8-dev as GLOBAL."""
+    sent = translate(square_tour())
+    newer = [
+        replace(item, frame=MavFrame.GLOBAL) if item.frame == MavFrame.MISSION else item
+        for item in read_back(sent)
+    ]
+    assert newer != read_back(sent)
+    assert differences(sent, newer) == ()
+    relative = [replace(item, frame=MavFrame.GLOBAL_RELATIVE_ALT) for item in newer]
+    assert "frame sent 2, should be kept as 2, is 3" in differences(sent, relative)[0]
+
+
 def test_another_kind_of_vehicle_keeps_other_things():
     sent = translate(narrow_view(), "generic")
     kept = [AUTOPILOTS["px4"].kept(item) for item in sent.items]
