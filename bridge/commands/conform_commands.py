@@ -22,10 +22,12 @@ from bridge.commands.connection import (
 )
 from bridge.commands.order_commands import Json, TakeOver
 from bridge.console import Bar, print_json, say, tell, tell_lines
+from mission.errors import InputError
 
 if TYPE_CHECKING:
     from bridge.conform.requirements import ConformVerdict
     from bridge.conform.robot_bench import RobotBench
+    from mission.events import Pose
 
 TRIED = ("requirements", 1)
 
@@ -94,11 +96,20 @@ def _say_what_it_will_do(bench: RobotBench, *, drive: bool) -> None:
     if not drive:
         say(f"{robot} will not drive; what needs that is left out (--drive)")
         return
-    pose = bench.pose()
+    pose = _where_it_stands(bench)
     say(
         f"{robot} WILL DRIVE, up to half a metre ahead of {pose.x:.2f}, {pose.y:.2f} m heading"
         f" {math.degrees(pose.heading):.0f} degrees and back, several times; keep clear. Ctrl-C aborts"
     )
+
+
+def _where_it_stands(bench: RobotBench) -> Pose:
+    from bridge.conform.requirements import NotTried
+
+    try:
+        return bench.pose()
+    except NotTried as why:
+        raise InputError(f"{bench.keys.robot} cannot be let drive: {why}; leave --drive out") from None
 
 
 def conform_station(

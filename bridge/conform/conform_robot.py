@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from bridge.conform.falsified_seals import FalsifiedSeals
-from bridge.conform.requirements import ConformVerdict, Requirement, tried
+from bridge.conform.requirements import ConformVerdict, Nonconforming, PeerGone, Requirement, tried
 from bridge.conform.robot_bench import OVER, Forger, OtherStation, RobotBench
 from bridge.conform.robot_orders import IDLE, ORDERS
 from bridge.conform.robot_pushes import PUSHES
@@ -92,7 +92,14 @@ def robot_bench(options: ConformOptions) -> Iterator[RobotBench]:
         try:
             yield bench
         finally:  # also where somebody stops this: no run goes on that nobody wants
-            bench.leave()
+            _leave(bench)
+
+
+def _leave(bench: RobotBench) -> None:
+    try:
+        bench.leave()
+    except PeerGone as error:
+        raise OutcomeUnknown(f"{bench.keys.robot}: {error}") from None
 
 
 def _reach(options: ConformOptions) -> dict[str, Any]:
@@ -169,8 +176,20 @@ def restarting(command: str) -> Any:
 
 
 def robot_verdicts(bench: RobotBench, *, drive: bool) -> Iterator[ConformVerdict]:
-    """Every requirement's verdict; what the robot held before lies ready again at the end."""
-    held = bench.held_mission()
+    """Every requirement's verdict; what the robot held before lies ready again at the end.
+
+    Raises
+    ------
+    InputError
+        If that cannot be read, and so would be lost; nothing was done.
+    """
+    try:
+        held = bench.held_mission()
+    except Nonconforming as wrong:
+        raise InputError(
+            f"the mission on {bench.keys.robot} cannot be read, and would be lost: {wrong}; take it off the"
+            " robot first; no case was tried"
+        ) from None
     gone = False
     for verdict in tried(REQUIREMENTS, bench, drive=drive, undrivable="the robot would drive: --drive"):
         gone |= verdict.gone

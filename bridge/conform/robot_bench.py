@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
@@ -172,9 +173,11 @@ class RobotBench:
             page = self.ask_for(LogPage, self.keys.log, since=str(since))
             if not page.bodies:
                 break
-            events += [event_of(bytes(body)) for body in page.bodies]
-            must(events[-1].number > since, "a page of the log goes not on behind `since`")
-            since = events[-1].number
+            for body in page.bodies:
+                event = read_event(bytes(body))
+                must(event.number > since, "the log does not go on behind `since`")
+                events.append(event)
+                since = event.number
         return events
 
     def pose(self) -> Pose:
@@ -319,10 +322,16 @@ class RobotBench:
             raise PeerGone(f"the robot answers no more: {silent}") from None
 
     def leave(self) -> None:
-        """Abort what is under way, if the robot still answers."""
+        """Abort what is under way, if the robot still answers; raises `PeerGone` if it does not obey."""
         raw = self.link.ask(self.keys.info, timeout_s=TRY_S)
-        if raw is not None and read(raw, Info, "info").state.state not in OVER:
+        if raw is not None and not self._at_rest(raw):
             self.end_run()
+
+    def _at_rest(self, raw: bytes) -> bool:
+        try:
+            return read(raw, Info, "info").state.state in OVER
+        except Nonconforming:
+            return False  # who knows
 
     def end_run(self) -> None:
         """Abort what is under way; raises `PeerGone` if the robot does not obey."""
@@ -349,9 +358,21 @@ def read_reply(raw: bytes) -> Any:
 
 def read(raw: bytes, kind: Any, what: str) -> Any:
     """What was told, read strictly; raises `Nonconforming` where it is not of this kind."""
-    try:
+    with _readable(raw, what):
         return msgspec.json.decode(raw, type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+
+
+def read_event(raw: bytes) -> AnyEvent:
+    """An event of any kind; raises `Nonconforming` where it is none."""
+    with _readable(raw, "an event"):
+        return event_of(raw)
+
+
+@contextmanager
+def _readable(raw: bytes, what: str) -> Iterator[None]:
+    try:
+        yield
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise Nonconforming(f"{what} cannot be read ({error}): {short(raw)}") from None
 
 

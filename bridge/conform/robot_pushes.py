@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from bridge.conform.requirements import NotTried, Requirement, must
-from bridge.conform.robot_bench import RobotBench, manifest_of, rejects, told_of
+from bridge.conform.robot_bench import RobotBench, manifest_of, read, rejects, told_of
 from bridge.link.protocol import (
     MAX_CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
@@ -174,7 +174,7 @@ def an_older_revision_is_refused(bench: RobotBench) -> None:
 def what_is_stored_is_read_back(bench: RobotBench) -> None:
     mission = bench.has(bench.mission())
     document = bench.stored(mission.id, mission.revision)
-    must(msgspec.json.decode(document, type=Mission) == mission, "another mission comes back than was sent")
+    must(read(document, Mission, "what is stored") == mission, "another mission comes back than was sent")
 
 
 def a_late_commit_is_expired(bench: RobotBench) -> None:

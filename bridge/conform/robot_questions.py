@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
-from bridge.conform.robot_bench import RobotBench, manifest_of, read
+from bridge.conform.robot_bench import RobotBench, manifest_of, read, read_event
 from bridge.conform.trial_mission import trial_mission
 from bridge.link.capabilities import RECORD
 from bridge.link.protocol import (
@@ -29,7 +29,7 @@ from bridge.link.protocol import (
     encode,
 )
 from mission.document import Mission
-from mission.events import STOPS_LISTED, Pose, StateReport, event_of
+from mission.events import STOPS_LISTED, Pose, StateReport
 from mission.run.orders import Order
 
 STATE_BYTES = 16 * 1024
@@ -103,7 +103,7 @@ def log_comes_in_pages(bench: RobotBench) -> None:
     beyond = bench.ask_for(LogPage, bench.keys.log, since=str(page.newest))
     must(not beyond.bodies, "there are events behind the newest")
     for body in page.bodies:
-        event_of(bytes(body))
+        read_event(bytes(body))
 
 
 def poses_come_in_pages(bench: RobotBench) -> None:

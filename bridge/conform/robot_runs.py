@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from bridge.conform.requirements import NotTried, Requirement, must
-from bridge.conform.robot_bench import OVER, RobotBench, read, rejects, told_of
+from bridge.conform.robot_bench import OVER, RobotBench, read, read_event, rejects, told_of
 from bridge.conform.robot_orders import as_another, ready, refuses_what_means_nothing
 from bridge.conform.robot_questions import keeps_a_record, states_are_bounded
 from bridge.link.capabilities import RECORD
@@ -20,7 +20,6 @@ from mission.events import (
     Skipped,
     Started,
     StateReport,
-    event_of,
 )
 from mission.run.orders import LONGEST_VALID_S, Answer
 
@@ -75,7 +74,7 @@ def _told_once_in_order(bench: RobotBench, events: list[AnyEvent]) -> None:
     wanted = [event.number for event in events]
 
     def all_heard() -> list[int] | None:
-        numbers = [event_of(raw).number for raw in bench.heard.events]
+        numbers = [read_event(raw).number for raw in bench.heard.events]
         mine = [number for number in numbers if number >= wanted[0]]
         return mine if mine and mine[-1] >= wanted[-1] else None
 
@@ -95,6 +94,7 @@ def the_way_has_no_gaps(bench: RobotBench) -> None:
         seqs += [pose.seq for pose in page.poses]
         if len(page.poses) < POSE_PAGE:
             break
+        must(seqs[-1] > since, "a page of poses does not go on behind `since`")
         since = seqs[-1]
     must(seqs, "no poses of the run are kept")
     missing = set(range(seqs[0], seqs[-1] + 1)) - set(seqs)
@@ -246,6 +246,7 @@ def the_record_has_no_gaps(bench: RobotBench) -> None:
     bench.wait_for_state(*OVER, within_s=RUN_S)
     entries = bench.wait(lambda: _record(bench, run_id), RECORD_S, f"the record has no end of run {run_id}")
     seqs = [pose.seq for entry in entries for pose in entry.poses]
+    must(seqs, "the record has no pose")
     must(seqs == list(range(seqs[0], seqs[-1] + 1)), "poses are missing from the record, or are there twice")
     times = [pose.robot_ns for entry in entries for pose in entry.poses]
     must(times == sorted(times), "the times of the record's poses go back")
@@ -254,7 +255,8 @@ def the_record_has_no_gaps(bench: RobotBench) -> None:
     again = list(page.entries)
     must(again == entries[middle:][: len(again)], "an entry is another when it is read again")
     late = bench.ask_for(RecordPage, bench.keys.record, run=run_id, time=str(times[-1] - 1))
-    must(late.entries and late.entries[0].poses[-1].robot_ns >= times[-1], "`time` is not heeded")
+    later = [pose.robot_ns for entry in late.entries[:1] for pose in entry.poses]
+    must(later and later[-1] >= times[-1], "`time` is not heeded")
 
 
 def _record(bench: RobotBench, run_id: str) -> list[RecordEntry] | None:

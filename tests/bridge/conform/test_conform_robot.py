@@ -12,7 +12,17 @@ from bridge.conform.conform_robot import REQUIREMENTS, check_at_rest, robot_verd
 from bridge.conform.requirements import ConformVerdict, tried
 from bridge.conform.robot_bench import OVER
 from bridge.link.link import Answering, Request
-from bridge.link.protocol import LogPage, Manifest, RecordPage, Rejected, decode, encode
+from bridge.link.protocol import (
+    POSE_PAGE,
+    LogPage,
+    Manifest,
+    MissionPart,
+    PosePage,
+    RecordPage,
+    Rejected,
+    decode,
+    encode,
+)
 from bridge.link.seals import KeySeals, SealedAnswering, Seals
 from bridge.robot.agent import Agent
 from bridge.robot.controller import Controller
@@ -63,6 +73,16 @@ def test_what_lay_on_the_robot_lies_ready_again() -> None:
         state = robot.bench().info().state
     assert found[-1].text == "what lay there before lies ready again"
     assert (state.state, state.mission_id, state.revision) == ("READY", held.id, held.revision)
+
+
+def test_a_mission_that_cannot_be_read_back_is_not_written_over() -> None:
+    robot = RobotUnderTest()
+    robot.agent = TellsNoParts
+    with booted(robot):
+        held = robot.bench().has(robot.bench().mission())
+        with pytest.raises(InputError, match="the mission on r1 cannot be read, and would be lost"):
+            next(robot_verdicts(robot.bench(), drive=False))
+        assert robot.bench().info().state.revision == held.revision
 
 
 def test_a_robot_on_a_run_or_in_others_hands_is_left_alone() -> None:
@@ -195,6 +215,46 @@ class LosesEntriesOfTheRecord(RunRecorder):
         return changed(page, entries=tuple(entry for entry in page.entries if entry.number != 2))
 
 
+class TellsNoParts(Agent):
+    def _mission_step(self, request: Request) -> Any:
+        reply = super()._mission_step(request)
+        return Rejected(reason="no_mission", messages=()) if isinstance(reply, MissionPart) else reply
+
+
+class TellsNoEvents(Agent):
+    def _log(self, request: Request) -> bytes:
+        page = decode(super()._log(request), LogPage)
+        nothing = tuple(msgspec.Raw(b'{"event": "Started"}') for _ in page.bodies)
+        return encode(changed(page, bodies=nothing))
+
+
+class RepeatsItsPoses(Agent):
+    def _past_poses(self, request: Request) -> bytes:
+        page = decode(super()._past_poses(changed_parameters(request, since="0")), PosePage)
+        return encode(changed(page, poses=page.poses[:1] * POSE_PAGE))
+
+
+class AnswersInBrackets(Agent):
+    def _log(self, request: Request) -> bytes:
+        return b'{"is": "LogPage", "events": [], "newest": 1, "later": ' + b"[" * 20_000
+
+
+class KeepsNoPoses(RunRecorder):
+    def page(self, run_id: str, since: int | None = 0, *, robot_ns: int = 0) -> RecordPage:
+        page = super().page(run_id, since, robot_ns=robot_ns)
+        return changed(page, entries=tuple(changed(entry, poses=()) for entry in page.entries))
+
+
+class GivesNonsenseBack(Inbox):
+    def receive(self, request: Request) -> Any:
+        reply = super().receive(request)
+        return changed(reply, data=reply.data[::-1]) if isinstance(reply, MissionPart) else reply
+
+
+def changed_parameters(request: Request, **parameters: str) -> Request:
+    return Request(request.key, request.payload, {**request.parameters, **parameters})
+
+
 class WantsPiecesInOrder(Inbox):
     def _chunk(self, mission_id: str, number: int, request: Request) -> Any:
         manifest = self._journal.transfer(mission_id)
@@ -232,6 +292,11 @@ class WantsPiecesInOrder(Inbox):
         ("recorder", LosesPosesOfTheRecord, RECORD_WHOLE, "poses are missing from the record"),
         ("recorder", LosesEntriesOfTheRecord, RECORD_WHOLE, "the entries are numbered [1, 3"),
         ("inbox", WantsPiecesInOrder, "chunks may come in any order", "Rejected incomplete"),
+        ("agent", TellsNoEvents, "a run goes stop by stop to FINISHED", "an event cannot be read"),
+        ("agent", RepeatsItsPoses, "the way of a run is kept without gaps", "does not go on behind"),
+        ("agent", AnswersInBrackets, "numbered from 1 without gaps", "an answer cannot be read"),
+        ("recorder", KeepsNoPoses, RECORD_WHOLE, "the record has no pose"),
+        ("inbox", GivesNonsenseBack, "what is stored comes back in parts", "what is stored cannot be read"),
     ],
 )
 def test_a_broken_robot_is_found_by_the_requirement_that_names_it(
