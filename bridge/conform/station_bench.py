@@ -14,7 +14,7 @@ from bridge.conform.fake_robot import FakeRobot, ForgedAnswers, Meddling, Withho
 from bridge.conform.requirements import Nonconforming, NotTried, must
 from bridge.conform.trial_mission import trial_mission
 from bridge.link.link import Answering, Request
-from bridge.link.protocol import CHUNK_BYTES, Commit, Manifest, encode
+from bridge.link.protocol import CHUNK_BYTES, Commit, Manifest, count_of, encode
 from mission.document import Mission, Stop
 from mission.run.orders import Answer, Order, Verb
 
@@ -79,17 +79,26 @@ class StationBench:
     def orders(self, verb: Verb) -> list[Order]:
         return [_read(request, Order, verb) for request in self.asked(f"cmd/{verb}")]
 
+    def announced(self) -> list[Manifest]:
+        return self._steps("begin", Manifest)
+
     def commits(self) -> list[Commit]:
-        return [
-            _read(request, Commit, "a commit")
-            for request in self.asked("mission/")
-            if request.key.endswith("/commit")
-        ]
+        return self._steps("commit", Commit)
+
+    def _steps(self, step: str, kind: type[M]) -> list[M]:
+        """What was sent for a step of a push, read."""
+        sent = (request for request in self.asked("mission/") if request.key.endswith(f"/{step}"))
+        return [_read(request, kind, f"a {step}") for request in sent]
 
     def chunks(self) -> list[int]:
         """Numbers of the chunks that came, in their order."""
-        tails = (tail.split("/") for tail in self.tails() if "/chunk/" in tail)
-        return [int(parts[-1]) for parts in tails]
+        return [self._number(tail.split("/")[-1]) for tail in self.tails() if "/chunk/" in tail]
+
+    def _number(self, told: str) -> int:
+        try:
+            return count_of(told)
+        except ValueError as error:
+            raise Nonconforming(f"a chunk's number: {error}") from None
 
     # The robot's own side
 
@@ -179,7 +188,7 @@ def _bytes_of_a_stop(mission: Mission) -> int:
 def _read(request: Request, kind: type[M], what: str) -> M:
     try:
         return msgspec.json.decode(request.payload, type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise Nonconforming(f"{what} cannot be read ({error})") from None
 
 

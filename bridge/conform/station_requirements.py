@@ -20,7 +20,7 @@ from bridge.conform.station_bench import (
     tells,
 )
 from bridge.link.link import Answering, Request, Unanswered
-from bridge.link.protocol import Booted, ChunkHeld, Manifest, Rejected, encode
+from bridge.link.protocol import Booted, ChunkHeld, Rejected, encode
 from mission.run.orders import LONGEST_VALID_S
 
 LATE_S = 2.0
@@ -143,7 +143,7 @@ def a_push_is_whole_and_read_back(bench: StationBench) -> None:
     mission = bench.large()
     tells(bench.does("push", mission), DONE, "a push that was taken is not told as done")
     must(bench.robot.holds(mission), "the robot does not hold what was to be pushed")
-    manifest = msgspec.json.decode(bench.asked("mission/")[0].payload, type=Manifest)
+    manifest = bench.announced()[-1]
     numbers = bench.chunks()
     must(sorted(set(numbers)) == list(range(manifest.chunks)), f"chunks {numbers} came of {manifest.chunks}")
     tails = bench.tails()

@@ -129,6 +129,21 @@ class LeavesGaps(Station):
         return super().reports()
 
 
+class LooksFirst(Station):
+    """Asks for what the robot holds, and for a chunk that is none, before it pushes."""
+
+    chunk = "0"
+
+    def push(self, mission: Mission, **details: Any) -> Any:
+        self.link.ask(self.keys.mission(mission.id, "part/0"), timeout_s=1.0)
+        self.link.ask(self.keys.mission(mission.id, f"chunk/{self.chunk}"), timeout_s=1.0)
+        return super().push(mission, **details)
+
+
+class CountsInWords(LooksFirst):
+    chunk = "first"
+
+
 def _parameters(details: dict[str, Any]) -> dict[str, str]:
     return {name: value for name, value in details.items() if name not in ("try_s", "bulk")}
 
@@ -147,6 +162,7 @@ def _parameters(details: dict[str, Any]) -> dict[str, str]:
         (NewNonceEachTime, "a commit is repeated under its nonce", "under 2 nonces"),
         (ReadsInfoStrictly, "fields that are not known are passed over", "cannot be started"),
         (LeavesGaps, "poses that were missed are asked for", "are not asked for"),
+        (CountsInWords, "every chunk, then the commit, then a look", "a chunk's number: 'first'"),
         (SeesOneOfTwo, "two boots: no order, both paused", "though two robots"),
     ],
 )
@@ -158,6 +174,13 @@ def test_a_broken_station_is_found_by_the_requirement_that_names_it(
     found = verdicts(station, requirement)[requirement]
     assert found.outcome == "failed"
     assert why in found.reason
+
+
+def test_a_station_may_ask_before_it_pushes() -> None:
+    station = StationUnderTest()
+    station.station = LooksFirst
+    whole = "every chunk, then the commit, then a look"
+    assert verdicts(station, whole)[whole].outcome == "passed"
 
 
 class BelievesEverybody(KeySeals):
