@@ -236,6 +236,12 @@ def test_the_front_door_opens_without_slow_libraries() -> None:
     )
 
 
+def test_a_simulated_robot_loads_nothing_of_autopilots() -> None:
+    robot = "['robot', '--name', 'r1', '--state', 'r1.state', '--listen', 'nowhere']"
+    code = f"from mission.__main__ import main; import sys; main({robot}); print(*sys.modules)"
+    assert not {"pymavlink", "mission.plugins"} & set(run(sys.executable, "-c", code).split())
+
+
 def test_every_module_says_what_it_is_for() -> None:
     for name in MODULES:
         assert ast.get_docstring(tree_of(name)), f"{name} has no first sentence"

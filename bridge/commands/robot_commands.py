@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from mission.events import Pose
     from mission.run.revision import RevisionPolicy
 
-
+MAVLINK = "mavlink:"
+"""Before the URL of an autopilot that is the controller."""
 ONLY_SIMULATED = ("--at", "--map", "--fault", "--speed-up", "--endurance")
 ONLY_DRIVEN = ("--arm", "--trigger", "--vehicle", "--signing-key")
 """Options of `--controller sim`, and of `--controller mavlink:URL`; with the other one they are refused."""
@@ -92,28 +93,31 @@ def robot(
 
     Example: stopgo robot --name r1 --state r1.state --controller mavlink:serial:/dev/ttyAMA0:921600
     """
-    from bridge.mavlink.driving.autopilot_body import AutopilotBody, autopilot_url
     from bridge.robot.bodies import OpenBody, SimulatedBody
-    from bridge.robot.plugin_body import plugin_body
     from bridge.robot.program import RobotOptions, run_robot
     from bridge.robot.simulator import Faults, read_fault
 
-    given, url = given_in(context), autopilot_url(controller)
+    given = given_in(context)
     if connect is not None:
         alone(given, "--connect", "--listen")
     faults, to_map = Faults(tuple(read_fault(text) for text in fault or ())), read_map(map_)
-    if controller != "sim" and url is None:
-        others = tuple(option for option in ONLY_SIMULATED if option != "--map")
-        alone(given, "a controller of your own", *others, *ONLY_DRIVEN)
-        body: OpenBody = plugin_body(controller, state, to_map)
-    elif url is None:
+    if controller == "sim":
         alone(given, "a simulated robot", *ONLY_DRIVEN)
-        body = SimulatedBody(
+        body: OpenBody = SimulatedBody(
             state, None if at is None else read_pose("--at", at), to_map, 3600 * endurance, faults
         )
-    else:
+    elif controller.startswith(MAVLINK):
+        from bridge.mavlink.driving.autopilot_body import AutopilotBody
+
         alone(given, "an autopilot", *ONLY_SIMULATED)
+        url = controller.removeprefix(MAVLINK)
         body = AutopilotBody(url, arm, read_trigger(trigger), signing_key, vehicle, insecure)
+    else:
+        from bridge.robot.plugin_body import plugin_body
+
+        others = tuple(option for option in ONLY_SIMULATED if option != "--map")
+        alone(given, "a controller of your own", *others, *ONLY_DRIVEN)
+        body = plugin_body(controller, state, to_map)
     options = RobotOptions(
         name=name, listen=listen, connect=connect, state=state, body=body, site=site, speed_up=speed_up,
         to_map=to_map, insecure=insecure, revisions=read_revisions(revision), keys=keys, faults=faults,

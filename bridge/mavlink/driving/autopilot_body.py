@@ -15,8 +15,6 @@ from bridge.mavlink.line.wire import read_line
 from bridge.robot.bodies import Body
 from mission.document import Mission
 
-MAVLINK = "mavlink:"
-
 
 @dataclass(frozen=True)
 class AutopilotBody:
@@ -44,8 +42,3 @@ class AutopilotBody:
                 scanner.take(mission)
 
             yield Body(base, scanner, take)
-
-
-def autopilot_url(controller: str) -> str | None:
-    """The URL in `mavlink:URL`; `None` for any other controller."""
-    return controller.removeprefix(MAVLINK) if controller.startswith(MAVLINK) else None
