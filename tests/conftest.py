@@ -8,6 +8,7 @@ import signal
 import tempfile
 from collections.abc import Iterator
 from contextlib import nullcontext
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -21,6 +22,8 @@ settings.register_profile(
 )
 settings.register_profile("search", deadline=None, max_examples=20_000)
 settings.load_profile(os.environ.get("STOPGO_HYPOTHESIS", "tests"))
+
+TESTS = Path(__file__).parent
 
 
 def pytest_configure() -> None:
@@ -50,6 +53,27 @@ def pytest_collection_finish() -> None:
     """Look no more for garbage among thousands of collected tests: that takes a tenth of all time."""
     gc.collect()
     gc.freeze()
+
+
+WAITING = {TESTS / name for name in ("bridge", "faults", "journeys")}
+"""Folders whose tests mostly wait for other processes; those of the other folders mostly compute."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Deal both kinds of files out evenly, so that at any time some tests compute while others wait.
+
+    The folders that wait are taken from the last one: their longest files are there, and none may end alone.
+    """
+    kinds: tuple[list[Path], list[Path]] = [], []
+    for path in dict.fromkeys(item.path for item in items):
+        kinds[not WAITING.isdisjoint(path.parents)].append(path)
+    computing, waiting = kinds
+    place = {
+        path: (number + 0.5) / len(kind)
+        for kind in (computing, waiting[::-1])
+        for number, path in enumerate(kind)
+    }
+    items.sort(key=lambda item: (place[item.path], item.path))
 
 
 @pytest.fixture
