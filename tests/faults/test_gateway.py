@@ -100,6 +100,7 @@ def chassis(chance: random.Random, profile: str) -> dict[str, float]:
     """Wheels, sensors and loops, better or worse than usual."""
     own = {"SIM_LAG": chance.uniform(0.15, 0.5), "SIM_TURN_LAG": chance.uniform(0.05, 0.25)}
     own |= {"SIM_STICTION": chance.uniform(0.0, 0.03), "SIM_POS_DRIFT": chance.uniform(0.002, 0.008)}
+    own |= {"SIM_ARM_AFTER": chance.choice([0.0, 5.0, 18.0])}
     own |= {"SIM_POS_NOISE": chance.uniform(0.0005, 0.002), "SIM_EST_LAG": chance.uniform(0.02, 0.15)}
     if profile == "ardupilot":
         return {**own, "ATC_SPEED_I": chance.uniform(0.1, 0.4), "ATC_STR_ANG_P": chance.uniform(1.5, 2.5)}

@@ -164,9 +164,18 @@ class MavlinkBase:
         _must(self.not_ready() or autopilot.changed_hands())
         self._boots = autopilot.peer.boots
         if not autopilot.peer.armed:
-            _must(autopilot.arm())
+            self._make_armed(interrupt)
         with autopilot.standing_at(autopilot.place()):
             self._guide(interrupt)
+
+    def _make_armed(self, interrupt: Event) -> None:
+        """Arm it; one that was started just now says no until its sensors agree, and is asked again."""
+        autopilot = self.autopilot
+        while trouble := autopilot.arm():
+            _must(trouble if autopilot.up_s > TAKE_UP_S else "")
+            self._pause(AGAIN_S, interrupt)
+            self._await(interrupt)
+            _must(self.not_ready() or autopilot.changed_hands())
 
     def _guide(self, interrupt: Event) -> None:
         """Into the mode in which we drive it, seen by its heartbeat."""

@@ -34,7 +34,15 @@ from mission.mavlink.autopilots.kind import Mode, why_no_rover
 from mission.mavlink.enums import Component, MessageId
 from mission.mavlink.items import Command
 from mission.mavlink.local_frame import VehicleOrigin
-from mission.mavlink.telemetry import Message, charge_of, is_lost, local_speed, origin_of, stands_still
+from mission.mavlink.telemetry import (
+    Message,
+    charge_of,
+    complains,
+    is_lost,
+    local_speed,
+    origin_of,
+    stands_still,
+)
 
 ON_BOARD = Who(253, Component.ONBOARD_COMPUTER)
 """Ourselves: neither QGroundControl (255) nor a station of ours (254)."""
@@ -43,6 +51,8 @@ ORDER_S = 3.0
 """How long one order waits for its answer."""
 STOP_S = 2.5
 """How long `stop` waits to see itself obeyed; it goes on being ordered after that."""
+WORDS_S = 0.5
+"""So long after it refused an order an autopilot may say why."""
 IN_FLIGHT_S = 0.3
 """A heartbeat that comes so soon after an order may have been sent before it."""
 ASK_ORIGIN_S = 4.0
@@ -331,15 +341,20 @@ class OnboardAutopilot:
 
     def order(self, command: int, *params: float, what: str) -> str:
         """Why an order was not obeyed; empty if it was."""
-        try:
-            ack = self.peer.command(command, *params, patience_s=ORDER_S)
-        except OutcomeUnknown:
-            return f"the autopilot did not answer {what}{self.peer.why_silent()}"
-        if ack.accepted:
-            return ""
-        text = self._heard.newest("STATUSTEXT", ORDER_S)
-        said = f' (it said "{text.text}")' if text is not None else ""
-        return f"the autopilot answered {what} with {ack.name}{said}"
+        with self.peer.waiting("STATUSTEXT") as waiting:
+            try:
+                ack = self.peer.command(command, *params, patience_s=ORDER_S)
+            except OutcomeUnknown:
+                return f"the autopilot did not answer {what}{self.peer.why_silent()}"
+            if ack.accepted:
+                return ""
+            said = _said(waiting)
+        return f"the autopilot answered {what} with {ack.name}" + (f' (it said "{said}")' if said else "")
+
+    @property
+    def up_s(self) -> float:
+        """Seconds since it was started, by its own clock."""
+        return float(self._told("LOCAL_POSITION_NED").time_boot_ms) / 1000
 
     def arm(self) -> str:
         """Why it cannot be armed; empty once it is."""
@@ -444,3 +459,13 @@ class OnboardAutopilot:
         """What every setpoint bears: the height it is at, and the time."""
         down = self._told("LOCAL_POSITION_NED").z
         return {"down": down, "now_ms": int(time.monotonic() * 1000)}
+
+
+def _said(waiting: MessageQueue) -> str:
+    """What it says of an order that it refused: its complaint, or else its last words; they may come late."""
+    until_s, said = time.monotonic() + WORDS_S, ""
+    while (message := waiting.get(until_s - time.monotonic())) is not None:
+        said = message.text
+        if complains(said):
+            break
+    return said

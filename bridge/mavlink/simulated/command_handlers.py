@@ -81,6 +81,9 @@ def _answer(vehicle: Vehicle, who: Who, order: ReceivedCommand) -> None:
     """Obey and acknowledge; an order that makes the vehicle silent is acknowledged first."""
     if order.command == Command.PREFLIGHT_REBOOT_SHUTDOWN:
         return _reboot(vehicle, who, order)
+    if order.command == Command.COMPONENT_ARM_DISARM and order.params[0] == 1 and vehicle.refuses_arming:
+        _acknowledge(vehicle, who, order.command, _no(vehicle))
+        return vehicle.text(vehicle.refuses_arming)  # a real one says why after it has answered
     obey = OBEYED.get(order.command)
     _acknowledge(vehicle, who, order.command, UNSUPPORTED if obey is None else obey(vehicle, order))
     if order.command == Command.REQUEST_MESSAGE:

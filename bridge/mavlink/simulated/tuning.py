@@ -21,6 +21,7 @@ CHASSIS = {
     "SIM_VEL_NOISE": 0.003,  # m/s
     "SIM_YAW_DRIFT": 0.3,  # degrees
     "SIM_EST_LAG": 0.06,  # s by which the estimate is late
+    "SIM_ARM_AFTER": 0.0,  # s from its start until its sensors agree and it lets itself be armed
 }
 ARDUPILOT_ROVER = {
     "WP_SPEED": 0.8, "WP_RADIUS": 0.02, "WP_ACCEL": 0.0, "WP_JERK": 0.0,

@@ -102,7 +102,7 @@ class Vehicle:
         self.store = Store(setting.state)
         rule = self.autopilot.rule
         driving = self.autopilot.driving
-        tuning = Tuning(self.autopilot.name, **setting.changed)
+        self._tuning = tuning = Tuning(self.autopilot.name, **setting.changed)
         self.rover = Rover(self.store, self._drive(tuning), rule=rule, origin=setting.origin)
         self.target = GuidedTarget(
             self.rover, wall, patience_s=lambda: tuning.values.get(driving.gives_up_parameter, PATIENCE_S)
@@ -224,6 +224,12 @@ class Vehicle:
             self.auto.go_on(self.now_ns)
         self.tell(MessageId.HEARTBEAT)
         return True
+
+    @property
+    def refuses_arming(self) -> str:
+        """Why it does not let itself be armed; empty if it does."""
+        settled_s = self._tuning.values.get("SIM_ARM_AFTER", 0.0)
+        return "Arm: Accels inconsistent" if self.boot_ms < 1000 * settled_s else ""
 
     def arm(self) -> None:
         was, self.armed = self.armed, True

@@ -96,6 +96,34 @@ def test_a_short_silence_and_a_restart_are_taken_up_by_itself(
         assert scanned(station) == ["s1", "s2"]
 
 
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+def test_one_that_refuses_to_arm_until_its_sensors_agree_is_asked_again(tmp_path: Path, profile: str) -> None:
+    """As ArduPilot did for 18 s after each start."""
+    faults = VehicleFaults((VehicleFault("restart", 30, 4.0),))
+    settles = {"SIM_ARM_AFTER": 18.0}
+    with (
+        rover(tmp_path, profile, faults=faults, changed=settles) as (vehicle, _),
+        gateway(tmp_path, vehicle.url) as station,
+    ):
+        station.push(site_mission())
+        station.command("start")
+        until(station.reports(), is_state("FINISHED", "HELD"))
+        assert [event for event in events_of(station) if isinstance(event, Held)] == []
+        assert scanned(station) == ["s1", "s2"]
+
+
+def test_one_that_refuses_to_arm_for_good_is_held_for_what_it_says(tmp_path: Path) -> None:
+    with (
+        rover(tmp_path, "ardupilot", changed={"SIM_ARM_AFTER": 9000.0}) as (vehicle, _),
+        gateway(tmp_path, vehicle.url) as station,
+    ):
+        station.push(site_mission())
+        station.command("start")
+        until(station.reports(), is_state("HELD"))
+        (held,) = [event for event in events_of(station) if isinstance(event, Held)]
+    assert 'answered arming with FAILED (it said "Arm: Accels inconsistent")' in held.reason
+
+
 def test_a_jump_of_its_place_is_driven_back_from(tmp_path: Path) -> None:
     faults = VehicleFaults((VehicleFault("jump", 6, 0.25),))
     with rover(tmp_path, "ardupilot", faults=faults) as (vehicle, _), gateway(tmp_path, vehicle.url) as s:
