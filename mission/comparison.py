@@ -12,6 +12,10 @@ from mission.document import Mission
 from mission.events import State
 from mission.geometry import FloatArray, IntArray
 from mission.run_log import RunLog
+from mission.tolerance import beside, is_outside
+
+DONE = {"scanned": "scanned", "unconfirmed": "passed"}
+"""Outcomes of a stop that is done, in words."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +28,7 @@ class StopComparison:
     arrived_s: float | None = None
     """First arrival in the run, from the start of the run."""
     deviation_m: float | None = None
-    """Distance of the robot from the stop when it scanned there, else when it last arrived."""
+    """Distance of the robot from the stop when it scanned or passed there, else when it last arrived."""
     along_m: float | None = None
     """The part of it in the direction in which the robot was to arrive, positive where it went too far."""
     across_m: float | None = None
@@ -54,7 +58,14 @@ class StopComparison:
     def outside_tolerance(self) -> bool:
         """Whether the robot was farther from the stop than the mission tolerates."""
         away, limit = self.deviation_m, self.tolerance_m
-        return away is not None and limit is not None and away > limit
+        return away is not None and limit is not None and is_outside(away, limit)
+
+    @property
+    def seen_beside(self) -> str:
+        """That it was scanned, or passed, from elsewhere, in words; empty if it was not."""
+        if self.outcome not in DONE or not self.outside_tolerance:
+            return ""
+        return f"{DONE[self.outcome]} {beside(self.deviation_m or 0.0, self.tolerance_m or 0.0)}"
 
 
 @dataclass(frozen=True)
@@ -132,7 +143,12 @@ class Comparison:
     @cached_property
     def missing(self) -> tuple[StopComparison, ...]:
         """Those of them that were not scanned, unless only nobody says so."""
-        return tuple(item for item in self.asked if item.outcome not in ("scanned", "unconfirmed"))
+        return tuple(item for item in self.asked if item.outcome not in DONE)
+
+    @cached_property
+    def outside(self) -> tuple[StopComparison, ...]:
+        """Stops that were scanned, or passed unconfirmed, from elsewhere than the plan reckons with."""
+        return tuple(item for item in self.stops if item.seen_beside)
 
     @property
     def greatest_deviation_m(self) -> float | None:

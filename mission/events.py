@@ -225,6 +225,9 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     """The revision that will be followed from the next stop on."""
     done_count: int = 0
     skipped_count: int = 0
+    outside: tuple[str, ...] = ()
+    """Of those that are done, the newest that were scanned farther from their places than is tolerated."""
+    outside_count: int = 0
 
 
 class PoseReport(msgspec.Struct, frozen=True, kw_only=True):

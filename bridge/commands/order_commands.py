@@ -44,7 +44,8 @@ OtherOrigin = Annotated[
     bool, typer.Option("--any-origin", help="Do not compare origins: it has satellite positions.")
 ]
 STATUS_KEYS = (
-    "robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop", "done", "skipped", "battery",
+    "robot", "boot_id", "state", "run_id", "mission_id", "revision", "stop", "done", "skipped", "outside",
+    "battery",
 )  # fmt: skip
 
 
@@ -247,14 +248,17 @@ def report_answer(answer: Answer, robot: str, json_: bool) -> None:
 
 def state_line(report: StateReport) -> str:
     """The state as one line a person reads."""
+    from mission.tolerance import told_outside
+
     mission = (
         f"mission {report.mission_id[:12]} revision {report.revision}" if report.mission_id else "no mission"
     )
     stop = f", {report.stop_state} at {report.stop}" if report.stop else ""
+    outside = told_outside(report.outside, report.outside_count)
     skipped = f", {report.skipped_count} skipped" if report.skipped_count else ""
     if report.next_revision is not None:
         mission += f" (revision {report.next_revision} from the next stop on)"
     return (
-        f"{report.robot}: {report.state}{stop}; {mission}; {report.done_count} done{skipped};"
+        f"{report.robot}: {report.state}{stop}; {mission}; {report.done_count} done{outside}{skipped};"
         f" battery {report.battery:.0%}"
     )

@@ -35,6 +35,7 @@ from mission.run.orders import FREE_VERBS, Answer, Order, Refused
 from mission.run.revision import RevisionPolicy
 from mission.run.scans import ScanFailed, ScanResult
 from mission.run.states import Change, Run
+from mission.tolerance import deviation, is_outside
 
 SETTLE_SAMPLE_S = 0.1
 FACING_RAD = math.radians(2)
@@ -347,7 +348,8 @@ class Controller:
         at_stop = run.leg > run.at
         path = ((stop.x, stop.y),) if at_stop else way.forward(mission.stops[run.leg].approach, pose)
         outcome = "arrived"
-        if not (at_stop and runs.deviation(pose, stop) <= stop.tolerance_m and _faces(pose, stop)):
+        stands = at_stop and not is_outside(deviation(pose, stop), stop.tolerance_m)
+        if not (stands and _faces(pose, stop)):
             heading = stop.heading if run.leg >= run.at else None
             outcome = self._base.goto(path, heading=heading, limits=mission.robot, interrupt=self._interrupt)
         here = self._base.pose()
@@ -355,7 +357,7 @@ class Controller:
             reason = self._blocked(f"the way to {stop.id}", here)
             self._advance(run, lambda now: runs.held(now, reason))
         elif outcome == "arrived":
-            self._advance(run, lambda now: runs.reached(now, mission, here, runs.deviation(here, stop)))
+            self._advance(run, lambda now: runs.reached(now, mission, here, deviation(here, stop)))
 
     def _settle(self, run: Run, mission: Mission) -> None:
         stop = mission.stops[run.at]
@@ -367,7 +369,7 @@ class Controller:
             self._advance(run, lambda now: runs.failed(now, mission, reason))
             return
         here = self._base.pose()
-        self._advance(run, lambda now: runs.settled(now, mission, here, runs.deviation(here, stop)))
+        self._advance(run, lambda now: runs.settled(now, mission, here, deviation(here, stop)))
 
     def _stands_still(self, settle_s: float) -> bool | None:
         """Whether the robot came to a stand for `settle_s`; `None` if interrupted."""

@@ -63,5 +63,6 @@ def state_report(runner: Runner, *, robot: str, seq: int, ns: int, newest: int) 
         mission_id=run.mission_id, revision=run.revision, stop=stop.id if stop else None,
         stop_state=run.stop_state if stop else None, done=run.done[-STOPS_LISTED:],
         skipped=run.skipped[-STOPS_LISTED:], done_count=len(run.done), skipped_count=len(run.skipped),
+        outside=run.outside[-STOPS_LISTED:], outside_count=len(run.outside),
         battery=runner.battery(), last_event=newest, next_revision=run.next_revision,
     )  # fmt: skip

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from bridge.link.capabilities import RECORD
 from bridge.station.follow import Followed
 from bridge.station.record import Past, past_run, read_index
 from bridge.station.station import Station
+from mission.document import Mission
 from mission.errors import AnswerIsNo
 from mission.events import Aborted, AnyEvent, Finished, Scanned, Skipped, StateReport, Unconfirmed
+from mission.tolerance import stops_outside
 
 
-def past_reports(station: Station, run_id: str) -> Iterator[Followed]:
+def past_reports(
+    station: Station, run_id: str, mission_of: Callable[[str, int], Mission | None]
+) -> Iterator[Followed]:
     """Events, poses and states of a run that is over, in the order of their times; last how it ended.
+
+    `mission_of` knows a mission and revision once an event of it has been told.
 
     Raises
     ------
@@ -39,7 +45,7 @@ def past_reports(station: Station, run_id: str) -> Iterator[Followed]:
                 yield waiting.pop(0)
         yield item
     yield from waiting
-    yield _ended(events, end, battery)
+    yield _ended(events, end, battery, tuple(stops_outside(events, mission_of)))
 
 
 def _runs(station: Station) -> str:
@@ -48,7 +54,9 @@ def _runs(station: Station) -> str:
     return ", ".join(kept) or "none"
 
 
-def _ended(events: tuple[AnyEvent, ...], end: Finished | Aborted, battery: float) -> StateReport:
+def _ended(
+    events: tuple[AnyEvent, ...], end: Finished | Aborted, battery: float, outside: tuple[str, ...]
+) -> StateReport:
     done = tuple(event.stop for event in events if isinstance(event, Scanned | Unconfirmed))
     skipped = tuple(event.stop for event in events if isinstance(event, Skipped))
     return StateReport(
@@ -56,5 +64,5 @@ def _ended(events: tuple[AnyEvent, ...], end: Finished | Aborted, battery: float
         state="FINISHED" if isinstance(end, Finished) else "ABORTED",
         run_id=end.run_id, mission_id=end.mission_id, revision=end.revision, stop=None, stop_state=None,
         done=done, skipped=skipped, battery=battery, last_event=end.number,
-        done_count=len(done), skipped_count=len(skipped),
+        done_count=len(done), skipped_count=len(skipped), outside=outside, outside_count=len(outside),
     )  # fmt: skip

@@ -46,6 +46,7 @@ from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreacha
 from mission.events import AnyEvent, Scanned, Skipped, StateReport, Unconfirmed
 from mission.files.mission_json import parse
 from mission.run.orders import FREE_VERBS, LONGEST_VALID_S, Answer, Order, Verb
+from mission.tolerance import stops_outside
 
 TRY_S = 1.0
 """How long one try waits for its answer."""
@@ -208,8 +209,16 @@ class Station:
         events = self.log(run_id=state.run_id)
         done = tuple(event.stop for event in events if isinstance(event, Scanned | Unconfirmed))
         skipped = tuple(event.stop for event in events if isinstance(event, Skipped))
+        outside = state.outside
+        if state.outside_count > len(outside):
+            outside = tuple(stops_outside(events, self.mission))
         return msgspec.structs.replace(
-            state, done=done, skipped=skipped, done_count=len(done), skipped_count=len(skipped)
+            state,
+            done=done,
+            skipped=skipped,
+            done_count=len(done),
+            skipped_count=len(skipped),
+            outside=outside,
         )
 
     def push(

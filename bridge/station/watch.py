@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 import msgspec
@@ -15,7 +15,7 @@ from bridge.station.past import past_reports
 from bridge.station.record import Past
 from bridge.station.station import Station
 from mission.comparing.spans import stood_s
-from mission.document import Mission
+from mission.document import Mission, Stop
 from mission.errors import OutcomeUnknown
 from mission.events import (
     AnyEvent,
@@ -35,6 +35,7 @@ from mission.heard_run import RunTaker
 from mission.run.decision import STATES
 from mission.schedule import schedule
 from mission.table import printable
+from mission.tolerance import scanned_beside, told_outside
 
 REDRAW_S = 0.2
 LOST_S = 3.0
@@ -67,11 +68,14 @@ def watch_showing(
     """
     state: StateReport | None = None
     known: tuple[str | None, int | None] = (None, None)
-    for report in station.reports() if run_id is None else past_reports(station, run_id):
+    missions: dict[tuple[str, int], Mission] = {}
+    past = None if run_id is None else past_reports(station, run_id, lambda *name: missions.get(name))
+    for report in station.reports() if past is None else past:
         plan = _plan_of(report)
         if plan is not None and plan != known:
             known = plan
-            _introduce(station, report, record, showing)
+            mission = _introduced(station, report, record, showing)
+            missions[mission.id, mission.revision] = mission
         if isinstance(report, StateReport):
             state = report
         if record is not None:
@@ -92,12 +96,13 @@ def _plan_of(report: Followed) -> tuple[str | None, int | None] | None:
     return report.run_id, report.revision
 
 
-def _introduce(station: Station, report: Any, record: RunTaker | None, showing: Showing) -> None:
+def _introduced(station: Station, report: Any, record: RunTaker | None, showing: Showing) -> Mission:
     """Fetch the mission that is run, so that it can be drawn and counted down."""
     mission = station.mission(report.mission_id or "", report.revision or 0)
     showing.mission(mission)
     if record is not None:
         record.mission(mission)
+    return mission
 
 
 def hand_over(record: RunTaker, report: Followed) -> None:
@@ -120,10 +125,12 @@ class Lines:
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
+        self._stops: Mapping[str, Stop] = {}
         self._greeted = False
         self._lost_s = 0.0
 
     def mission(self, mission: Mission) -> None:
+        self._stops = {stop.id: stop for stop in mission.stops}
         self._say(f"{mission.name}: {len(mission.stops)} stops")
 
     def show(self, report: Followed) -> None:
@@ -140,7 +147,7 @@ class Lines:
         elif isinstance(report, PosesMissing):
             self._say(missing_line(report))
         elif not isinstance(report, PoseReport | Past):
-            self._say(event_line(report))
+            self._say(event_line(report, self._stops))
             if isinstance(report, Held):
                 self._say(HINT)
 
@@ -152,19 +159,22 @@ class Lines:
 
 
 class EventObjects:
-    """One JSON object for every event."""
+    """One JSON object for every event; with `beside`, in words, where a stop was scanned from elsewhere."""
 
     def __init__(self, write: Callable[[dict[str, Any]], None]) -> None:
         self._write = write
+        self._stops: Mapping[str, Stop] = {}
 
     def mission(self, mission: Mission) -> None:
-        """Nothing: events and the state name the mission they are of."""
+        """Its stops; events and the state name themselves the mission they are of."""
+        self._stops = {stop.id: stop for stop in mission.stops}
 
     def show(self, report: Followed) -> None:
         if isinstance(report, PosesMissing):
             self._write({"missing": msgspec.to_builtins(report)})
         elif not isinstance(report, StateReport | PoseReport | Silence | Past):
-            self._write(msgspec.to_builtins(report))
+            beside = scanned_beside(report, self._stops.get(getattr(report, "stop", "")))
+            self._write(msgspec.to_builtins(report) | ({"beside": beside} if beside else {}))
 
 
 _WAITED_FOR = [f"stopgo {verb}" for verb, places in STATES.items() if "HELD" in places]
@@ -225,16 +235,18 @@ def table_lines(
     stop = f"{state.stop} {state.stop_state}" if state.stop else "-"
     elapsed = pose.mission_time_s if pose and pose.mission_time_s is not None else 0.0
     left = None if mission is None else remaining_s(mission, state, events, elapsed)
+    outside = told_outside(state.outside, state.outside_count)
     rows = [
         ("robot", f"{state.robot}  run {state.run_id or 'none yet'}"),
         ("state", f"{state.state}  {stop}"),
-        ("stops", f"{state.done_count} done, {state.skipped_count} skipped{of}"),
+        ("stops", f"{state.done_count} done{outside}, {state.skipped_count} skipped{of}"),
         ("place", f"{pose.pose.x:.2f}, {pose.pose.y:.2f} m at {pose.speed:.2f} m/s" if pose else "-"),
         ("battery", f"{state.battery:.0%}"),
         ("time", f"{clock(elapsed)} run, {'-' if left is None else clock(left)} left as planned"),
         ("link", "no word for " + f"{silent_s:.0f} s, asking" if silent_s else "alive"),
     ]
-    told = [event_line(event) for event in events]
+    stops = {} if mission is None else {stop.id: stop for stop in mission.stops}
+    told = [event_line(event, stops) for event in events]
     if state.state == "HELD":
         told = [*told[1 - LAST_EVENTS :], HINT]
     return [f"  {name:8} {value}" for name, value in rows] + told + [""] * (LAST_EVENTS - len(told))
@@ -268,8 +280,8 @@ def missing_line(gap: PosesMissing) -> str:
     return f"{gap.mission_time_s:8.1f} s  {gap.words}"
 
 
-def event_line(event: AnyEvent) -> str:
-    """An event as one line a person reads."""
+def event_line(event: AnyEvent, stops: Mapping[str, Stop]) -> str:
+    """An event as one line a person reads, beside the stops of its mission as far as they are known."""
     name = type(event).__name__
     about = getattr(event, "stop", None) or ""
     detail = getattr(event, "reason", "") or getattr(event, "commander", "")
@@ -283,4 +295,5 @@ def event_line(event: AnyEvent) -> str:
         detail = f"{event.deviation_m * 1000:.0f} mm beside"
     if isinstance(event, Scanned):
         detail = f"{event.file}, {event.points / 1e6:.1f} million points"
+    detail = "; ".join(word for word in (scanned_beside(event, stops.get(about)), detail) if word)
     return f"{event.mission_time_s:8.1f} s  {name:15} {about:6} {detail}".rstrip()

@@ -29,6 +29,7 @@ from mission.events import (
 from mission.run_log import RunLog
 from mission.schedule import schedule
 from mission.sight import Sight
+from mission.tolerance import deviation
 
 VISITS = (Arrived, Settled, Scanned, Unconfirmed, Skipped, Failed)
 """Events at a stop."""
@@ -97,7 +98,7 @@ class _Planned:
 def _stop(stop: str, plans: list[_Planned], events: Sequence[AnyEvent]) -> StopComparison:
     mine = [event for event in events if isinstance(event, VISITS) and event.stop == stop]
     arrivals = [event for event in mine if isinstance(event, Arrived)]
-    scans = [event for event in mine if isinstance(event, Scanned)]
+    ends = [event for event in mine if isinstance(event, Scanned | Unconfirmed)]
     plan = _reached_by(stop, plans, mine[-1].revision if mine else None)
     told = StopComparison(
         stop=stop,
@@ -108,7 +109,7 @@ def _stop(stop: str, plans: list[_Planned], events: Sequence[AnyEvent]) -> StopC
         outcome=_outcome(mine) if mine or stop in plans[-1].stops else "withdrawn",
         reason=_reason(mine),
     )
-    where = (scans or arrivals)[-1].pose if scans or arrivals else None
+    where = next((event.pose for event in reversed([*arrivals, *ends]) if event.pose is not None), None)
     return told if plan is None or where is None else _placed(told, where, plan.stops[stop])
 
 
@@ -124,7 +125,7 @@ def _placed(told: StopComparison, pose: Pose, stop: Stop) -> StopComparison:
     x, y, ahead = pose.x - stop.x, pose.y - stop.y, arriving(stop)
     return replace(
         told,
-        deviation_m=math.hypot(x, y),
+        deviation_m=deviation(pose, stop),
         along_m=x * math.cos(ahead) + y * math.sin(ahead),
         across_m=y * math.cos(ahead) - x * math.sin(ahead),
         heading_rad=math.remainder(pose.heading - stop.heading, math.tau),

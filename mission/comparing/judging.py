@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from mission.acquired import Acquired, Certainty
-from mission.comparison import Comparison, StopComparison
+from mission.comparison import Comparison
 from mission.events import Aborted
 from mission.figures import percent
 
@@ -46,7 +46,7 @@ def judge(comparison: Comparison) -> Judgement:
 
 def _answer(comparison: Comparison) -> Certainty:
     acquired = comparison.acquired
-    if _outside(comparison):
+    if comparison.outside:
         return "no"
     if acquired is not None:
         return acquired.answer
@@ -54,11 +54,6 @@ def _answer(comparison: Comparison) -> Certainty:
         return "no"
     unsure = any(item.outcome == "unconfirmed" for item in comparison.asked)
     return "unknown" if unsure else "yes"
-
-
-def _outside(comparison: Comparison) -> list[StopComparison]:
-    """Stops that were scanned from elsewhere than the plan reckons with."""
-    return [item for item in comparison.stops if item.outcome == "scanned" and item.outside_tolerance]
 
 
 def _sentences(comparison: Comparison) -> Iterator[str]:
@@ -70,9 +65,8 @@ def _sentences(comparison: Comparison) -> Iterator[str]:
             "what they saw is not known without the plan's recording."
         )
     yield from _outcomes(comparison)
-    for item in _outside(comparison):
-        away, limit = 1000 * (item.deviation_m or 0.0), 1000 * (item.tolerance_m or 0.0)
-        yield f"{item.stop} was scanned {away:.0f} mm beside its place ({limit:.0f} mm are tolerated)."
+    for item in comparison.outside:
+        yield f"{item.stop} was {item.seen_beside}."
     if not comparison.log.ended:
         yield "The run has not ended."
     for event in comparison.log.events:

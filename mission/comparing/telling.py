@@ -43,7 +43,7 @@ def stop_cells(item: StopComparison) -> tuple[str, ...]:
         _number(item.heading_rad, 180 / math.pi, sign="+"),
         *(_number(item.settle_s), str(item.tries)),
         _number(item.lost, 100),
-        item.reason,
+        "; ".join(why for why in (item.seen_beside, item.reason) if why),
     )
 
 
@@ -142,7 +142,7 @@ def _stop_json(item: StopComparison) -> dict[str, Any]:
         *("stop", "outcome", "reason", "planned_s", "arrived_s", "late_s", "deviation_m", "along_m"),
         *("across_m", "heading_rad", "tolerance_m", "settle_s", "tries", "lost"),
     )
-    return {key: getattr(item, key) for key in keys}
+    return {**{key: getattr(item, key) for key in keys}, "outside_tolerance": bool(item.seen_beside)}
 
 
 def _acquired_json(acquired: Acquired) -> dict[str, Any]:

@@ -19,9 +19,10 @@ from mission.geodesy import heading_of
 from mission.mavlink.items import ItemList
 from mission.mavlink.read_back import point_at
 from mission.run.scans import ScanFailed, ScanResult, missing_in
+from mission.tolerance import deviation, is_outside
 
 NEAR_M = 0.5
-"""A failure that is told from farther away is of another stop."""
+"""What is told from farther away is of another stop."""
 STEPS_M = 0.02
 """Two steps of 1e-7 degrees, in which the camera tells where it was."""
 _NUMBER = re.compile(r"[1-9][0-9]{0,14}")
@@ -55,8 +56,15 @@ class Capture:
         """Whether it is of this stop; one that does not say where it is from may be."""
         if self.pose is None:
             return True
-        away = math.dist((self.pose.x, self.pose.y), (stop.x, stop.y))
-        return away <= (NEAR_M if isinstance(self.result, ScanFailed) else stop.tolerance_m + STEPS_M)
+        within_m = NEAR_M if isinstance(self.result, ScanFailed) else stop.tolerance_m + STEPS_M
+        return not is_outside(deviation(self.pose, stop), within_m)
+
+    def beside(self, at: int, stops: Sequence[Stop]) -> bool:
+        """Whether it was made near this stop, and no nearer to the one before or after."""
+        if self.pose is None:
+            return False
+        own, around = deviation(self.pose, stops[at]), stops[max(0, at - 1) : at + 2]
+        return own <= NEAR_M and all(own <= deviation(self.pose, stop) for stop in around)
 
 
 def capture_of(message: CaptureMessage, sent: ItemList | None) -> Capture:

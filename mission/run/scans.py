@@ -8,6 +8,7 @@ import re
 import msgspec
 
 from mission.document import ScannerSpec
+from mission.events import Pose
 
 HEADING_RAD = math.radians(5.0)
 """How far a stop's heading may be missed by a scanner that does not see all round."""
@@ -22,6 +23,8 @@ class ScanResult(msgspec.Struct, frozen=True, kw_only=True):
     size: int
     sha256: str
     points: int
+    pose: Pose | None = None
+    """Where the robot stood when the scan ended, if whoever tells of it knows."""
 
 
 class ScanFailed(msgspec.Struct, frozen=True, kw_only=True):

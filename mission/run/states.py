@@ -6,7 +6,6 @@ the events that tell of it. The controller stores both before anything else happ
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -35,6 +34,7 @@ from mission.events import (
     StopState,
 )
 from mission.run.scans import ScanFailed, ScanResult, missing_in
+from mission.tolerance import deviation, is_outside
 
 After = Literal["FINISHED", "ABORTED", "PAUSED"]
 DetailedState = State | Literal["PAUSED homing", "HELD homing"]
@@ -62,6 +62,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     """The scan that waits to be verified."""
     done: tuple[str, ...] = ()
     skipped: tuple[str, ...] = ()
+    outside: tuple[str, ...] = ()
+    """Those that are done and were scanned farther from their places than is tolerated."""
     reason: str = ""
     """Why it is paused, held or homing."""
     homing: bool = False
@@ -174,7 +176,7 @@ def reached(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Chang
     if run.leg < run.at:
         return Change(changed(run, leg=run.leg + 1))
     stop = mission.stops[run.at]
-    if deviation_m > stop.tolerance_m:
+    if is_outside(deviation_m, stop.tolerance_m):
         if run.approaches < REAPPROACHES:
             return Change(
                 changed(run, leg=run.at + 1, stop_state="NAVIGATING", approaches=run.approaches + 1)
@@ -189,14 +191,9 @@ def reached(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Chang
     return Change(changed(run, leg=run.at + 1, stop_state="SETTLING"), (arrived,))
 
 
-def deviation(pose: Pose, stop: Stop) -> float:
-    """Metres from the stop."""
-    return math.hypot(pose.x - stop.x, pose.y - stop.y)
-
-
 def settled(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Change:
     """The robot stands still; if not where it should, it goes there again."""
-    if deviation_m > mission.stops[run.at].tolerance_m:
+    if is_outside(deviation_m, mission.stops[run.at].tolerance_m):
         return reached(run, mission, pose, deviation_m)
     telling = partial(Settled, stop=mission.stops[run.at].id, pose=pose)
     return Change(changed(run, stop_state="SCANNING", scans=run.scans + 1), (telling,))
@@ -209,10 +206,14 @@ def scan_ended(run: Run, mission: Mission, result: ScanResult | ScanFailed) -> C
 
 
 def verified(run: Run, mission: Mission, pose: Pose) -> Change:
-    """Whether the scanner's result is one; then the stop is done."""
+    """Whether the scanner's result is one; then the stop is done.
+
+    The robot stands at the pose by now, and stood there while it scanned unless the result says otherwise.
+    """
     stop, scan = mission.stops[run.at], run.scan
     if scan is None:
         return Change(changed(run, stop_state="WAITING"))
+    pose = scan.pose or pose
     missing = missing_in(scan)
     if missing:
         told = f"{scan.file} ({scan.size} bytes, {scan.points} points)"
@@ -222,8 +223,16 @@ def verified(run: Run, mission: Mission, pose: Pose) -> Change:
         Scanned, stop=stop.id, pose=pose,
         file=scan.file, size=scan.size, sha256=scan.sha256, points=scan.points,
     )  # fmt: skip
-    done = next_stop(changed(run, done=(*run.done, stop.id)), mission)
+    done = next_stop(with_done(run, stop, pose), mission)
     return Change(done.run, (telling, *done.events))
+
+
+def with_done(run: Run, stop: Stop, pose: Pose | None) -> Run:
+    """The stop is done; from elsewhere, if the robot stood there."""
+    outside = pose is not None and is_outside(deviation(pose, stop), stop.tolerance_m)
+    return changed(
+        run, done=(*run.done, stop.id), outside=(*run.outside, stop.id) if outside else run.outside
+    )
 
 
 def next_stop(run: Run, mission: Mission) -> Change:

@@ -201,7 +201,7 @@ STOP_HEADER = (
 
 
 def _stop_grid(comparison: Comparison) -> str:
-    missing = {item.stop for item in comparison.missing}
+    missing = {item.stop for item in (*comparison.missing, *comparison.outside)}
     rows = [
         row(_stop_cells(item), **({"class_": "missing"} if item.stop in missing else {}))
         for item in comparison.stops
@@ -210,9 +210,9 @@ def _stop_grid(comparison: Comparison) -> str:
 
 
 def _stop_cells(item: StopComparison) -> list[str]:
-    reason = f": {item.reason}" if item.reason else ""
+    told = ": ".join(word for word in (item.seen_beside or item.outcome, item.reason) if word)
     return [
-        *(shown(item.stop), shown(item.outcome + reason), _clock(item.planned_s), _clock(item.arrived_s)),
+        *(shown(item.stop), shown(told), _clock(item.planned_s), _clock(item.arrived_s)),
         *(number(item.late_s, sign=True), number(item.along_m, 1000, sign=True)),
         *(number(item.across_m, 1000, sign=True), number(item.heading_rad, 180 / math.pi, sign=True)),
         *(number(item.settle_s), str(item.tries)),

@@ -6,11 +6,9 @@ from collections.abc import Iterator
 
 from mission.acquired import Certainty
 from mission.comparing.judging import Judgement, named
-from mission.comparison import StopComparison
+from mission.comparison import DONE, StopComparison
 from mission.figures import percent
 from recordings.replay.replayed import Replay
-
-VISITED = ("scanned", "unconfirmed")
 
 
 def judged(replay: Replay) -> Judgement:
@@ -33,13 +31,12 @@ class DriveJudgement(Judgement):
 
 def missing(replay: Replay) -> list[StopComparison]:
     """Stops at which the robot did not stand, or not long enough."""
-    return [item for item in replay.comparison.asked if item.outcome not in VISITED]
+    return [item for item in replay.comparison.asked if item.outcome not in DONE]
 
 
 def outside(replay: Replay) -> list[StopComparison]:
     """Stops at which it stood too far away, or, by a simulator's truth, in truth did."""
-    away = [item for item in replay.comparison.asked if item.outcome in VISITED and item.outside_tolerance]
-    return away
+    return [item for item in replay.comparison.asked if item.seen_beside]
 
 
 def _sentences(replay: Replay) -> Iterator[str]:

@@ -11,7 +11,7 @@ import numpy as np
 import rerun as rr
 
 from mission.comparing.late_beside import LateBeside
-from mission.document import Mission
+from mission.document import Mission, Stop
 from mission.events import (
     Aborted,
     AnyEvent,
@@ -33,6 +33,7 @@ from mission.events import (
 from mission.geometry import FloatArray, IntArray
 from mission.run_log import Track
 from mission.sight import Sight
+from mission.tolerance import deviation, scanned_beside
 from recordings import entities, palette, strokes
 from recordings.canvas import Canvas, on_screen
 from recordings.pens import ORDER, Pen, style
@@ -139,11 +140,15 @@ class RunDrawing:
         told = {name: value for name, value in msgspec.to_builtins(event).items() if name in EVENT_FIELDS}
         told["body"] = msgspec.json.encode(event).decode()
         self._at(self.names.events, rr.DynamicArchetype("Event", components=told), event.robot_ns)
-        level = "WARN" if isinstance(event, WARNINGS) else "INFO"
-        line = rr.TextLog(f"{type(event).__name__} {_about(event)}".rstrip(), level=level)
+        stop = self.stops.get(getattr(event, "stop", ""))
+        beside = scanned_beside(event, stop)
+        level = "WARN" if isinstance(event, WARNINGS) or beside else "INFO"
+        line = rr.TextLog(f"{type(event).__name__} {_about(event, stop)}".rstrip(), level=level)
         self._at(self.names.log, line, event.robot_ns)
         if isinstance(event, Arrived):
-            self._plot_deviation(event)
+            self._plot_deviation(event.deviation_m, stop, event.robot_ns)
+        elif isinstance(event, Scanned) and stop is not None and beside:
+            self._plot_deviation(deviation(event.pose, stop), stop, event.robot_ns)
         self._mark(event)
         if self._growth is not None:
             self._growth.tell(event, canvas=self.canvas, names=self.names, draw=self._at_time(event.robot_ns))
@@ -228,27 +233,25 @@ class RunDrawing:
             [self.canvas.local(np.array([place.x, place.y]))],
             class_ids=meaning.number,
             radii=on_screen(3),
-            labels=[f"{type(event).__name__} {_about(event)}"],
+            labels=[f"{type(event).__name__} {_about(event, stop)}"],
             show_labels=False,
             draw_order=order,
         )
         self._at(self.names.flat(name), mark, event.robot_ns)
 
-    def _plot_deviation(self, event: Arrived) -> None:
+    def _plot_deviation(self, away_m: float, stop: Stop | None, robot_ns: int) -> None:
         """In millimetres, with what the mission tolerates at this stop, to both sides of the route too."""
-        deviation = rr.Scalars(event.deviation_m * 1000)
-        self._at(self.names.metric(entities.METRIC_DEVIATION), deviation, event.robot_ns)
-        stop = self.stops.get(event.stop)
+        self._at(self.names.metric(entities.METRIC_DEVIATION), rr.Scalars(away_m * 1000), robot_ns)
         if stop is not None:
             limit = stop.tolerance_m * 1000
             for metric, limits in _LIMITED.items():
                 values = rr.Scalars([sign * limit for sign in limits])
-                self._at(self.names.tolerance(metric), values, event.robot_ns)
+                self._at(self.names.tolerance(metric), values, robot_ns)
 
     def _report(self, event: AnyEvent) -> None:
         stop = getattr(event, "stop", None)
         if stop is not None:
-            self.records[stop] = self.records.get(stop, StopRecord()).after(event)
+            self.records[stop] = self.records.get(stop, StopRecord()).after(event, self.stops.get(stop))
         coverage = "" if self._growth is None else self._growth.in_words()
         text = run_report(self.revisions, self.run_id, self.records, event, coverage)
         document = rr.TextDocument(text, media_type="text/markdown")
@@ -295,9 +298,10 @@ _LIMITED = {entities.METRIC_DEVIATION: (1,), entities.METRIC_CROSS_TRACK: (-1, 1
 """Metrics with a tolerance, and on which sides."""
 
 
-def _about(event: AnyEvent) -> str:
-    """The event's particulars in a few words."""
+def _about(event: AnyEvent, stop: Stop | None) -> str:
+    """The event's particulars in a few words; `stop` is the one it is of."""
     words = [getattr(event, name, "") for name in ("stop", "reason", "commander", "kind")]
+    words.append(scanned_beside(event, stop))
     if isinstance(event, Arrived):
         words.append(f"{event.deviation_m * 1000:.0f} mm beside")
     if isinstance(event, Scanned):

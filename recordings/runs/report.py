@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from mission.document import Mission
+from mission.document import Mission, Stop
 from mission.events import (
     Aborted,
     AnyEvent,
@@ -17,6 +17,7 @@ from mission.events import (
     Skipped,
     Unconfirmed,
 )
+from mission.tolerance import deviation, scanned_beside
 
 
 @dataclass(frozen=True)
@@ -27,17 +28,22 @@ class StopRecord:
     deviation_m: float | None = None
     outcome: str = "on the way"
     """`arrived`, `scanned`, `unconfirmed`, `skipped` or `failed`, with the reason."""
+    scanned: bool = False
 
-    def after(self, event: AnyEvent) -> StopRecord:
-        """The record once the event has happened."""
+    def after(self, event: AnyEvent, stop: Stop | None) -> StopRecord:
+        """The record once the event has happened at the stop."""
         if isinstance(event, Arrived):
             return replace(
                 self, arrived_s=event.mission_time_s, deviation_m=event.deviation_m, outcome="arrived"
             )
         if isinstance(event, Scanned):
-            return replace(self, outcome="scanned")
+            away = self.deviation_m if stop is None else deviation(event.pose, stop)
+            outcome = f"scanned {scanned_beside(event, stop)}".rstrip()
+            return replace(self, deviation_m=away, outcome=outcome, scanned=True)
         if isinstance(event, Unconfirmed | Skipped | Failed):
-            return replace(self, outcome=f"{type(event).__name__.lower()}: {event.reason}")
+            told = (scanned_beside(event, stop), event.reason)
+            words = "; ".join(word for word in told if word)
+            return replace(self, outcome=f"{type(event).__name__.lower()}: {words}", scanned=False)
         return self
 
 
@@ -53,7 +59,7 @@ def run_report(
     `coverage` tells what was acquired, where that is known.
     """
     mission = revisions[-1]
-    scanned = sum(record.outcome == "scanned" for record in records.values())
+    scanned = sum(record.scanned for record in records.values())
     lines = [
         f"# Run {run_id}",
         "",

@@ -19,7 +19,7 @@ from mission.mavlink.enums import MessageId
 from mission.mavlink.following import steps as progress
 from mission.mavlink.following.listed_mission import ListedMission
 from mission.mavlink.following.observer import CLOCKS, Observer
-from mission.mavlink.following.steps import SOMEBODY, Observation, steps, tried_again
+from mission.mavlink.following.steps import SOMEBODY, TELLS_LATE, Observation, steps, tried_again
 from mission.mavlink.read_back import differences
 from mission.mavlink.telemetry import began_again
 from mission.run import states as runs
@@ -110,7 +110,7 @@ class AutoFollower:
 
     def _write_down(self, listed: ListedMission, observed: Observation, before: Run) -> None:
         """Store what has happened, with what it wants of the vehicle, and the scan that counts no more."""
-        capture = self._observer.capture(before, listed, self._book.used)
+        capture = self._observer.capture(before, listed, self._arrived(listed), self._book.used)
         with self._book.journal.transaction():
             self.run = self._book.move(
                 lambda run: () if run != before else self._happened(run, listed, observed),
@@ -127,8 +127,8 @@ class AutoFollower:
         """The vehicle as it is seen now; asked once more for a scan of a stop that it has left."""
         run, now_ns = self.run, self._book.clock.now_ns()
         observed = self._observer.observe(run, listed, self._arrived(listed), after=self._book.used)
-        scanning = run.stop_state == "SCANNING" and run.at < len(listed.stops)
-        if observed is None or not scanning or observed.place < listed.stops[run.at].after:
+        at_work = run.stop_state in TELLS_LATE and run.at < len(listed.stops)
+        if observed is None or not at_work or observed.place < listed.stops[run.at].after:
             return observed
         stop = (run.run_id or "", run.at, run.attempt)
         if self._left is None or self._left[0] != stop:

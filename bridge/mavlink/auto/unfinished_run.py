@@ -6,6 +6,7 @@ from bridge.mavlink.auto.logbook import Logbook
 from bridge.mavlink.line.peer import Peer
 from bridge.mavlink.line.url import Url
 from mission.errors import AnswerIsNo
+from mission.tolerance import told_outside
 
 
 def check_run_over(peer: Peer, url: Url, book: Logbook, what: str) -> None:
@@ -20,7 +21,8 @@ def check_run_over(peer: Peer, url: Url, book: Logbook, what: str) -> None:
     if run.over or listed is None:
         return
     mission = listed.mission
-    stops = f"{len(run.done)} of {len(mission.stops)} stops done"
+    outside = told_outside(run.outside, len(run.outside))
+    stops = f"{len(run.done)} of {len(mission.stops)} stops done{outside}"
     seen = ", unless stopgo watch sees that it has come to its end" if run.state == "RUNNING" else ""
     raise AnswerIsNo(
         f"{peer}: run {run.run_id} of {mission.name} ({mission.id[:12]}) is {run.state}, {stops}, and {what}"

@@ -76,7 +76,8 @@ class Camera:
         self.told.clear()
 
     def _message(self, done: ScanEnd, now_ns: int, boot_ms: int) -> Message:
-        pose = self._rover.at(now_ns)[0]
+        """With the place where the autopilot believes it is, as it knows no other."""
+        pose = self._rover.told(now_ns).pose
         return picture(
             done.index, boot_ms=boot_ms, now_ns=now_ns, place=self._rover.place((pose.x, pose.y)),
             alt_mm=self._rover.alt_mm, heading=pose.heading, file_url=done.file_url,

@@ -14,7 +14,7 @@ from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.captures import NEAR_M, Picture
 from mission.mavlink.following.listed_mission import ListedMission
 from mission.mavlink.following.observer import CLOCKS, NONE_YET, Observer
-from mission.mavlink.following.steps import SOMEBODY, Observation, steps, taken_over
+from mission.mavlink.following.steps import SOMEBODY, TELLS_LATE, Observation, steps, taken_over
 from mission.mavlink.telemetry import Message, began_again
 from mission.run import states as runs
 from mission.run.states import Change, Run, changed, told_of
@@ -74,7 +74,7 @@ class FollowedRun:
             return False
         self._go_back(observed)
         before = self._run
-        capture = self._observer.capture(before, self._listed, self._used)
+        capture = self._observer.capture(before, self._listed, self._arrived(), self._used)
         for change in self._happened(observed, now_ns):
             self._take(change, now_ns)
         waiting = self._run.at == before.at and self._run.stop_state in COUNTS_NOT_YET
@@ -87,8 +87,8 @@ class FollowedRun:
     def _observe(self, now_ns: int) -> Observation | None:
         run, stops = self._run, self._listed.stops
         observed = self._observer.observe(run, self._listed, self._arrived(), after=self._used)
-        scanning = run.stop_state == "SCANNING" and run.at < len(stops)
-        if observed is None or not scanning or observed.place < stops[run.at].after:
+        at_work = run.stop_state in TELLS_LATE and run.at < len(stops)
+        if observed is None or not at_work or observed.place < stops[run.at].after:
             return observed
         self._left_ns = now_ns if self._left_ns is None else self._left_ns
         beyond = run.at + 1 < len(stops) and observed.place > stops[run.at + 1].at

@@ -11,7 +11,7 @@ from mission.events import Arrived, Pose
 from mission.geodesy import heading_of
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.autopilots.kind import Autopilot
-from mission.mavlink.captures import Capture, Picture, capture_of
+from mission.mavlink.captures import STEPS_M, Capture, Picture, capture_of
 from mission.mavlink.enums import MissionState, ModeFlag
 from mission.mavlink.following.listed_mission import ListedMission
 from mission.mavlink.following.steps import Observation
@@ -56,13 +56,23 @@ class Fix:
     ns: int
 
 
+@dataclass(frozen=True)
+class HeardCapture:
+    """What a camera told, and what was known when it was first heard."""
+
+    capture: Capture
+    pose: Pose | None
+    """Where the robot stood by its own word, unless the camera says that it was elsewhere."""
+    ns: int
+
+
 class Observer:
     """Takes messages one after another; asked, it says what they come to."""
 
     def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
         self._newest: dict[str, Told] = {}
-        self._captures: deque[Capture] = deque(maxlen=CAPTURES_KEPT)
+        self._captures: deque[HeardCapture] = deque(maxlen=CAPTURES_KEPT)
         self._frame: tuple[ListedMission, VehicleOrigin, LocalFrame] | None = None
         self._work: tuple[int, bool] | None = None
         """Sequence number that is worked on, and whether all is done."""
@@ -174,14 +184,13 @@ class Observer:
             return None
         place, began_ns = self.place(listed), self._work_ns
         fix = self.fix if self.fix is not None and self.fix.ns > began_ns else None
-        capture = self.capture(run, listed, after)
-        stood = capture.pose if capture is not None else None
+        heard = self._heard(run, listed, arrived, after)
         return Observation(
             mode=self.mode, armed=self.armed, place=place,
             pose=None if fix is None else fix.pose,
             still=fix is not None and fix.still,
-            scan=None if capture is None else capture.result,
-            stood=arrived.pose if arrived is not None else stood,
+            scan=None if heard is None else heard.capture.result,
+            stood=_stood(heard, arrived),
         )  # fmt: skip
 
     def place(self, listed: ListedMission) -> int:
@@ -196,17 +205,27 @@ class Observer:
             return listed.end
         return listed.place(current.seq)
 
-    def capture(self, run: Run, listed: ListedMission, after: Picture) -> Capture | None:
+    def capture(
+        self, run: Run, listed: ListedMission, arrived: Arrived | None, after: Picture
+    ) -> Capture | None:
         """What was told last of a scan at the stop that is worked on."""
-        if run.at >= len(listed.mission.stops):
+        heard = self._heard(run, listed, arrived, after)
+        return None if heard is None else heard.capture
+
+    def _heard(
+        self, run: Run, listed: ListedMission, arrived: Arrived | None, after: Picture
+    ) -> HeardCapture | None:
+        """A scan from beside its stop may be of an earlier try, unless it was told after the arrival."""
+        stops = listed.mission.stops
+        if run.at >= len(stops):
             return None
-        stop = listed.mission.stops[run.at]
-        own = [
-            capture
-            for capture in self._captures
-            if capture.name[1] > after[1] and capture.name != after and capture.at(stop)
-        ]
-        return own[-1] if own else None
+        since_ns = 0 if arrived is None else arrived.robot_ns
+        for heard in reversed(self._captures):
+            capture = heard.capture
+            new = capture.name[1] > after[1] and capture.name != after
+            if new and (capture.at(stops[run.at]) or (heard.ns > since_ns and capture.beside(run.at, stops))):
+                return heard
+        return None
 
     def _take_current(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         work = (message.seq, message.mission_state == MissionState.COMPLETE)
@@ -243,8 +262,21 @@ class Observer:
 
     def _take_capture(self, message: Message, listed: ListedMission | None, now_ns: int) -> None:
         capture = capture_of(message, None if listed is None else listed.sent)
-        if all(capture.name != known.name for known in self._captures):
-            self._captures.append(capture)
+        if all(capture.name != known.capture.name for known in self._captures):
+            self._captures.append(HeardCapture(capture, self._seen_at(capture, listed, now_ns), now_ns))
+
+    def _seen_at(self, capture: Capture, listed: ListedMission | None, now_ns: int) -> Pose | None:
+        """Where the vehicle itself says that it stands, if that is where its camera tells of."""
+        pose = self.pose(now_ns)
+        there = self._waits(listed) if capture.pose is None else _agree(capture.pose, pose)
+        return pose if there else None
+
+    def _waits(self, listed: ListedMission | None) -> bool:
+        """Whether the vehicle is at a stop, and not on its way."""
+        if listed is None or "MISSION_CURRENT" not in self._newest:
+            return False
+        place = self.place(listed)
+        return any(items.at < place < items.after for items in listed.stops)
 
     def _local_frame(self, listed: ListedMission | None) -> LocalFrame | None:
         """The vehicle's local metres in the site; `None` before its origin is known, or if it is far away."""
@@ -258,6 +290,22 @@ class Observer:
             rule = autopilot_named(listed.sent.autopilot).rule
             self._frame = (listed, origin, local_frame(listed.sent.origin, origin, rule))
         return self._frame[2]
+
+
+def _stood(heard: HeardCapture | None, arrived: Arrived | None) -> Pose | None:
+    """Where the robot was scanned from; a camera tells that in steps of a centimetre, and after all else."""
+    before = None if arrived is None else arrived.pose
+    if heard is not None and heard.pose is not None:
+        return heard.pose
+    told = None if heard is None else heard.capture.pose
+    return before if told is None or _agree(told, before) else told
+
+
+def _agree(told: Pose | None, seen: Pose | None) -> bool:
+    """Whether a camera's place is a pose, rounded to its steps."""
+    if told is None or seen is None:
+        return False
+    return math.dist((told.x, told.y), (seen.x, seen.y)) <= STEPS_M
 
 
 UNKNOWN_TOTAL = 65_535

@@ -12,15 +12,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
+import msgspec
+
 from mission.document import Stop
 from mission.events import Pose, Settled, Unconfirmed
 from mission.mavlink.following.listed_mission import ListedMission, StopItems
 from mission.run import states as runs
 from mission.run.scans import ScanFailed, ScanResult, turned_away
-from mission.run.states import Change, Run, changed, deviation
+from mission.run.states import Change, Run, changed
+from mission.tolerance import deviation, is_outside
 
 SOMEBODY = "the vehicle's operator"
 """Who gives orders that were not given here."""
+TELLS_LATE = ("NAVIGATING", "SCANNING")
+"""Of a stop that was left in these, the scanner's word is still waited for."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,7 @@ class Observation:
     stood: Pose | None = None
     """Where the robot stood at that stop, as the scanner told, or as it was seen there before."""
     in_vain: bool = False
-    """No word of the scanner is to be expected any more."""
+    """No word of the scanner is to be expected any more, which would say where it stood too."""
 
     @property
     def drives(self) -> bool:
@@ -78,8 +83,13 @@ def _ends_scan(run: Run, listed: ListedMission, observed: Observation) -> Change
     if run.stop_state == "VERIFYING":
         return _verified(run, listed, observed)
     if run.stop_state == "SCANNING" and isinstance(observed.scan, ScanResult):
-        return runs.scan_ended(run, listed.mission, observed.scan)
+        return _ended(run, listed, observed, observed.scan)
     return None
+
+
+def _ended(run: Run, listed: ListedMission, observed: Observation, scan: ScanResult) -> Change:
+    """The scan is there; where from is known now, and no more once the vehicle has left."""
+    return runs.scan_ended(run, listed.mission, msgspec.structs.replace(scan, pose=observed.stood))
 
 
 def _begun(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
@@ -94,7 +104,7 @@ def _driven(run: Run, listed: ListedMission, observed: Observation, items: StopI
     pose = observed.stood if left else observed.pose
     if pose is None:
         reason = "nobody saw where the vehicle stood"
-        return _unconfirmed(run, listed, None, reason) if left else None
+        return _unconfirmed(run, listed, None, reason) if left and observed.in_vain else None
     stop, wrong = listed.mission.stops[run.at], misplaced(pose, run, listed)
     if not wrong:
         return runs.reached(changed(run, leg=run.at), listed.mission, pose, deviation(pose, stop))
@@ -124,7 +134,7 @@ def _scanned(run: Run, listed: ListedMission, observed: Observation, items: Stop
     if observed.place <= items.at:
         return Change(changed(run, stop_state="NAVIGATING"))
     if isinstance(observed.scan, ScanResult):
-        return runs.scan_ended(run, listed.mission, observed.scan)
+        return _ended(run, listed, observed, observed.scan)
     if isinstance(observed.scan, ScanFailed):
         left = observed.place >= items.after
         tried = _last_try(run, listed.mission.stops[run.at]) if left else run
@@ -151,9 +161,9 @@ def _verified(run: Run, listed: ListedMission, observed: Observation) -> Change 
 
 def _unconfirmed(run: Run, listed: ListedMission, pose: Pose | None, reason: str) -> Change:
     """The vehicle is through with the stop, and that is all that is known."""
-    stop = listed.mission.stops[run.at].id
-    behind = runs.next_stop(changed(run, leg=run.at + 1, done=(*run.done, stop)), listed.mission)
-    telling = partial(Unconfirmed, stop=stop, pose=pose, reason=reason)
+    stop = listed.mission.stops[run.at]
+    behind = runs.next_stop(runs.with_done(changed(run, leg=run.at + 1), stop, pose), listed.mission)
+    telling = partial(Unconfirmed, stop=stop.id, pose=pose, reason=reason)
     return Change(behind.run, (telling, *behind.events))
 
 
@@ -203,7 +213,7 @@ def held_by_vehicle(run: Run, items: int | None) -> Run:
 def misplaced(pose: Pose, run: Run, listed: ListedMission) -> str:
     """How the robot stands elsewhere than at its stop, or turned away; empty if it stands there."""
     stop, away = listed.mission.stops[run.at], deviation(pose, listed.mission.stops[run.at])
-    if away > stop.tolerance_m:
+    if is_outside(away, stop.tolerance_m):
         return (
             f"{away:.3f} m from the stop, tolerance is {stop.tolerance_m:g} m; the vehicle calls it reached"
         )

@@ -22,7 +22,7 @@ from tests.mission.mavlink.following.worlds import tour
 from tests.ports import free_port
 
 STOPGO = (sys.executable, "-m", "mission")
-KEYS = "robot boot_id state run_id mission_id revision stop done skipped battery"
+KEYS = "robot boot_id state run_id mission_id revision stop done skipped outside battery"
 
 
 class Vehicle:

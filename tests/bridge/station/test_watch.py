@@ -206,9 +206,9 @@ def test_what_was_missed_while_the_link_was_cut_is_told_once_and_in_order_and_ag
             time.sleep(0.01)
         board.cut = False
         watching.join(20)
-        past = list(past_reports(station, str(controller.run.run_id)))
+        past = list(past_reports(station, str(controller.run.run_id), station.mission))
         with pytest.raises(AnswerIsNo, match=f"no run x; it has {controller.run.run_id}"):
-            next(past_reports(station, "x"))
+            next(past_reports(station, "x", station.mission))
     heard += [told.get() for _ in range(told.qsize())]
     events = [report for report in heard if isinstance(report, Event)]
     assert [event.number for event in events] == list(range(events[0].number, journal.newest + 1))

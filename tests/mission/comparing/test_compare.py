@@ -161,6 +161,15 @@ def test_a_scan_from_outside_the_tolerance_is_none_of_the_plan() -> None:
     assert "S2 was scanned 200 mm beside its place (50 mm are tolerated)." in judge(away).text
 
 
+def test_a_stop_passed_outside_its_tolerance_was_not_acquired_whether_it_was_scanned_or_not() -> None:
+    passed = (Unconfirmed, 133.0, {"stop": "S2", "pose": at(3.2, 1.2), "reason": "no word"})
+    away = run(*visit("S1", 0, 1, 1), *visit("S2", 70, 3.2, 1, scan=False), passed, (Finished, 134.0, {}))
+    words = "passed 200 mm beside its place (50 mm are tolerated)"
+    assert judge(away).answer == "no" and f"S2 was {words}." in judge(away).text
+    assert f"{words}; no word" in comparison_text(away)
+    assert [item["outside_tolerance"] for item in comparison_json(away)["stops"]] == [False, True]
+
+
 def test_without_a_plan_all_stops_must_have_been_scanned() -> None:
     mission = square_tour()
     all_of_them = [*visit("S1", 0, 4, 0), *visit("S2", 70, 4, 3), (Finished, 133.0, {})]

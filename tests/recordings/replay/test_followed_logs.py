@@ -19,7 +19,9 @@ from mission.mavlink.items import Command
 from mission.mavlink.read_back import upload_of
 from mission.mavlink.translate import translate
 from recordings.logs import read_log
+from recordings.replay.judged import judged
 from recordings.replay.log_placing import Placing
+from recordings.replay.replay_text import as_text
 from recordings.replay.replayed import Replay
 from recordings.replay.replaying import replay
 from tests.mission.mavlink.following.worlds import told, tour
@@ -34,8 +36,9 @@ BEFORE_S, AFTER_S, STEP_S = 3.0, 60.0, 0.05
 """Before the order to go, from then on, and between two looks of the vehicle at its clock."""
 
 
-def mission() -> Mission:
-    return msgspec.structs.replace(tour(), georeference=ORIGIN)
+def mission(**details: Any) -> Mission:
+    """For a vehicle that drives as a real one, and so takes its time to stand still."""
+    return msgspec.structs.replace(tour(**{"settle_s": 3.0, **details}), georeference=ORIGIN)
 
 
 def logged(
@@ -51,6 +54,7 @@ def logged(
             ORIGIN,
             Pose(x=0.0, y=0.0, heading=0.0),
             VehicleFaults(tuple(map(read_vehicle_fault, faults))),
+            seed=1,
         ),
         clock=clock,
         wall=clock,
@@ -105,6 +109,21 @@ def test_a_log_of_auto_tells_its_scans_by_the_camera(tmp_path: Path) -> None:
     assert told(laid.run.events) == ["Started", *words, "Finished"]
     assert not laid.inferred
     assert {event.file[-4:] for event in laid.run.events if isinstance(event, Scanned)} == {".e57"}
+
+
+def test_stops_scanned_outside_their_tolerance_are_told_and_not_driven_as_planned(tmp_path: Path) -> None:
+    """The vehicle drives as a real one: beside its stops, which it calls reached."""
+    narrow, wide = mission(), mission(tolerance_m=0.4)
+    path = logged(tmp_path / "auto.tlog", narrow)
+    laid = replayed(path, narrow)
+    assert [item.outcome for item in laid.comparison.stops] == ["scanned"] * 3
+    assert [item.stop for item in laid.comparison.outside] == ["S1", "S2", "S3"]
+    assert judged(laid).exit_code == 1
+    for item in laid.comparison.stops:
+        assert 0.08 < (item.deviation_m or 0.0) < 0.4
+        away = f"{item.stop} was missed by {1000 * (item.deviation_m or 0.0):.0f} mm (50 mm are tolerated)."
+        assert away in judged(laid).text and away in as_text(laid)
+    assert judged(replayed(path, wide)).exit_code == 0
 
 
 def test_a_scan_that_failed_is_told_and_the_way_goes_on(tmp_path: Path) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from bridge.mavlink.auto.logbook import Logbook, logbook, remember
 from bridge.mavlink.auto.vehicle_orders import Consent
@@ -20,7 +22,7 @@ from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_
 from bridge.mavlink.simulated.vehicle_process import vehicle_on
 from bridge.mavlink.simulated.vehicle_store import Store
 from bridge.station.station import Station
-from mission.document import Mission, SiteOrigin
+from mission.document import Mission, SiteOrigin, sealed
 from mission.events import AnyEvent, Pose
 from mission.mavlink.autopilots import autopilot_named
 from mission.mavlink.items import ItemList
@@ -32,8 +34,16 @@ from tests.ports import free_port
 
 SPEED_UP = 5.0
 PATIENCE_S = 60.0
+TUNED = {"px4": {"NAV_ACC_RAD": 0.1}}
+"""As PX4 comes, half a metre from a stop is there."""
 KINDS = {"strict": "generic", "ardupilot": "ardupilot", "px4": "px4"}
 """The autopilot of each profile of the simulated vehicle."""
+
+
+def real_tour(**details: Any) -> Mission:
+    """The tour for a vehicle that drives as a real one: beside its stops, and late to stand still."""
+    made = tour(**{"tolerance_m": 0.3, "settle_s": 3.0, **details})
+    return sealed(msgspec.structs.replace(made, robot=msgspec.structs.replace(made.robot, speed=0.5)))
 
 
 @dataclass
@@ -42,12 +52,15 @@ class Site:
 
     folder: Path
     profile: str = "ardupilot"
-    mission: Mission = field(default_factory=tour)
+    mission: Mission = field(default_factory=lambda: real_tour())  # noqa: PLW0108
     faults: Sequence[str] = ()
     trigger: Any = "auto"
     origin: SiteOrigin | None = None
     at: Pose | None = field(default_factory=lambda: Pose(x=0.0, y=0.0, heading=0.0))
     speed_up: float = SPEED_UP
+    seed: int | None = 1
+    """It drives as a real one, by chances of this seed; `None`: exactly."""
+    changed: Mapping[str, float] = field(default_factory=dict)
     key: bytes | None = None
 
     def __post_init__(self) -> None:
@@ -67,7 +80,10 @@ class Site:
     def up(self) -> Iterator[None]:
         """The vehicle is on."""
         made = VehicleFaults(tuple(read_vehicle_fault(text) for text in self.faults))
-        setting = Setting(PROFILES[self.profile], self.folder / "vehicle", self.origin, self.at, made)
+        setting = Setting(
+            PROFILES[self.profile], self.folder / "vehicle", self.origin, self.at, made, self.seed,
+            {**TUNED.get(self.profile, {}), **self.changed},
+        )  # fmt: skip
         listening = Url("udpin", self.url.host, self.url.number)
         with vehicle_on(listening, setting, speed_up=self.speed_up, signing_key=self.key):
             yield

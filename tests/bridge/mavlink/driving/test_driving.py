@@ -10,13 +10,16 @@ from typing import Any
 import msgspec
 import pytest
 
+from bridge.commands.watch_commands import tell_compared
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.line.wire import read_signing_key
 from bridge.mavlink.simulated.chassis import Chassis
 from bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
-from mission.document import sealed
+from bridge.station.watch import Lines, watch_showing
+from mission.document import Scan, sealed
 from mission.errors import AnswerIsNo, InputError, RobotUnreachable
 from mission.events import Arrived, Finished, Held, PoseReport, Scanned
+from mission.heard_run import HeardRun
 from mission.mavlink.telemetry import STILL_M_S
 from tests.bridge.mavlink.driving.world import (
     SITE,
@@ -367,3 +370,22 @@ def _strict(tmp_path: Path) -> None:
             pass
     finally:
         made.off()
+
+
+def test_a_scan_during_which_the_estimate_jumps_is_told_as_made_beside_its_stop(tmp_path: Path) -> None:
+    """The vehicle stood still, and where that was nobody knows: done, and never without saying so."""
+    scan = Scan(profile="default", duration_s=40.0, timeout_s=60.0)
+    mission, said, heard = site_mission(stops=1, scan=scan), [], HeardRun()
+    faults = VehicleFaults((VehicleFault("jump", 35, 0.12),))
+    with (
+        rover(tmp_path, "ardupilot", faults=faults) as (vehicle, _),
+        gateway(tmp_path, vehicle.url) as station,
+    ):
+        station.push(mission)
+        station.command("start")
+        state = watch_showing(station, heard, Lines(said.append))
+        assert station.status().outside == ("s1",)
+    (line,) = [line for line in said if "Scanned         s1" in line]
+    away = float(re.findall(r"(\d+) mm beside its place \(50 mm are tolerated\)", line)[0])
+    assert 85 <= away <= 155 and state.outside == ("s1",)
+    assert tell_compared(heard, state, json_=True) == 1

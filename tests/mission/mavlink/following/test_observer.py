@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from mission.events import Arrived, Pose
 from mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic
 from mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from mission.mavlink.following.listed_mission import ListedMission, listed_mission
@@ -163,3 +164,53 @@ def test_a_number_of_items_that_is_not_told_is_not_taken_for_one() -> None:
     assert told == [None, None, 7]
     telling.current(0, dialect.MISSION_STATE_NO_MISSION, total=65_535)
     assert telling.observer.items == 0
+
+
+def standing(telling: Telling, x: float, y: float) -> None:
+    telling.tell(dialect.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0))
+    telling.tell(dialect.MAVLink_local_position_ned_message(2, y, x, 0, 0, 0, 0))
+
+
+def stood(telling: Telling, arrived: Arrived | None = None) -> Pose:
+    observed = telling.observer.observe(AT_S1, telling.listed, arrived)
+    assert observed is not None and observed.stood is not None
+    return observed.stood
+
+
+def arrival(x: float) -> Arrived:
+    return Arrived(
+        number=1, robot="", boot_id="", run_id="r", mission_id="m", revision=1, robot_ns=0,
+        mission_time_s=0.0, stop="S1", pose=Pose(x=x, y=0.0, heading=0.0), deviation_m=abs(1.0 - x),
+    )  # fmt: skip
+
+
+def test_a_scan_made_beside_its_stop_is_that_stops_with_where_it_was_made() -> None:
+    """The vehicle arrived, and was moved, or its estimate jumped, before the scan was over."""
+    telling = Telling()
+    telling.origin()
+    telling.current(4)
+    standing(telling, 1.12, 0.0)
+    telling.captured(1, at=(1.12, 0.0))
+    assert isinstance(telling.scan(), ScanResult)
+    assert stood(telling, arrival(1.01)).x == pytest.approx(1.12, abs=0.001)
+
+
+def test_where_a_scan_was_made_is_told_as_exactly_as_it_is_known() -> None:
+    """The camera tells it in steps of a centimetre; what it rounds, nobody is said to have moved."""
+    telling = Telling()
+    telling.origin()
+    telling.current(4)
+    telling.captured(1, at=(1.018, 0.0))
+    assert stood(telling, arrival(1.01)).x == 1.01
+    assert stood(telling).x == pytest.approx(1.018, abs=0.012)
+    telling.captured(2, at=(1.12, 0.0))
+    assert stood(telling, arrival(1.01)).x == pytest.approx(1.12, abs=0.012)
+
+
+def test_a_scan_between_two_stops_is_of_the_nearer_one() -> None:
+    telling = Telling()
+    telling.current(4)
+    telling.captured(1, at=(1.55, 0.0))
+    assert telling.scan() is None
+    telling.captured(2, at=(1.45, 0.0))
+    assert isinstance(telling.scan(), ScanResult)

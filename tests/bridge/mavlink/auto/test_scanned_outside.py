@@ -1,0 +1,157 @@
+"""A vehicle that is beside a stop while it scans there: told as it is, at once, at the end and ever after."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from bridge.commands.order_commands import state_line
+from bridge.commands.watch_commands import tell_compared
+from bridge.mavlink.auto.unfinished_run import check_run_over
+from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.peer import reached as found_peer
+from bridge.mavlink.simulated.estimator import Estimator
+from bridge.station.watch import Lines, watch_showing
+from mission.document import Scan
+from mission.errors import AnswerIsNo
+from mission.events import Failed, Scanned, Unconfirmed
+from mission.heard_run import HeardRun
+from mission.tolerance import deviation
+from recordings.field import FieldRecording
+from recordings.page import report_html
+from recordings.page.from_recordings import subject_of
+from recordings.review import review
+from recordings.run_index import index_of, index_text
+from tests.bridge.mavlink.auto.site import PATIENCE_S, Site, real_tour, until, watched
+from tests.mission.mavlink.following.worlds import told
+
+pytestmark = pytest.mark.usefixtures("own_time")
+
+SCAN = Scan(profile="default", duration_s=30.0, timeout_s=60.0)
+JUMP = "jump@5=0.25"
+"""In the midst of the first stop's scan."""
+NARROW_M, WIDE_M = 0.05, 0.3
+
+
+@pytest.fixture(autouse=True)
+def away(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An estimate jumps away from the first stop, by no chance."""
+
+    def jump(estimator: Estimator, metres: float) -> None:
+        off = estimator.now.pose.x - 1.0, estimator.now.pose.y
+        for axis in (0, 1):
+            estimator._jumped[axis] += metres * off[axis] / math.hypot(*off)
+
+    monkeypatch.setattr(Estimator, "jump", jump)
+
+
+def site_that_jumps(folder: Path) -> Site:
+    mission = real_tour(tolerance_m=WIDE_M, scan=SCAN)
+    return Site(folder, "ardupilot", mission=mission, faults=[JUMP])
+
+
+def test_a_scan_during_which_the_estimate_jumps_is_told_with_its_deviation_everywhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    site, said = site_that_jumps(tmp_path), []
+    (tmp_path / "records").mkdir()
+    path = tmp_path / "records" / "field.rrd"
+    with site.up(), FieldRecording(path, None) as record, site.reached() as station:
+        station.command("start")
+        heard = HeardRun(record)
+        state = watch_showing(station, heard, Lines(said.append))
+        again = watch_showing(station, HeardRun(), Lines(said.append), run_id=state.run_id)
+    first = site.mission.stops[0]
+    scan = next(event for event in site.events if isinstance(event, Scanned) and event.stop == "S1")
+    away = deviation(scan.pose, first)
+    assert 0.3 < away < 0.5
+    words = f"{1000 * away:.0f} mm beside its place (300 mm are tolerated)"
+    assert len([line for line in said if "Scanned         S1" in line and words in line]) == 2
+    assert state.outside == again.outside and "S1" in state.outside
+    assert "scanned outside tolerance: S1" in state_line(state)
+    assert tell_compared(heard, state, json_=False) == 1
+    assert f"S1 was scanned {words}" in capsys.readouterr().out
+    found = review([path])
+    assert found.exit_code == 1
+    assert f"S1 was scanned {words}" in found.recordings[0].as_text()
+    assert found.recordings[0].as_json()["runs"][0]["stops"][0]["outside_tolerance"] is True
+    assert f"S1 was scanned {words}" in report_html(subject_of(found)).decode()
+    ((_, run),) = index_of(path.parent).runs()
+    assert (run.answer, run.deviation_m) == ("no", pytest.approx(away, abs=0.001))
+    assert f"{1000 * away:.1f}" in index_text(index_of(path.parent))
+
+
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+def test_a_stop_that_is_missed_and_left_out_is_not_done(
+    profile: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It drives as a real one, so all its stops are beside their places; it scans there all the same."""
+    mission = real_tour(tolerance_m=NARROW_M, on_failure="skip")
+    site, said, heard = Site(tmp_path, profile, mission=mission, seed=2), [], HeardRun()
+    with site.up(), site.reached() as station:
+        station.command("start")
+        state = watch_showing(station, heard, Lines(said.append))
+    failed = [event for event in site.events if isinstance(event, Failed)]
+    assert [event.stop for event in failed] == ["S1", "S2", "S3"]
+    away = [float(re.findall(r"([0-9.]+) m from the stop", event.reason)[0]) for event in failed]
+    assert min(away) > 0.05 and max(away) < 0.25
+    assert all("tolerance is 0.05 m" in event.reason for event in failed)
+    assert sum("m from the stop" in line for line in said) >= 3
+    assert (state.done, state.skipped) == ((), ("S1", "S2", "S3"))
+    assert tell_compared(heard, state, json_=False) == 1
+    assert "0 of 3 stops scanned" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+def test_within_a_tolerance_that_it_keeps_its_stops_are_done_with_their_deviation(
+    profile: str, tmp_path: Path
+) -> None:
+    site, said, heard = Site(tmp_path, profile, mission=real_tour(tolerance_m=WIDE_M), seed=2), [], HeardRun()
+    with site.up(), site.reached() as station:
+        station.command("start")
+        state = watch_showing(station, heard, Lines(said.append))
+    compared = heard.compared()
+    assert compared is not None and (state.done, state.outside) == (("S1", "S2", "S3"), ())
+    assert all(0.08 < (item.deviation_m or 0.0) < WIDE_M for item in compared.stops)
+    assert tell_compared(heard, state, json_=False) == 0
+
+
+def test_a_stop_that_nobody_saw_scanned_from_elsewhere_has_failed_and_is_not_only_unconfirmed(
+    tmp_path: Path,
+) -> None:
+    """Its camera tells where it was: whoever comes later can know it."""
+    site = Site(tmp_path, "ardupilot", mission=real_tour(tolerance_m=NARROW_M, on_failure="skip"))
+    with site.up():
+        assert site.order("start").outcome == "ok"
+        with found_peer(site.url, vehicle=1) as peer:
+            heard(peer, "CAMERA_IMAGE_CAPTURED")
+        with watched(site):
+            pass
+    assert not [event for event in site.events if isinstance(event, Unconfirmed)]
+    assert told(site.events)[1:3] == ["Failed S1", "Skipped S1"]
+
+
+def test_a_push_names_the_stops_of_the_run_in_its_way_that_were_scanned_from_elsewhere(
+    tmp_path: Path,
+) -> None:
+    site = site_that_jumps(tmp_path)
+    with site.up(), site.reached() as station:
+        station.command("start")
+        until(site, lambda events, run: run.outside == ("S1",))
+        station.command("pause")
+    with (
+        site.up(),
+        site.book() as book,
+        found_peer(site.url, vehicle=1) as peer,
+        pytest.raises(AnswerIsNo, match=r"1 of 3 stops done \(1 scanned outside tolerance: S1\)"),
+    ):
+        check_run_over(peer, site.url, book, "a push")
+
+
+def heard(peer: Peer, name: str) -> None:
+    """Wait for a message of the vehicle."""
+    with peer.waiting(name) as waiting:
+        assert waiting.get(PATIENCE_S) is not None

@@ -1,0 +1,92 @@
+"""A stop that was scanned from elsewhere is done, and whoever says so says that too."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+import pytest
+
+from bridge.commands.order_commands import state_line, status_json
+from bridge.commands.watch_commands import tell_compared
+from bridge.station.watch import EventObjects, Lines, event_line, table_lines, watch_showing
+from mission.events import Scanned
+from mission.heard_run import HeardRun
+from tests.bridge.world import Field, corridor
+
+BESIDE = "120 mm beside its place (50 mm are tolerated)"
+
+
+@pytest.fixture
+def field() -> Field:
+    """A robot that is pushed 120 mm aside while it scans s2."""
+    made = Field()
+    made.station().push(corridor())
+    made.order("start")
+    made.work_until(lambda run: (run.at, run.stop_state) == (1, "VERIFYING"))
+    here = made.base.pose()
+    made.base.stand_at(msgspec.structs.replace(here, y=here.y + 0.12))
+    made.work()
+    return made
+
+
+def test_the_robot_tells_it_in_its_state(field: Field) -> None:
+    state = field.report()
+    assert (state.done, state.outside, state.outside_count) == (("s1", "s2", "s3"), ("s2",), 1)
+    assert "3 done (1 scanned outside tolerance: s2);" in state_line(state)
+    assert status_json(state)["outside"] == ("s2",)
+    assert "3 done (1 scanned outside tolerance: s2)" in "\n".join(
+        table_lines(corridor(), state, None, field.journal.events(), 0.0)
+    )
+
+
+@pytest.mark.parametrize("run_id", [None, "past"])
+def test_watch_tells_it_at_once_and_at_the_end_and_by_its_exit_code(
+    field: Field, run_id: str | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said: list[str] = []
+    heard = HeardRun()
+    past = None if run_id is None else field.controller.run.run_id
+    state = watch_showing(field.station(), heard, Lines(said.append), run_id=past)
+    (line,) = [line for line in said if "Scanned         s2" in line]
+    assert BESIDE in line
+    assert not [line for line in said if BESIDE in line and "s2" not in line]
+    assert state.outside == ("s2",)
+    assert tell_compared(heard, state, json_=False) == 1
+    assert f"s2 was scanned {BESIDE}." in capsys.readouterr().out
+
+
+def test_a_program_that_watches_is_told(field: Field) -> None:
+    told: list[dict[str, Any]] = []
+    objects = EventObjects(told.append)
+    objects.mission(corridor())
+    for event in field.journal.events():
+        objects.show(event)
+    assert {item["stop"]: item["beside"] for item in told if "beside" in item} == {"s2": BESIDE}
+
+
+def test_every_stop_scanned_outside_is_named_however_many_a_state_lists() -> None:
+    field, most = Field(), 55
+    field.station().push(corridor(stops=most, closed=False))
+    field.order("start")
+    while field.controller.run.state == "RUNNING":
+        if field.controller.run.stop_state == "VERIFYING":
+            here = field.base.pose()
+            field.base.stand_at(msgspec.structs.replace(here, y=0.12))
+        field.controller.step()
+    assert (len(field.report().outside), field.report().outside_count) == (50, most)
+    assert field.station().status().outside == field.controller.run.done
+    assert "55 done (55 scanned outside tolerance: s50, s51, s52, s53, s54, s55, …);" in state_line(
+        field.report()
+    )
+
+
+def test_a_stop_scanned_within_its_tolerance_is_told_as_before() -> None:
+    field = Field()
+    field.station().push(corridor())
+    field.order("start")
+    field.work()
+    stops = {stop.id: stop for stop in corridor().stops}
+    scans = [event for event in field.journal.events() if isinstance(event, Scanned)]
+    assert len(scans) == 3 and not [event for event in scans if "beside" in event_line(event, stops)]
+    assert "3 done;" in state_line(field.report())
