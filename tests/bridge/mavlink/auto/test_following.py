@@ -13,8 +13,8 @@ from mission.document import sealed
 from mission.events import Arrived, Failed, Held, PoseReport, Scanned, StateReport, Unconfirmed
 from recordings.field import FieldRecording
 from recordings.review import review
-from tests.bridge.mavlink.auto.site import ALL, Site, until, watched
-from tests.mission.mavlink.following.worlds import told, tour
+from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
+from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
@@ -26,7 +26,8 @@ def test_a_run_is_told_from_start_to_finish(tmp_path: Path) -> None:
     assert told(site.events) == ALL
     assert site.run.state == "FINISHED" and site.run.done == ("S1", "S2", "S3")
     assert told([report for report in seen if not isinstance(report, StateReport | PoseReport)]) == ALL
-    assert all(event.deviation_m < 0.02 for event in site.events if isinstance(event, Arrived))
+    away = [event.deviation_m for event in site.events if isinstance(event, Arrived)]
+    assert min(away) > 0.05 and max(away) < 0.3
 
 
 @pytest.mark.parametrize("profile", ["ardupilot", "px4", "strict"])
@@ -56,14 +57,14 @@ def test_scans_of_a_vehicle_that_tells_nothing_are_not_made_up(tmp_path: Path) -
 
 
 def test_a_stop_that_is_missed_has_failed_however_often_it_is_called_reached(tmp_path: Path) -> None:
-    site = Site(tmp_path, "ardupilot", faults=["beside@7=0.3"])
+    site = Site(tmp_path, "ardupilot", faults=["beside@7=0.6"])
     with site.up(), watched(site):
         site.order("start")
         until(site, lambda events, run: run.state == "HELD")
         (failed,) = [event for event in site.events if isinstance(event, Failed)]
         assert failed.stop == "S2"
-        assert float(failed.reason.split()[0]) == pytest.approx(0.3, abs=0.012)
-        assert "tolerance is 0.05 m" in failed.reason
+        assert 0.5 < float(failed.reason.split()[0]) < 0.8
+        assert "tolerance is 0.3 m" in failed.reason
         assert "Arrived S2" not in told(site.events)
         assert isinstance(site.events[-1], Held)
         with site.reached() as station:
@@ -73,7 +74,7 @@ def test_a_stop_that_is_missed_has_failed_however_often_it_is_called_reached(tmp
 
 
 def test_a_stop_that_may_be_left_out_does_not_hold_the_run(tmp_path: Path) -> None:
-    site = Site(tmp_path, "ardupilot", faults=["beside@7=0.3"], mission=tour(on_failure="skip"))
+    site = Site(tmp_path, "ardupilot", faults=["beside@7=0.6"], mission=real_tour(on_failure="skip"))
     with site.up(), watched(site):
         site.order("start")
     assert site.run.done == ("S1", "S3") and site.run.skipped == ("S2",)
@@ -81,7 +82,7 @@ def test_a_stop_that_may_be_left_out_does_not_hold_the_run(tmp_path: Path) -> No
 
 
 def test_a_scan_that_fails_is_tried_again_as_often_as_the_stop_says(tmp_path: Path) -> None:
-    site = Site(tmp_path, "ardupilot", faults=["scanner@2"], mission=tour(retries=1))
+    site = Site(tmp_path, "ardupilot", faults=["scanner@2"], mission=real_tour(retries=1))
     with site.up(), watched(site):
         site.order("start")
     words = told(site.events)
@@ -103,7 +104,7 @@ def test_what_the_line_loses_is_recovered(tmp_path: Path) -> None:
 
 
 def test_a_stop_that_ends_the_run_leaves_the_vehicle_standing(tmp_path: Path) -> None:
-    site = Site(tmp_path, "px4", faults=["beside@6=0.3"], mission=tour(on_failure="abort"))
+    site = Site(tmp_path, "px4", faults=["beside@6=0.6"], mission=real_tour(on_failure="abort"))
     with site.up():
         with watched(site):
             site.order("start")
@@ -124,14 +125,14 @@ def test_a_last_stop_that_is_left_out_ends_the_run_where_the_vehicle_is(tmp_path
 
 
 def test_the_way_back_is_driven_at_the_end(tmp_path: Path) -> None:
-    there = tour()
+    there = real_tour()
     back = sealed(msgspec.structs.replace(there, return_=((1.0, 1.0), (0.0, 1.0), (0.0, 0.0))))
     site = Site(tmp_path, "ardupilot", mission=back)
     with site.up(), watched(site) as seen:
         site.order("start")
     assert told(site.events) == [*ALL[:-1], "Homing", "Finished"]
     last = [report for report in seen if isinstance(report, PoseReport)][-1].pose
-    assert (last.x, last.y) == pytest.approx((0.0, 0.0), abs=0.03)
+    assert (last.x, last.y) == pytest.approx((0.0, 0.0), abs=0.25)
 
 
 def test_a_pause_stops_a_vehicle_that_somebody_else_has_started(tmp_path: Path) -> None:

@@ -16,8 +16,8 @@ from bridge.station.follow import Silence
 from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
 from mission.events import Arrived, Held, Paused, Resumed, Started
 from mission.mavlink.translate import translate
-from tests.bridge.mavlink.auto.site import ALL, Site, until, watched
-from tests.mission.mavlink.following.worlds import told, tour
+from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
+from tests.mission.mavlink.following.worlds import told
 
 pytestmark = pytest.mark.usefixtures("own_time")
 
@@ -72,7 +72,7 @@ def test_a_station_that_ends_is_followed_by_another_without_gap_or_repeat(tmp_pa
 
 
 def test_a_stop_that_nobody_saw_is_not_said_to_be_scanned(tmp_path: Path) -> None:
-    site = Site(tmp_path, "ardupilot", mission=tour(), speed_up=20.0)
+    site = Site(tmp_path, "ardupilot", mission=real_tour(), speed_up=20.0)
     with site.up():
         site.order("start")
         with found_peer(site.url, vehicle=1) as peer, peer.waiting("MISSION_CURRENT") as waiting:
@@ -112,7 +112,7 @@ def test_a_mission_that_somebody_else_changes_holds_the_run(tmp_path: Path) -> N
     from bridge.mavlink.transfer.upload import upload
 
     site = Site(tmp_path, "ardupilot")
-    short = translate(tour(), "ardupilot", trigger="none")
+    short = translate(real_tour(), "ardupilot", trigger="none")
     with site.up():
         site.order("start")
         with site.reached():
@@ -165,7 +165,8 @@ def test_a_new_push_ends_the_run_that_it_replaces(tmp_path: Path) -> None:
 
 
 def test_a_stop_is_measured_where_the_vehicle_stands(tmp_path: Path) -> None:
-    site = Site(tmp_path, "px4", faults=["beside@6=0.03"])
+    """It drives exactly, so that it is known where that is."""
+    site = Site(tmp_path, "px4", faults=["beside@6=0.03"], seed=None)
     with site.up(), watched(site):
         site.order("start")
     (arrived,) = [event for event in site.events if isinstance(event, Arrived) and event.stop == "S2"]
@@ -212,7 +213,7 @@ def test_a_mission_of_as_many_items_is_seen_to_be_another_when_somebody_starts_i
     from bridge.mavlink.transfer.upload import upload
 
     site = Site(tmp_path, "ardupilot")
-    other = translate(tour(settle_s=1.5), "ardupilot")
+    other = translate(real_tour(settle_s=3.5), "ardupilot")
     assert len(other.placed) == len(site.sent.placed)
     with site.up(), site.reached() as station, found_peer(site.url, vehicle=1) as peer:
         station.command("start")
