@@ -17,8 +17,8 @@ from mission.document import Scan
 from mission.events import Finished, Scanned, Unconfirmed
 from mission.files.mission_json import write
 from recordings.carried.reading import read_recording
+from tests.bridge.mavlink.auto.site import real_tour
 from tests.called import stopgo
-from tests.mission.mavlink.following.worlds import tour
 from tests.ports import free_port
 
 STOPGO = (sys.executable, "-m", "mission")
@@ -33,10 +33,10 @@ class Vehicle:
         self.url = str(Url("udpout", "127.0.0.1", port))
         self.state = folder / "station"
         self.mission = folder / "mission.json"
-        write(tour(), self.mission)
+        write(real_tour(), self.mission)
         self.process = subprocess.Popen(
             [*STOPGO, "simulate", "vehicle", "--mavlink", f"udpin:127.0.0.1:{port}", "--profile", "ardupilot",
-             "--exact", "--origin", "51.5,7.5,100", "--at", "0,0,0", "--speed-up", "10"],
+             "--origin", "51.5,7.5,100", "--at", "0,0,0", "--speed-up", "10"],
             stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         assert self.process.stderr is not None
@@ -67,9 +67,9 @@ HOURS = Scan(profile="default", duration_s=6e4, timeout_s=7e4)
 
 
 def test_a_mission_is_pushed_started_and_watched_to_its_end(vehicle: Vehicle, tmp_path: Path) -> None:
-    first, second, third = tour().stops
+    first, second, third = real_tour().stops
     stops = (first, msgspec.structs.replace(second, scan=HOURS), third)
-    write(msgspec.structs.replace(tour(), stops=stops), vehicle.mission)
+    write(msgspec.structs.replace(real_tour(), stops=stops), vehicle.mission)
     pushed = vehicle.run("push", str(vehicle.mission))
     assert pushed.returncode == 0, pushed.stderr
     refused = vehicle.run("start", "--json")
@@ -106,7 +106,7 @@ def test_a_mission_is_pushed_started_and_watched_to_its_end(vehicle: Vehicle, tm
 
 
 def test_ctrl_c_in_watch_leaves_the_vehicle_alone(vehicle: Vehicle) -> None:
-    write(tour(scan=HOURS), vehicle.mission)
+    write(real_tour(scan=HOURS), vehicle.mission)
     assert vehicle.run("push", str(vehicle.mission)).returncode == 0
     assert vehicle.run("start", "--arm").returncode == 0
     watching = subprocess.Popen(vehicle.command("watch"), stdout=subprocess.PIPE, text=True)
