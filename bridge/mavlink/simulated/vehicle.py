@@ -56,8 +56,8 @@ class Setting:
     at: Pose | None = None
     """Where it stands, x to the east and y to the north of the origin; else where it last stood."""
     faults: VehicleFaults = NO_FAULTS
-    seed: int | None = None
-    """It drives as a real one, by chances of this seed, if it is known how its kind does; else exactly."""
+    seed: int | None = 1
+    """It drives as a real one, by chances of this seed, if it is known how its kind does; `None`: exactly."""
     changed: Mapping[str, float] = field(default_factory=dict)
     """Parameters that are not as by default."""
 

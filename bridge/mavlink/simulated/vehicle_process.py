@@ -45,7 +45,7 @@ class VehicleOptions:
     at: Pose | None = None
     """In the site's frame, whose +y bears what the origin says."""
     faults: tuple[str, ...] = field(default=())
-    seed: int | None = None
+    seed: int | None = 1
     """As in `Setting`."""
     parameters: tuple[str, ...] = field(default=())
     """NAME=VALUE each."""

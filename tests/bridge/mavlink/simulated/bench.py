@@ -48,7 +48,10 @@ def script(number: int, seconds: float) -> Item:
 
 
 class Bench:
-    """One vehicle and everything it has said."""
+    """One vehicle and everything it has said.
+
+    Without a seed it drives exactly: its places and times are then counted on paper.
+    """
 
     def __init__(
         self, profile: str = "strict", *, state: Path | None = None, origin: SiteOrigin | None = ORIGIN,
