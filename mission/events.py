@@ -180,9 +180,18 @@ def event_of(body: bytes) -> AnyEvent:
 
     Raises
     ------
-    msgspec.ValidationError
+    msgspec.DecodeError
         If it is not an event.
     """
+    try:
+        return _event(body)
+    except UnicodeDecodeError as error:
+        raise msgspec.DecodeError(str(error)) from None
+    except RecursionError:
+        raise msgspec.DecodeError("it is nested too deeply") from None
+
+
+def _event(body: bytes) -> AnyEvent:
     try:
         return _EVENTS.decode(body)
     except msgspec.ValidationError:

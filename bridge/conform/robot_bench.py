@@ -29,6 +29,7 @@ from bridge.link.protocol import (
     Ready,
     Rejected,
     Reply,
+    decode,
     encode,
 )
 from mission.document import Mission
@@ -359,7 +360,7 @@ def read_reply(raw: bytes) -> Any:
 def read(raw: bytes, kind: Any, what: str) -> Any:
     """What was told, read strictly; raises `Nonconforming` where it is not of this kind."""
     with _readable(raw, what):
-        return msgspec.json.decode(raw, type=kind)
+        return decode(raw, kind)
 
 
 def read_event(raw: bytes) -> AnyEvent:
@@ -372,7 +373,7 @@ def read_event(raw: bytes) -> AnyEvent:
 def _readable(raw: bytes, what: str) -> Iterator[None]:
     try:
         yield
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+    except msgspec.DecodeError as error:
         raise Nonconforming(f"{what} cannot be read ({error}): {short(raw)}") from None
 
 

@@ -14,7 +14,7 @@ from bridge.conform.fake_robot import FakeRobot, ForgedAnswers, Meddling, Withho
 from bridge.conform.requirements import Nonconforming, NotTried, must
 from bridge.conform.trial_mission import trial_mission
 from bridge.link.link import Answering, Request
-from bridge.link.protocol import CHUNK_BYTES, Commit, Manifest, count_of, encode
+from bridge.link.protocol import CHUNK_BYTES, Commit, Manifest, count_of, decode, encode
 from mission.document import Mission, Stop
 from mission.run.orders import Answer, Order, Verb
 
@@ -187,8 +187,8 @@ def _bytes_of_a_stop(mission: Mission) -> int:
 
 def _read(request: Request, kind: type[M], what: str) -> M:
     try:
-        return msgspec.json.decode(request.payload, type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        return decode(request.payload, kind)
+    except msgspec.DecodeError as error:
         raise Nonconforming(f"{what} cannot be read ({error})") from None
 
 

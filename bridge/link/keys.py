@@ -134,7 +134,7 @@ def _revoked_in(data: bytes, path: Path, authority: x509.Certificate) -> Revoked
         signed = msgspec.json.decode(data, type=SignedList)
         public.verify(signed.signature, REVOKED + bytes(signed.revoked))
         return msgspec.json.decode(signed.revoked, type=Revoked)
-    except (msgspec.DecodeError, UnicodeDecodeError):
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         raise InputError(f"{path}: not a list of revoked keys; copy it from the site's folder") from None
     except InvalidSignature:
         raise InputError(f"{path}: not signed by the authority of these keys; copy it again") from None

@@ -351,8 +351,19 @@ def encode(message: Any) -> bytes:
 
 
 def decode(payload: bytes, kind: type[M]) -> M:
-    """The message in `payload`; raises `msgspec.ValidationError` or `DecodeError` with the JSON path."""
-    return msgspec.json.decode(payload, type=kind)
+    """The message in `payload`.
+
+    Raises
+    ------
+    msgspec.DecodeError
+        Whatever is wrong with it; `ValidationError`, which is one, with the JSON path.
+    """
+    try:
+        return msgspec.json.decode(payload, type=kind)
+    except UnicodeDecodeError as error:
+        raise msgspec.DecodeError(str(error)) from None
+    except RecursionError:  # in what is passed over, too
+        raise msgspec.DecodeError("it is nested too deeply") from None
 
 
 _PLACE = re.compile(rf"(?P<root>(?:.+?/)?sx/{VERSION}/(?P<robot>[^/]+))/(?P<rest>[^\n]*)")

@@ -21,7 +21,7 @@ import msgspec
 
 from bridge.link.keys import Certificates, HeldKeys, Holder, Untrusted, now_utc
 from bridge.link.link import Answering, Hearing, Request
-from bridge.link.protocol import VERSION, encode, place_of, untrusted
+from bridge.link.protocol import VERSION, decode, encode, place_of, untrusted
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -307,8 +307,8 @@ def _read(seal: bytes) -> Seal:
     if not seal:
         raise Untrusted("it is not signed")
     try:
-        return msgspec.json.decode(seal, type=Seal)
-    except (msgspec.DecodeError, UnicodeDecodeError):
+        return decode(seal, Seal)
+    except msgspec.DecodeError:
         raise Untrusted("its signature cannot be read") from None
 
 

@@ -260,7 +260,7 @@ class Agent:
         try:
             order = decode(request.payload, kind)
             check_ordering(request, order.commander)
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        except msgspec.DecodeError as error:
             return encode(Malformed(message=f"{kind.__name__}: {error}"))
         except Untrusted as error:
             self._refusals.note(kind.__name__.lower(), order.commander, str(error))
@@ -274,7 +274,7 @@ class Agent:
         try:
             watching = decode(request.payload, Watching)
             check_ordering(request, watching.commander)
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        except msgspec.DecodeError as error:
             return encode(Malformed(message=f"Watching: {error}"))
         except Untrusted:
             return self._info(request)  # viewers watch as well

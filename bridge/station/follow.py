@@ -7,11 +7,12 @@ import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
 
 import msgspec
 
 from bridge.link.link import Link
-from bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage
+from bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, decode
 from bridge.station.record import AGAIN_S, Past, RecordHistory
 from bridge.station.robot_replies import PastEvents, read_events, read_reply
 from mission.events import (
@@ -240,9 +241,9 @@ def _put(heard: queue.SimpleQueue[LiveReport], payload: bytes, read: Callable[[b
         heard.put(read(payload))
 
 
-_HEALTH = msgspec.json.Decoder(Health).decode
-_POSE = msgspec.json.Decoder(PoseReport).decode
-_STATE = msgspec.json.Decoder(StateReport).decode
+_HEALTH = partial(decode, kind=Health)
+_POSE = partial(decode, kind=PoseReport)
+_STATE = partial(decode, kind=StateReport)
 
 
 def _late_poses(heard: queue.SimpleQueue[LiveReport], follower: RunFollower) -> Iterator[Followed]:

@@ -6,11 +6,9 @@ from typing import NamedTuple, TypeVar
 
 import msgspec
 
-from bridge.link.protocol import LogPage, Malformed, Rejected, Reply
+from bridge.link.protocol import LogPage, Malformed, Rejected, Reply, decode
 from mission.errors import AnswerIsNo, OutcomeUnknown
 from mission.events import AnyEvent
-
-UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 M = TypeVar("M")
 
@@ -33,8 +31,8 @@ def read_reply(reply: bytes, kind: type[M], *, robot: str, what: str) -> M:
         If it cannot be read.
     """
     try:
-        message: Reply = msgspec.json.decode(reply, type=Reply)
-    except UNREADABLE as error:
+        message: Reply = decode(reply, Reply)  # type: ignore[arg-type]
+    except msgspec.DecodeError as error:
         raise _unknown(robot, what, str(error)) from None
     if isinstance(message, Rejected):
         why = f"{message.reason}: {'; '.join(message.messages)}"
@@ -50,7 +48,7 @@ def read_events(reply: bytes, *, since: int, robot: str) -> PastEvents:
     page = read_reply(reply, LogPage, robot=robot, what="reading its log")
     try:
         events = page.events
-    except UNREADABLE as error:
+    except msgspec.DecodeError as error:
         raise _unknown(robot, "reading its log", str(error)) from None
     for event in events:
         if event.number <= since:

@@ -68,6 +68,7 @@ def test_an_answer_that_was_changed_or_meant_for_another_question_is_not_believe
         (lambda packet: (packet,) if packet.kind == "question" else (old,), "signature|another question"),
         (lambda packet: (replace(packet, seal=b""),), "not signed"),
         (lambda packet: (replace(packet, seal=b"\xff"),), "cannot be read"),
+        (lambda packet: (replace(packet, seal=b'{"later": ' + b"[" * 20_000),), "cannot be read"),
     ):
         field.router.meddle = meddle  # type: ignore[assignment]
         with pytest.raises(OutcomeUnknown, match=why):

@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from bridge.link.link import Request
-from bridge.link.protocol import CHUNK_BYTES, Accepted, Malformed, Manifest, Ready, Rejected, encode
+from bridge.link.protocol import CHUNK_BYTES, Accepted, Malformed, Manifest, Ready, Rejected, decode, encode
 from bridge.robot.mission_reading import read_mission
 from mission.document import Mission, canonical, sealed
 from mission.errors import AnswerIsNo, OutcomeUnknown
@@ -153,6 +153,15 @@ def test_nonsense_is_answered_as_malformed() -> None:
     field, mission = Field(), corridor()
     for step in ("begin", "commit", "chunk/x", "part/x", "nowhere"):
         assert isinstance(asked(field, mission, step, b"\xff{"), Malformed)
+
+
+@pytest.mark.parametrize("step", ["mission/x/begin", "mission/x/commit", "cmd/pause", "keep"])
+@pytest.mark.parametrize("odd", [b"[" * 20_000, b'"\xff\xfe"'])
+def test_what_is_odd_where_it_would_be_passed_over_is_malformed(step: str, odd: bytes) -> None:
+    field = Field()
+    station = field.station()
+    reply = station.link.ask(f"{field.keys.root}/{step}", b'{"later": ' + odd, timeout_s=1.0)
+    assert isinstance(decode(reply or b"", Malformed), Malformed)
 
 
 def test_a_cut_link_makes_the_outcome_unknown() -> None:

@@ -233,6 +233,8 @@ def test_a_forged_publication_is_left_out() -> None:
     first = next(reports)
     field.board.link().publisher(field.keys.state)(b"{}")
     field.board.link().publisher(field.keys.event)(b"\xff")
+    for key in (field.keys.state, field.keys.event, field.keys.pose, field.keys.health):
+        field.board.link().publisher(key)(b'{"later": ' + b"[" * 20_000)
     rest = [first, *reports]
     assert [report.state for report in rest if isinstance(report, StateReport)][-1] == "FINISHED"
 
