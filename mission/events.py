@@ -10,6 +10,8 @@ from typing import Any, Literal, get_args
 
 import msgspec
 
+from mission.decoding import one_decode_error
+
 State = Literal["IDLE", "READY", "RUNNING", "PAUSED", "HELD", "HOMING", "FINISHED", "ABORTED"]
 StopState = Literal[
     "WAITING",
@@ -183,22 +185,15 @@ def event_of(body: bytes) -> AnyEvent:
     msgspec.DecodeError
         If it is not an event.
     """
-    try:
-        return _event(body)
-    except UnicodeDecodeError as error:
-        raise msgspec.DecodeError(str(error)) from None
-    except RecursionError:
-        raise msgspec.DecodeError("it is nested too deeply") from None
-
-
-def _event(body: bytes) -> AnyEvent:
-    try:
-        return _EVENTS.decode(body)
-    except msgspec.ValidationError:
-        told = _ENVELOPE.decode(body)
-        if told.get("event") in KINDS:
-            raise
-        return msgspec.convert({**told, "event": "UnknownKind", "kind": told.get("event")}, UnknownKind)
+    with one_decode_error():
+        try:
+            return _EVENTS.decode(body)
+        except msgspec.ValidationError:
+            told = _ENVELOPE.decode(body)
+            if told.get("event") in KINDS:
+                raise
+            kind = told.get("event")
+            return msgspec.convert({**told, "event": "UnknownKind", "kind": kind}, UnknownKind)
 
 
 _EVENTS = msgspec.json.Decoder(AnyEvent)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from mission.decoding import one_decode_error
 from mission.errors import InputError
 from mission.figures import percent
 from mission.files.atomic import write_atomic
@@ -115,8 +116,9 @@ def index_of(folder: Path, *, say: Callable[[str], None] = lambda line: None) ->
 def _known(path: Path) -> dict[str, IndexedFile]:
     """What the index says; nothing if it is missing, damaged or of another version."""
     try:
-        index = msgspec.json.decode(path.read_bytes(), type=RunIndex)
-    except (OSError, msgspec.DecodeError, UnicodeDecodeError):
+        with one_decode_error():
+            index = msgspec.json.decode(path.read_bytes(), type=RunIndex)
+    except (OSError, msgspec.DecodeError):
         return {}
     return index.files if index.version == VERSION else {}
 

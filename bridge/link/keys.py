@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
 
+from mission.decoding import one_decode_error
 from mission.errors import InputError
 from mission.files.atomic import write_atomic
 
@@ -131,10 +132,11 @@ def _revoked_in(data: bytes, path: Path, authority: x509.Certificate) -> Revoked
     public = authority.public_key()
     assert isinstance(public, Ed25519PublicKey)
     try:
-        signed = msgspec.json.decode(data, type=SignedList)
-        public.verify(signed.signature, REVOKED + bytes(signed.revoked))
-        return msgspec.json.decode(signed.revoked, type=Revoked)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        with one_decode_error():
+            signed = msgspec.json.decode(data, type=SignedList)
+            public.verify(signed.signature, REVOKED + bytes(signed.revoked))
+            return msgspec.json.decode(signed.revoked, type=Revoked)
+    except msgspec.DecodeError:
         raise InputError(f"{path}: not a list of revoked keys; copy it from the site's folder") from None
     except InvalidSignature:
         raise InputError(f"{path}: not signed by the authority of these keys; copy it again") from None

@@ -12,6 +12,7 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
+from mission.decoding import one_decode_error
 from mission.document import Transform
 from mission.errors import InputError
 from mission.events import AnyEvent, Health, PoseReport, PosesMissing, StateReport, event_of
@@ -358,12 +359,8 @@ def decode(payload: bytes, kind: type[M]) -> M:
     msgspec.DecodeError
         Whatever is wrong with it; `ValidationError`, which is one, with the JSON path.
     """
-    try:
+    with one_decode_error():
         return msgspec.json.decode(payload, type=kind)
-    except UnicodeDecodeError as error:
-        raise msgspec.DecodeError(str(error)) from None
-    except RecursionError:  # in what is passed over, too
-        raise msgspec.DecodeError("it is nested too deeply") from None
 
 
 _PLACE = re.compile(rf"(?P<root>(?:.+?/)?sx/{VERSION}/(?P<robot>[^/]+))/(?P<rest>[^\n]*)")

@@ -13,6 +13,7 @@ from pathlib import Path
 import msgspec
 
 from bridge.link.protocol import KeyExpressions
+from mission.decoding import one_decode_error
 from mission.errors import InputError
 from mission.files.atomic import write_atomic
 from mission.files.file_name import file_name
@@ -40,8 +41,9 @@ def usual_roster(endpoint: str, site: str | None) -> Path:
 def remembered(path: Path) -> Sightings:
     """Whom the file tells of; nobody if there is none, or it cannot be read any more."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=dict[str, LastSeen])
-    except (OSError, msgspec.DecodeError, UnicodeDecodeError):
+        with one_decode_error():
+            return msgspec.json.decode(path.read_bytes(), type=dict[str, LastSeen])
+    except (OSError, msgspec.DecodeError):
         return {}
 
 

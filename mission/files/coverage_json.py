@@ -10,6 +10,7 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
+from mission.decoding import one_decode_error
 from mission.document import Mission
 from mission.errors import InputError
 from mission.figures import Figures, Share
@@ -81,10 +82,11 @@ def read_coverage(path: Path, mission: Mission) -> Coverage:
         When the file cannot be read, or tells the coverage of another mission.
     """
     try:
-        coverage = msgspec.json.decode(path.read_bytes().removeprefix(BOM_UTF8), type=Coverage)
+        with one_decode_error():
+            coverage = msgspec.json.decode(path.read_bytes().removeprefix(BOM_UTF8), type=Coverage)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give a coverage.json") from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+    except msgspec.DecodeError as error:
         raise InputError(f"{path}: not a coverage.json of this version ({error}); plan again") from None
     _check_mission(coverage.mission, mission, path)
     return coverage

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import msgspec
 import rerun as rr
 
+from mission.decoding import one_decode_error
 from mission.errors import InputError
 from mission.stop_reasons import StopReason
 from recordings import entities
@@ -32,6 +33,7 @@ def reasons_in(values: Values, name: str) -> tuple[StopReason, ...]:
     if not rows:
         return ()
     try:
-        return msgspec.json.decode(rows[-1]["document"][0], type=tuple[StopReason, ...])
+        with one_decode_error():
+            return msgspec.json.decode(rows[-1]["document"][0], type=tuple[StopReason, ...])
     except (KeyError, msgspec.DecodeError) as error:
         raise InputError(f"{name}: what its stops are for is damaged ({error}); plan again") from None

@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from mission.errors import InputError
-from mission.events import AnyEvent
+from mission.events import AnyEvent, event_of
 from mission.run_log import LogSource, RunLog, Track
 from recordings import entities
 from recordings.carried.values import Values
@@ -55,8 +55,7 @@ def _log(run_id: str, values: Values, source: LogSource) -> RunLog:
 
 
 def _events(values: Values, entity: str, name: str) -> list[AnyEvent]:
-    decoder = msgspec.json.Decoder(AnyEvent)
     try:
-        return [decoder.decode(row["body"][0]) for row in values.rows(entity) if "body" in row]
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        return [event_of(row["body"][0]) for row in values.rows(entity) if "body" in row]
+    except msgspec.DecodeError as error:
         raise InputError(f"{name}: an event in it cannot be read ({error})") from None

@@ -5,16 +5,17 @@ from __future__ import annotations
 import shutil
 import sqlite3
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import msgspec
 import numpy as np
 
+from mission.decoding import one_decode_error
 from mission.document import Mission
 from mission.errors import InputError
-from mission.events import AnyEvent
+from mission.events import AnyEvent, event_of
 from mission.geometry import frozen
 from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, poses_of
 from recordings.logs.files import digest_of
@@ -64,17 +65,14 @@ def _copied(path: Path) -> Iterator[sqlite3.Connection]:
 
 
 def _decoded(rows: Iterable[tuple[bytes]]) -> Iterator[AnyEvent]:
-    decoder = msgspec.json.Decoder(AnyEvent)
     for (body,) in rows:
-        try:
-            yield decoder.decode(body)
-        except (msgspec.DecodeError, msgspec.ValidationError):
-            continue
+        with suppress(msgspec.DecodeError):
+            yield event_of(body)
 
 
 def _documents(connection: sqlite3.Connection) -> Iterator[bytes]:
     """Each mission's JSON: in pieces by a number, or whole in journals of formats 1 and 2."""
-    pieces = "SELECT data FROM chunks WHERE document = ? ORDER BY number"
+    pieces = "SELECT COALESCE(CAST(data AS BLOB), x'') FROM chunks WHERE document = ? ORDER BY number"
     for (document,) in connection.execute("SELECT document FROM missions ORDER BY revision").fetchall():
         whole = isinstance(document, bytes)
         yield document if whole else b"".join(data for (data,) in connection.execute(pieces, (document,)))
@@ -82,10 +80,8 @@ def _documents(connection: sqlite3.Connection) -> Iterator[bytes]:
 
 def _missions(documents: Iterable[bytes]) -> Iterator[Mission]:
     for document in documents:
-        try:
+        with suppress(msgspec.DecodeError), one_decode_error():
             yield msgspec.json.decode(document, type=Mission)
-        except (msgspec.DecodeError, msgspec.ValidationError):
-            continue
 
 
 def poses_of_events(events: Iterable[AnyEvent]) -> Poses:

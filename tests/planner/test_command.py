@@ -432,6 +432,7 @@ def test_a_value_no_plan_can_be_made_with_is_2(
         ("[plan]\nstart = [1, 2]\n", ("start",)),
         ("[plan\n", ("TOML",)),
         ("[plan]\nd_sec = 1\nd_sec = 2\n", ("TOML",)),
+        ("[plan]\nd_sec = " + "[" * 20_000, ("TOML", "nested too deeply")),
     ],
 )
 def test_a_bad_plan_toml_is_2(

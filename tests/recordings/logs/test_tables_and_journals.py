@@ -100,8 +100,14 @@ def test_a_journals_missions_are_read_whole_and_in_pieces(tmp_path: Path, pieces
         connection.execute("INSERT INTO events VALUES (1, ?)", (msgspec.json.encode(started),))
         connection.execute("INSERT INTO missions VALUES (0, 0)")  # of this one only the name was kept
         connection.execute("INSERT INTO missions VALUES (1, ?)", (7 if pieces else data,))
+        for number, body in enumerate((5, None, "{}", b"\xff", b'{"later": ' + b"[" * 20_000), start=2):
+            connection.execute("INSERT INTO events VALUES (?, ?)", (number, body))
+            connection.execute("INSERT INTO missions VALUES (2, ?)", (100 + number,))
+            connection.execute("INSERT INTO chunks VALUES (?, 0, ?)", (100 + number, body))
         step = -(-len(data) // 3)
         for number in reversed(range(pieces)):
             piece = data[number * step : (number + 1) * step]
             connection.execute("INSERT INTO chunks VALUES (7, ?, ?)", (number, piece))
-    assert read_log(tmp_path / "journal.sqlite").missions == (mission,)
+    log = read_log(tmp_path / "journal.sqlite")
+    assert log.missions == (mission,)
+    assert log.events == (started,), "what is neither an event nor a mission is passed over"
