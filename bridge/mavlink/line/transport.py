@@ -285,7 +285,7 @@ class Serial:
             self._line.timeout = timeout_s
             data = self._line.read(1)
             data += self._line.read(self._line.in_waiting) if data else b""
-        except (serial.SerialException, OSError) as error:
+        except (serial.SerialException, OSError, TypeError) as error:
             self._lose(str(error))
             return []
         return [("serial", data)] if data else []
@@ -298,8 +298,9 @@ class Serial:
             return
         try:
             line.write(data)
-        except (serial.SerialException, OSError) as error:
-            self._broken = str(error)
+        except (serial.SerialException, OSError, TypeError) as error:  # TypeError: it is being closed
+            if line is self._line:
+                self._broken = str(error)
 
     def close(self) -> None:
         if self._line is not None:

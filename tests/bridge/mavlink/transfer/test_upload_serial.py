@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from bridge.mavlink.line import transport
 from bridge.mavlink.line.peer import reached
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.simulated.profiles import PROFILES
@@ -88,3 +89,16 @@ def test_a_pulled_plug_leaves_it_unknown(line: NullModem) -> None:
         pytest.raises(OutcomeUnknown, match=said),
     ):
         upload(peer, SENT, progress=pull)
+
+
+def test_what_is_written_while_a_lost_line_is_closed_is_lost_and_no_more(line: NullModem) -> None:
+    """A reader that meets a pulled plug closes the port; for a moment it has no descriptor and is open."""
+    end = transport.Serial(Url("serial", str(line.near), 57600))
+    try:
+        descriptor, end._line.fd = end._line.fd, None
+        end.write(b"heartbeat")
+        assert end.read(0.0) == []
+        assert "serial line is gone" in end.gone
+    finally:
+        os.close(descriptor)
+        end.close()
