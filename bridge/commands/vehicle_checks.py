@@ -113,7 +113,9 @@ def _origin(peer: Peer) -> Check:
         return Check(
             "origin", False, "not set, or not told", "set it after each boot (SET_GPS_GLOBAL_ORIGIN)"
         )
-    place = origin.place
+    place, unplaced = origin.place, peer.unplaced()
+    if unplaced:
+        return Check("origin", False, *unplaced.split("; "))
     return Check("origin", True, f"{place.lat:.7f}, {place.lon:.7f}; push compares it with the mission's")
 
 

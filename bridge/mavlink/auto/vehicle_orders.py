@@ -243,6 +243,9 @@ class VehicleOrders:
         unfit = why_no_rover(self._peer.heartbeat.type)
         if unfit:
             raise Denied(Refused("unsupported", unfit))
+        unplaced = self._peer.unplaced()
+        if unplaced:
+            raise Denied(Refused("no_position", unplaced))
         self._check_mission(listed)
         armed = self._observer.armed
         if not armed and not self._consent.arm:

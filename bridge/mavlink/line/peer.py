@@ -33,7 +33,7 @@ from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.enums import CommandResult, Component, Firmware, MessageId, ModeFlag, VehicleType
 from mission.mavlink.items import Command, MavFrame
 from mission.mavlink.local_frame import VehicleOrigin
-from mission.mavlink.telemetry import Message, began_again, origin_of
+from mission.mavlink.telemetry import Message, began_again, origin_of, place_of
 
 PATIENCE_S = 5.0
 """Silence after which a vehicle is given up."""
@@ -46,6 +46,11 @@ KNOCK_S = 0.3
 CLOCKS = (MessageId.SYSTEM_TIME, MessageId.ATTITUDE)
 UNSET_ANSWERS = 8
 """So often a vehicle takes the question and sends nothing before that means there is nothing to send."""
+
+UNPLACED = (
+    "the vehicle has an origin, and yet tells no place on earth (GLOBAL_POSITION_INT 0, 0): in AUTO it would"
+    " pass over its waypoints; start it again, and set its origin only once it tells LOCAL_POSITION_NED"
+)
 
 
 @dataclass(frozen=True)
@@ -249,6 +254,15 @@ class Peer:
         """What its metres count from (GPS_GLOBAL_ORIGIN); `None` if it is not set, or not told."""
         message = self.ask(MessageId.GPS_GLOBAL_ORIGIN, patience_s=patience_s)
         return None if message is None else origin_of(message)
+
+    def unplaced(self) -> str:
+        """Why it would not find a waypoint; empty if it would, or tells nothing of that.
+
+        ArduPilot that is given an origin before its filter runs tells it, and never uses it: measured, it
+        then told metres, armed, and in AUTO passed over waypoint after waypoint where it stood.
+        """
+        told = self.ask(MessageId.GLOBAL_POSITION_INT)
+        return UNPLACED if told is not None and place_of(told) is None else ""
 
     def set_origin(self, origin: VehicleOrigin, *, patience_s: float | None = None) -> VehicleOrigin | None:
         """Tell it what its metres count from, and the origin it then has: the old one if it had one."""

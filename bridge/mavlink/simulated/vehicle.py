@@ -226,6 +226,11 @@ class Vehicle:
         return True
 
     @property
+    def is_unplaced(self) -> bool:
+        """Whether its origin is of no use to it."""
+        return self._setting.faults.any("unplaced") is not None
+
+    @property
     def refuses_arming(self) -> str:
         """Why it does not let itself be armed; empty if it does."""
         settled_s = self._tuning.values.get("SIM_ARM_AFTER", 0.0)

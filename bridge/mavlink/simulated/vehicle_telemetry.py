@@ -69,7 +69,7 @@ def global_position(vehicle: Vehicle) -> Message:
     """All zeros before there is an origin, as autopilots do."""
     now = vehicle.motion()
     pose = now.pose
-    lat, lon = vehicle.rover.place((pose.x, pose.y))
+    lat, lon = (0, 0) if vehicle.is_unplaced else vehicle.rover.place((pose.x, pose.y))
     north, east = 100 * now.speed_y, 100 * now.speed_x
     heading = round(math.degrees(bearing(pose.heading)) % 360 * 100) % 36_000
     return dialect.MAVLink_global_position_int_message(

@@ -14,6 +14,7 @@ from bridge.mavlink.line.parameter_reading import value_of
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.simulated.profiles import PROFILES
 from bridge.mavlink.simulated.vehicle import Setting
+from bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
 from bridge.mavlink.simulated.vehicle_process import vehicle_on
 from mission.__main__ import main
 from mission.document import SiteOrigin
@@ -111,6 +112,20 @@ def test_a_vehicle_is_asked_and_not_changed(
     assert told["origin"]["ok"] is (origin is not None)
     assert code == (0 if origin is not None else 1)
     assert "right" in told["params"]["told"]
+
+
+def test_an_origin_that_is_of_no_use_to_the_vehicle_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    port = free_port()
+    origin = SiteOrigin(lat=47.0, lon=8.0, alt=400.0, heading_deg=0.0)
+    faults = VehicleFaults((VehicleFault("unplaced", 1),))
+    with vehicle_on(
+        Url("udpin", "127.0.0.1", port), Setting(PROFILES["ardupilot"], origin=origin, faults=faults)
+    ):
+        code = main(["doctor", "--mavlink", f"udpout:127.0.0.1:{port}", "--json"])
+    told = {check["name"]: check for check in json.loads(capsys.readouterr().out)["checks"]}
+    assert (code, told["origin"]["ok"]) == (1, False)
+    assert told["origin"]["told"].endswith("in AUTO it would pass over its waypoints")
+    assert told["origin"]["do"].startswith("start it again")
 
 
 def test_nobody_there_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -165,6 +165,14 @@ def test_a_vehicle_that_stands_elsewhere_is_not_started(tmp_path: Path) -> None:
         site.order("abort")
 
 
+def test_a_vehicle_that_knows_no_place_on_earth_is_not_started(tmp_path: Path) -> None:
+    """ArduPilot whose origin came before its filter ran: it passes over its waypoints."""
+    site = Site(tmp_path, "ardupilot", faults=["unplaced@1"])
+    with site.up():
+        why = refused(site, "start")
+    assert "no_position" in why and "GLOBAL_POSITION_INT 0, 0" in why and "start it again" in why
+
+
 def test_nothing_is_sent_where_no_vehicle_is(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot")
     with pytest.raises(RobotUnreachable, match="nothing was sent"), site.reached(timeout_s=0.5):
