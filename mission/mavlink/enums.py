@@ -83,6 +83,7 @@ class Component(IntEnum):
     """MAV_COMP_ID."""
 
     AUTOPILOT1 = 1
+    CAMERA = 100
     MISSIONPLANNER = 190
     ONBOARD_COMPUTER = 191
     UDP_BRIDGE = 240

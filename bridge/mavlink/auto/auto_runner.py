@@ -22,12 +22,21 @@ from mission.errors import RobotUnreachable
 from mission.mavlink.enums import MessageId
 from mission.mavlink.following.observer import TOLD, Observer
 from mission.mavlink.following.steps import held_by_vehicle
-from mission.mavlink.telemetry import is_lost
+from mission.mavlink.telemetry import Message, is_lost
 from mission.run.orders import Answer, Order
 from mission.run.states import Run
 
 TICK_S = 0.2
 ASK_AGAIN_S = 2.0
+
+
+class Telemetry(MessageQueue):
+    """What a vehicle tells of a run; of its scans a scanner may tell that is a component of its own."""
+
+    def wants(self, message: Message) -> bool:
+        assert self.of is not None
+        of_scanner = message.get_type() == "CAMERA_IMAGE_CAPTURED"
+        return (of_scanner and message.get_srcSystem() == self.of.system) or super().wants(message)
 
 
 class AutoRunner:
@@ -120,7 +129,7 @@ class AutoRunner:
 
     def _look(self) -> None:
         asked_ns = 0
-        with self._peer.waiting(*TOLD) as waiting:
+        with self._peer.wire.filling(Telemetry(frozenset(TOLD), self._peer.who)) as waiting:
             while not self._closing.is_set():
                 now_ns = self._book.clock.now_ns()
                 if now_ns > asked_ns + ASK_AGAIN_S * 1e9 and not self._observer.fresh(ASK_AGAIN_S, now_ns):

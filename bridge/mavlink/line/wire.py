@@ -128,11 +128,15 @@ class Wire:
         """Why nothing passes at the moment; empty if all is well."""
         return self._ended or self._transport.gone
 
-    def send(self, message: Message) -> None:
-        """Send to the one the message is for, if it is known where that is; else to all."""
+    def send(self, message: Message, *, component: int | None = None) -> None:
+        """Send to the one the message is for, if it is known where that is; else to all.
+
+        `component`: which of our system says it, if not `me`.
+        """
         target = (getattr(message, "target_system", 0), getattr(message, "target_component", 0))
         with self._lock:
             self._sending.signing.timestamp = max(self._sending.signing.timestamp, signing_time())
+            self._sending.srcComponent = self.me.component if component is None else component
             data = bytes(message.pack(self._sending))
             self._sending.seq = (self._sending.seq + 1) % 256
             self._transport.write(data, self._route(*target))

@@ -11,7 +11,7 @@ from mission.errors import InputError
 
 VehicleFaultKind = Literal[
     "loss", "duplicates", "jitter", "lostack", "nack", "silent", "reboot-upload", "reboot-mission",
-    "beside", "finish", "scanner", "unsigned", "unplaced", "jump", "gap", "restart",
+    "beside", "finish", "scanner", "unsigned", "unplaced", "camera", "jump", "gap", "restart",
 ]  # fmt: skip
 
 
@@ -45,6 +45,7 @@ FAULTS: dict[VehicleFaultKind, str] = {
     "gap": "N seconds after it was switched on, nothing is said or heard for AMOUNT seconds",
     "restart": "N seconds after it was switched on, it reboots, and takes AMOUNT seconds more for that",
     "unplaced": "its origin came too soon: it is told, but no place on earth is (N means nothing)",
+    "camera": "its scanner tells of scans as a component of its own, 100 (N means nothing)",
     "unsigned": "nothing is signed, though there is a key; only what is signed is heard (N means nothing)",
 }
 

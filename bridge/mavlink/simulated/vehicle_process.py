@@ -24,6 +24,8 @@ from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_
 from mission.document import SiteOrigin
 from mission.errors import InputError
 from mission.events import Pose
+from mission.mavlink.enums import Component
+from mission.mavlink.telemetry import Message
 
 OPTION = "--mavlink"
 VEHICLE = Who(1, 1)
@@ -84,9 +86,13 @@ def vehicle_on(
     signs = setting.faults.any("unsigned") is None
     line = on_line(open_transport(url), setting.faults)
     with closing(Wire(line, me=VEHICLE, signing_key=signing_key, signs=signs)) as wire:
-        vehicle = complete_vehicle(
-            setting, clock=WallClock(speed_up=speed_up), wall=WallClock(), say=wire.send
-        )
+        apart = setting.faults.any("camera") is not None
+
+        def say(message: Message) -> None:
+            of_camera = apart and message.get_type() == "CAMERA_IMAGE_CAPTURED"
+            wire.send(message, component=Component.CAMERA if of_camera else None)
+
+        vehicle = complete_vehicle(setting, clock=WallClock(speed_up=speed_up), wall=WallClock(), say=say)
         stop, stopped = threading.Event(), Stopped()
         thread = threading.Thread(target=_live, args=(vehicle, wire, stop, stopped), daemon=True)
         thread.start()

@@ -73,6 +73,14 @@ def test_a_stop_that_is_missed_has_failed_however_often_it_is_called_reached(tmp
     assert told(site.events)[-5:] == ["Skipped S2", "Arrived S3", "Settled S3", "Scanned S3", "Finished"]
 
 
+def test_a_scanner_that_is_a_component_of_its_own_is_believed(tmp_path: Path) -> None:
+    """As a camera is to which ArduPilot passes the trigger on."""
+    site = Site(tmp_path, "ardupilot", faults=["camera@1"])
+    with site.up(), watched(site):
+        site.order("start")
+    assert told(site.events) == ALL
+
+
 def test_a_stop_that_may_be_left_out_does_not_hold_the_run(tmp_path: Path) -> None:
     site = Site(tmp_path, "ardupilot", faults=["beside@7=0.6"], mission=real_tour(on_failure="skip"))
     with site.up(), watched(site):
