@@ -92,6 +92,14 @@ def _arming(peer: Peer) -> Iterator[Check]:
     yield Check("arming", ready, "ready to arm" if ready else "not ready to arm, and it does not say why")
 
 
+def knows_its_place(flags: int) -> bool:
+    """Whether an estimator with these flags has a place to tell.
+
+    PX4 tells that its place is only held whenever the vehicle stands, also with a place on earth.
+    """
+    return bool(flags & LEVEL) and bool(flags & FAR or (flags & NEAR and not flags & FIXED))
+
+
 def _estimator(peer: Peer) -> Check:
     """Whether its estimator has a place to tell."""
     for number in (MessageId.EKF_STATUS_REPORT, MessageId.ESTIMATOR_STATUS):
@@ -99,7 +107,7 @@ def _estimator(peer: Peer) -> Check:
         if report is None:
             continue
         flags = report.flags
-        ok = bool(flags & LEVEL) and bool(flags & (NEAR | FAR)) and not flags & FIXED
+        ok = knows_its_place(flags)
         do = (
             "" if ok else "send it the robot's pose as ODOMETRY, 4 times a second or more, and set its origin"
         )

@@ -7,17 +7,19 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from bridge.link.clock import Clock
-from bridge.mavlink.line.messages import interval
-from bridge.mavlink.line.peer import Peer
+from bridge.mavlink.line.messages import interval, set_current
+from bridge.mavlink.line.peer import Ack, Peer
 from mission.errors import OutcomeUnknown
 from mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
-from mission.mavlink.enums import MessageId
+from mission.mavlink.enums import CommandResult, MessageId
 from mission.mavlink.following.observer import Observer
 from mission.mavlink.items import Command
 from mission.run.orders import Refused
 
 SHOWS_S = 5.0
 """A vehicle beats every second; so long it may take until it shows what it was told."""
+MESSAGES = 5
+"""So often something is told that is not answered, within that time."""
 ASK_AGAIN_NS = 500_000_000
 REPEATED_HZ = {
     MessageId.MISSION_CURRENT: 5.0,
@@ -78,15 +80,24 @@ class ConfirmedCommands:
     def jump(self, sequence: int, *, anew: bool = False) -> None:
         """Make an item the one it works on; a command that is no NAV command is passed at once.
 
-        `anew` also takes a mission that is complete out of that state.
+        `anew` also takes a mission that is complete out of that state. PX4 does not know the command, but the
+        older message, which nobody answers (measured).
         """
-        asked_ns = self._clock.now_ns()
-        self._order(Command.DO_SET_MISSION_CURRENT, float(sequence), float(anew), what=f"item {sequence}")
+        asked_ns, what = self._clock.now_ns(), f"item {sequence}"
+        ack = self._told(Command.DO_SET_MISSION_CURRENT, float(sequence), float(anew))
+        if ack.result != CommandResult.UNSUPPORTED:
+            self._must(ack, what)
         near = range(sequence, sequence + 3)
-        self._shown(
-            lambda: self._observer.current_ns > asked_ns and self._observer.sequence in near,
-            f"going to item {sequence}",
-        )
+
+        def shown() -> bool:
+            return self._observer.current_ns > asked_ns and self._observer.sequence in near
+
+        for _ in range(MESSAGES if ack.result == CommandResult.UNSUPPORTED else 0):
+            self._peer.send(set_current(self._peer.who, sequence))
+            with self.news:
+                if self.news.wait_for(shown, SHOWS_S / MESSAGES):
+                    return
+        self._shown(shown, f"going to {what}")
 
     def arm(self, armed: bool = True) -> None:
         """Arm it, or disarm it."""
@@ -107,8 +118,14 @@ class ConfirmedCommands:
         )
 
     def _order(self, number: int, *params: float, what: str) -> None:
+        self._must(self._told(number, *params), what)
+
+    def _told(self, number: int, *params: float) -> Ack:
         self.working()
-        ack = self._peer.command(number, *params)
+        return self._peer.command(number, *params)
+
+    def _must(self, ack: Ack, what: str) -> None:
+        """The vehicle has taken the order."""
         if not ack.accepted:
             text = self._peer.newest("STATUSTEXT")
             said = f', and last said "{text.text}"' if text is not None else ""

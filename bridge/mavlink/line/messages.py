@@ -64,6 +64,11 @@ def parameter_request(to: Who, name: str) -> Message:
     return dialect.MAVLink_param_request_read_message(to.system, to.component, name.encode(), -1)
 
 
+def set_current(to: Who, sequence: int) -> Message:
+    """Makes an item the one it works on; nobody answers, MISSION_CURRENT shows it."""
+    return dialect.MAVLink_mission_set_current_message(to.system, to.component, sequence)
+
+
 def set_origin(to: Who, origin: VehicleOrigin) -> Message:
     """What its local metres are to count from."""
     return dialect.MAVLink_set_gps_global_origin_message(

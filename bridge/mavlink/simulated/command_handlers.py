@@ -146,6 +146,8 @@ def _set_mode_message(vehicle: Vehicle, who: Who, message: Message) -> None:
 
 def _set_current(vehicle: Vehicle, order: ReceivedCommand) -> int:
     """-1 means: stay; param2 1 means: count everything anew."""
+    if not vehicle.autopilot.habits.jumps_by_command:
+        return int(UNSUPPORTED)
     number = order.whole(0, -2)
     if number == -1:
         number = vehicle.auto.current

@@ -147,6 +147,8 @@ class Habits:
     modes_by_flags: bool
     """SET_MODE and DO_SET_MODE may name a mode by flags alone."""
     acknowledges_set_mode: bool
+    jumps_by_command: bool
+    """DO_SET_MISSION_CURRENT is obeyed; else only MISSION_SET_CURRENT."""
     start_takes_item: bool
     """MISSION_START may name the first item."""
     start_arms: bool

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from bridge.commands.vehicle_checks import parameter_checks
+from bridge.commands.vehicle_checks import knows_its_place, parameter_checks
 from bridge.mavlink.line.parameter_reading import value_of
 from bridge.mavlink.line.url import Url
 from bridge.mavlink.simulated.profiles import PROFILES
@@ -92,6 +92,21 @@ def test_whole_numbers_of_px4_stand_in_the_float_byte_by_byte() -> None:
     assert value_of(message, bytewise=True) == 15.0
     assert value_of(SimpleNamespace(param_type=6, param_value=15.0), bytewise=False) == 15.0
     assert value_of(SimpleNamespace(param_type=9, param_value=0.5), bytewise=True) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("flags", "knows"),
+    [
+        (831, True),  # ArduPilot by external navigation
+        (511, True),  # PX4 that stands
+        (383, True),  # PX4 that drives
+        (0b1000_1001, False),  # held where it was begun
+        (0b0000_0001, False),
+        (0b0001_1000, False),
+    ],
+)
+def test_an_estimator_has_a_place_to_tell(flags: int, knows: bool) -> None:
+    assert knows_its_place(flags) is knows
 
 
 def test_the_guide_names_every_parameter_that_is_looked_at() -> None:
