@@ -99,8 +99,8 @@ MODES = Modes(
 )  # fmt: skip
 
 # Source (Rover/mode_guided.cpp): it stays at its last place whatever becomes of us; set_desired_speed counts
-# only while it drives to a place, so that is sent first; a yaw alone is followed for GUID_TIMEOUT (3 s) and
-# then stops it.
+# only while it drives to a place, so that is sent first; a yaw alone is followed for 3 s and then stops it
+# (GUID_TIMEOUT is Copter's; up to 4.8-dev Rover has none).
 DRIVING = Driving(
     streams=False, gives_up_s=3.0, gives_up_parameter="GUID_TIMEOUT", turns=True, courses="heading",
     reposition_mode="guided",
