@@ -6,7 +6,7 @@ Times are nanoseconds on the robot's clock (`robot_ns`, since 1970) and seconds 
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 
@@ -26,6 +26,12 @@ StopState = Literal[
 ]
 
 
+Nanoseconds = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
+"""Since 1970, up to the year 2116: a recording holds times in 64 bits."""
+RunSeconds = Annotated[float, msgspec.Meta(ge=-9e9, le=9e9)]
+"""Which in nanoseconds fit there, too."""
+
+
 class Pose(msgspec.Struct, frozen=True, kw_only=True):
     x: float
     y: float
@@ -41,8 +47,8 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="even
     run_id: str
     mission_id: str
     revision: int
-    robot_ns: int
-    mission_time_s: float
+    robot_ns: Nanoseconds
+    mission_time_s: RunSeconds
 
 
 class Started(Event, frozen=True, kw_only=True):
@@ -210,7 +216,7 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     robot: str
     boot_id: str
     seq: int
-    robot_ns: int
+    robot_ns: Nanoseconds
     state: str
     """One of `State`, or what a newer robot calls it."""
     run_id: str | None
@@ -240,9 +246,9 @@ class PoseReport(msgspec.Struct, frozen=True, kw_only=True):
     robot: str
     boot_id: str
     seq: int
-    robot_ns: int
+    robot_ns: Nanoseconds
     run_id: str | None
-    mission_time_s: float | None
+    mission_time_s: RunSeconds | None
     pose: Pose
     speed: float
 
@@ -250,7 +256,7 @@ class PoseReport(msgspec.Struct, frozen=True, kw_only=True):
 class Health(msgspec.Struct, frozen=True, kw_only=True):
     """How a robot's base is, as far as it tells; each thing is `None` where it does not."""
 
-    robot_ns: int
+    robot_ns: Nanoseconds
     run_id: str | None
     battery: float
     """0 to 1."""
@@ -266,10 +272,10 @@ class PosesMissing(msgspec.Struct, frozen=True, kw_only=True):
     """Where the robot was between two times of a run is not known, and why not."""
 
     run_id: str
-    robot_ns: int
+    robot_ns: Nanoseconds
     """From this time on."""
-    until_ns: int
-    mission_time_s: float
+    until_ns: Nanoseconds
+    mission_time_s: RunSeconds
     """Of `robot_ns`."""
     reason: str
 

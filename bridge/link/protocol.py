@@ -15,7 +15,7 @@ import msgspec
 from mission.decoding import one_decode_error
 from mission.document import Transform
 from mission.errors import InputError
-from mission.events import AnyEvent, Health, PoseReport, PosesMissing, StateReport, event_of
+from mission.events import AnyEvent, Health, Nanoseconds, PoseReport, PosesMissing, StateReport, event_of
 from mission.run.lease import Lease
 from mission.run.orders import Answer, Count, ShortText
 
@@ -143,7 +143,7 @@ class Info(Tagged, frozen=True):
     stopgo: str
     robot: str
     boot_id: str
-    clock_ns: int
+    clock_ns: Nanoseconds
     """The clock that `valid_for_s` counts on."""
     state: StateReport
     lease: Lease | None
@@ -270,7 +270,7 @@ class PoseRow(msgspec.Struct, frozen=True, array_like=True):
     """A pose of a record, as an array: what a `PoseReport` tells, but for what all of an entry share."""
 
     seq: int
-    robot_ns: int
+    robot_ns: Nanoseconds
     x: float
     y: float
     heading: float
@@ -283,7 +283,7 @@ class RecordEntry(msgspec.Struct, frozen=True, kw_only=True):
     number: int
     """From 1 within the run, also over reboots."""
     boot_id: str
-    began_ns: int
+    began_ns: Nanoseconds
     """When the run began."""
     poses: tuple[PoseRow, ...] = ()
     states: tuple[StateReport, ...] = ()
@@ -381,6 +381,6 @@ def parts_of(key: str) -> list[str]:
 
 def count_of(text: str, *, digits: int = 15) -> int:
     """The number in a key or parameter; raises `ValueError` for anything but a plain, not too large one."""
-    if not text.isdecimal() or len(text) > digits:
+    if not (text.isascii() and text.isdecimal()) or len(text) > digits:
         raise ValueError(f"{text[:20]!r} is not a number")
     return int(text)

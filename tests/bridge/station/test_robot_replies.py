@@ -12,7 +12,7 @@ from bridge.station.record import past_run, read_index
 from bridge.station.station import Station
 from mission.errors import AnswerIsNo, OutcomeUnknown
 from mission.events import Started
-from tests.bridge.world import Field
+from tests.bridge.world import Field, corridor
 
 READS: dict[str, Callable[[Station], object]] = {
     "log": lambda station: station.log(),
@@ -62,6 +62,33 @@ def test_a_log_that_does_not_go_on_is_not_read_for_ever(numbers: tuple[int, ...]
 def test_an_event_that_is_none_is_unknown() -> None:
     with pytest.raises(OutcomeUnknown, match="words this stopgo does not know"):
         lying(encode(LogPage(bodies=(msgspec.Raw(b'{"event": "Started"}'),), newest=1))).log()
+
+
+@pytest.mark.parametrize("wrong", [{"robot_ns": 2**63}, {"robot_ns": -1}, {"mission_time_s": 1e300}])
+def test_a_time_that_no_recording_holds_is_unknown(wrong: dict[str, object]) -> None:
+    event = {**msgspec.json.decode(bytes(started(1))), **wrong}
+    page = LogPage(bodies=(msgspec.Raw(encode(event)),), newest=1)
+    with pytest.raises(OutcomeUnknown, match=rf"words this stopgo does not know .*{next(iter(wrong))}"):
+        lying(encode(page)).log()
+
+
+@pytest.mark.parametrize("kind", ["pose", "state", "health"])
+def test_a_robot_is_not_heard_with_a_time_that_no_recording_holds(kind: str) -> None:
+    field = Field()
+    station = field.station()
+    station.push(corridor())
+    field.order("start")
+    field.work()
+    reports = station.reports()
+    first = next(reports)
+    late = {**msgspec.to_builtins(field.report()), "robot_ns": 2**63}
+    told = {
+        "state": late,
+        "pose": {**late, "mission_time_s": 0.0, "pose": {"x": 0.0, "y": 0.0, "heading": 0.0}, "speed": 0.0},
+        "health": late,
+    }
+    field.board.link().publisher(getattr(field.keys, kind))(encode(told[kind]))
+    assert all(getattr(report, "robot_ns", 0) < 2**63 for report in [first, *reports])
 
 
 def test_a_record_that_tells_of_more_than_it_gives_is_not_read_for_ever() -> None:
