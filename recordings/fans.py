@@ -31,6 +31,8 @@ def sight_outline(eye: FloatArray, lines: FloatArray) -> FloatArray:
     after[-1] += 2 * np.pi
     middle = (edges + after) / 2
     inside = (middle[:, None] - begin) % (2 * np.pi) < span
+    if not inside.any():  # all that is seen is as good as edge-on
+        return np.stack([eye, eye])
     farthest = np.where(inside, _distance(middle[:, None], a, b), -1.0).argmax(axis=1)
     ends = [_along(angle, a[farthest], b[farthest]) for angle in (edges, after)]
     return eye + _joined(np.stack(ends, axis=1), inside.any(axis=1))
