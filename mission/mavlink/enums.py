@@ -35,6 +35,14 @@ class ModeFlag(IntFlag):
     SAFETY_ARMED = 128
 
 
+class SystemState(IntEnum):
+    """MAV_STATE, as far as it is looked at."""
+
+    STANDBY = 3
+    ACTIVE = 4
+    CRITICAL = 5
+
+
 class MissionResult(IntEnum):
     """MAV_MISSION_RESULT: how a message of the mission protocol is answered."""
 

@@ -284,11 +284,11 @@ class MavlinkBase:
     def _left_by_itself(self) -> bool:
         """Whether it holds because it did not hear us, as one does that wants a stream of setpoints.
 
-        Its heartbeat may tell of that a moment after the line is back.
+        Its heartbeat may tell of that a moment after the line is back; of a hold that somebody ordered
+        meanwhile it tells no failsafe.
         """
-        autopilot = self.autopilot
         just_back = self._now_s() - self._late_until_s < BEAT_S
-        return just_back and autopilot.kind.driving.streams and autopilot.mode() == autopilot.modes.hold
+        return just_back and self.autopilot.kind.driving.streams and self.autopilot.holds_by_itself
 
     def _pause(self, seconds: float, interrupt: Event) -> None:
         if self._clock.wait(seconds, interrupt):

@@ -279,6 +279,12 @@ class OnboardAutopilot:
     def mode(self) -> Mode:
         return self.kind.mode_of(self.peer.heartbeat)
 
+    @property
+    def holds_by_itself(self) -> bool:
+        """Whether it is on hold by a failsafe of its own, as one that lives on setpoints is without them."""
+        beat = self.peer.heartbeat
+        return self.kind.mode_of(beat) == self.modes.hold and self.kind.in_failsafe(beat)
+
     def out_of_reach(self) -> str:
         """Why nobody knows where it is or what it does; empty if all is well."""
         if is_lost(self.peer.silent_s):

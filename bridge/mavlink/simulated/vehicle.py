@@ -97,6 +97,8 @@ class Vehicle:
         """The time of what is happening."""
         self.mode: ModeName = "manual"
         self.armed = False
+        self.failsafe = False
+        """It holds because it heard no setpoints, and nobody has ordered anything since."""
         self.reached: int | None = None
         """The item reached last."""
         self.store = Store(setting.state)
@@ -158,14 +160,20 @@ class Vehicle:
             self.text("target not received, stopping")
             self.target.forget()
             self.rover.brake(self.now_ns)
-        if self.mode == "guided" and self.autopilot.driving.streams and not self.target.fresh:
-            self.text("Offboard: setpoints lost")
-            self.set_mode("hold")
+        self._look_for_setpoints()
         if self._quiet():
             return
         self.transfers.tick()
         for number in self.streams.due():
             self.tell(number)
+
+    def _look_for_setpoints(self) -> None:
+        """One that lives on them holds without them, and goes on by itself once they come again."""
+        if self.failsafe and self.target.fresh:
+            self.set_mode("guided")
+        if self.mode == "guided" and self.autopilot.driving.streams and not self.target.fresh:
+            self.text("Offboard: setpoints lost")
+            self.set_mode("hold", by_failsafe=True)
 
     def rest(self) -> None:
         """Write down where it stands, before it is switched off."""
@@ -206,17 +214,18 @@ class Vehicle:
 
     # What it can be told to do
 
-    def set_mode(self, mode: ModeName) -> bool:
+    def set_mode(self, mode: ModeName, *, by_failsafe: bool = False) -> bool:
         """Change the mode; false if it cannot be."""
         if mode == "auto" and not self.auto.total:
             self.text("No mission")
             return False
         if mode == self.mode:
+            self.failsafe = self.failsafe and by_failsafe
             return True
         if mode == "guided" and self.autopilot.driving.streams and not self.target.fresh:
             self.text("Offboard: no setpoints")
             return False
-        self.mode = mode
+        self.mode, self.failsafe = mode, by_failsafe
         self.target.forget()
         self.auto.stand(self.now_ns)
         self.rover.brake(self.now_ns)
@@ -277,7 +286,7 @@ class Vehicle:
         """Be away for a while, then wake up with the items but without mode, origin or current item."""
         self.rover.brake(self.now_ns)
         self.rover.origin = self._setting.origin
-        self.armed, self.mode, self.reached = False, "manual", None
+        self.armed, self.mode, self.failsafe, self.reached = False, "manual", False, None
         self.target.forget()
         self.auto.stand(self.now_ns)
         self.auto.reset()

@@ -7,7 +7,7 @@ import math
 from bridge.mavlink.line.frames import dialect
 from bridge.mavlink.simulated.rover import bearing
 from bridge.mavlink.simulated.vehicle import BATTERY_NS, Maker, Vehicle
-from mission.mavlink.enums import MessageId, MissionState, ModeFlag, VehicleType
+from mission.mavlink.enums import MessageId, MissionState, ModeFlag, SystemState, VehicleType
 from mission.mavlink.telemetry import Message
 
 CAPABILITIES = (
@@ -26,7 +26,8 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 def heartbeat(vehicle: Vehicle) -> Message:
     modes = vehicle.autopilot.modes
     flags = modes.flags[vehicle.mode] | (ModeFlag.SAFETY_ARMED if vehicle.armed else 0)
-    status = dialect.MAV_STATE_ACTIVE if vehicle.armed else dialect.MAV_STATE_STANDBY
+    armed = SystemState.CRITICAL if vehicle.failsafe else SystemState.ACTIVE
+    status = armed if vehicle.armed else SystemState.STANDBY
     rover = VehicleType.GROUND_ROVER
     return dialect.MAVLink_heartbeat_message(
         rover, vehicle.autopilot.firmware, flags, modes.custom(modes.numbers[vehicle.mode]), status, 3

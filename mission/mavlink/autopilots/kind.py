@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from mission.mavlink.enums import CommandResult, MissionResult, ModeFlag, VehicleType
+from mission.mavlink.enums import CommandResult, MissionResult, ModeFlag, SystemState, VehicleType
 from mission.mavlink.items import Item
 
 ROVERS = (VehicleType.GROUND_ROVER, VehicleType.SURFACE_BOAT)
@@ -24,6 +24,7 @@ class Heartbeat(Protocol):
     autopilot: int
     base_mode: int
     custom_mode: int
+    system_status: int
 
 
 @dataclass(frozen=True)
@@ -243,6 +244,10 @@ class Autopilot:
 
     def mode_of(self, heartbeat: Heartbeat) -> Mode:
         return self.modes.of(heartbeat.custom_mode)
+
+    def in_failsafe(self, heartbeat: Heartbeat) -> bool:
+        """Whether it does what a failsafe of its own wants, and not what somebody ordered."""
+        return heartbeat.system_status == SystemState.CRITICAL
 
     def mode_name(self, heartbeat: Heartbeat) -> str:
         """AUTO, HOLD, or what the vehicle's people call the mode it is in."""

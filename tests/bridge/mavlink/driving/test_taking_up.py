@@ -26,6 +26,7 @@ from tests.bridge.mavlink.driving.world import (
     site_mission,
     until,
 )
+from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.own_time import World, stepped_into
 
 STIFF = {"SIM_STICTION": 0.03, "SIM_LAG": 0.6, "SIM_TURN_LAG": 0.3, "SIM_POS_DRIFT": 0.01}
@@ -122,6 +123,33 @@ def test_one_that_refuses_to_arm_for_good_is_held_for_what_it_says(tmp_path: Pat
         until(station.reports(), is_state("HELD"))
         (held,) = [event for event in events_of(station) if isinstance(event, Held)]
     assert 'answered arming with FAILED (it said "Arm: Accels inconsistent")' in held.reason
+
+
+@pytest.mark.parametrize("by_hand", [False, True])
+def test_a_hold_during_a_silence_is_the_autopilots_own_or_somebodys(
+    tmp_path: Path, world: World, by_hand: bool
+) -> None:
+    """PX4 holds when it hears nobody, and drives on; that somebody meant it to hold, it tells as well."""
+    with (
+        rover(tmp_path, "px4") as (vehicle, operator),
+        Lossy(vehicle.url.number, Roughness(), seed=1) as line,
+        gateway(tmp_path, line.url) as station,
+    ):
+        station.push(site_mission())
+        station.command("start")
+        reports = station.reports()
+        until(reports, is_driving(0.5))
+        line.roughness = Roughness(loss=1.0)
+        world.sleep(4.0)
+        assert operator.mode() == "HOLD"
+        if by_hand:
+            operator.hold()
+        line.roughness = Roughness()
+        state = until(reports, is_state("FINISHED", "HELD"))
+        held = [event.reason for event in events_of(station) if isinstance(event, Held)]
+        assert state.state == ("HELD" if by_hand else "FINISHED")
+        assert all("somebody switched the autopilot to HOLD" in reason for reason in held)
+        assert operator.mode() == "HOLD"
 
 
 def test_a_jump_of_its_place_is_driven_back_from(tmp_path: Path) -> None:
