@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from bridge.commands.checks import Check
 from bridge.mavlink.line.parameter_reading import read_parameters
 from bridge.mavlink.line.peer import Peer
+from mission.mavlink.accuracy import LEAVES_LEGS
 from mission.mavlink.autopilots.kind import Autopilot, ParameterRule, why_no_rover
 from mission.mavlink.enums import MessageId
 from mission.mavlink.items import Command
@@ -39,7 +40,16 @@ def vehicle_checks(peer: Peer, *, any_origin: bool) -> Iterator[Check]:
     yield from _battery(peer)
     wanted = [rule for rule in kind.parameters if rule.when == "always" or not any_origin]
     names = {name for rule in wanted for either in _either(rule) for name in either.names}
-    yield from parameter_checks(kind, read_parameters(peer, names) if names else {}, any_origin=any_origin)
+    values = read_parameters(peer, names | set(kind.steering.parameters)) if names else {}
+    yield from steering_check(kind, values)
+    yield from parameter_checks(kind, values, any_origin=any_origin)
+
+
+def steering_check(kind: Autopilot, values: Mapping[str, float]) -> Iterator[Check]:
+    """A line if it cannot turn on the spot."""
+    fixed = kind.why_no_pivot(values)
+    if fixed:
+        yield Check("steering", False, f"{fixed}: {LEAVES_LEGS}", "use one with two driven sides")
 
 
 def parameter_checks(kind: Autopilot, values: Mapping[str, float], *, any_origin: bool) -> Iterator[Check]:

@@ -160,10 +160,11 @@ def _peer(line: Line) -> Iterator[tuple[Url, Peer]]:
 
 
 def _why_beside(peer: Peer, mission: Mission) -> str:
-    """What its own parameters make of the mission's tolerances, as far as it tells them."""
-    name = peer.autopilot.radius_parameter
-    radius = read_parameters(peer, [name]).get(name) if name else None
-    return "" if radius is None else why_beside(mission, peer.autopilot, radius)
+    """What its own parameters make of the mission's legs and tolerances, as far as it tells them."""
+    kind = peer.autopilot
+    return why_beside(
+        mission, kind, read_parameters(peer, [kind.radius_parameter, *kind.steering.parameters])
+    )
 
 
 def _note_down(

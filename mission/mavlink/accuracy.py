@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from mission.document import Mission
 from mission.mavlink.autopilots.kind import Autopilot
@@ -13,6 +14,8 @@ STOPS_AFTER_S = 0.3
 Measured: 0.27 s on the Rover whose log of five stops the simulated vehicle was compared with (218 mm at
 0.8 m/s); 0.2 to 0.25 s on that vehicle at 0.2 to 1.2 m/s, 0.32 s with PX4's loops.
 """
+LEAVES_LEGS = "in AUTO it leaves the legs at corners by its turning circle, and stops up to 2 m beside"
+"""What a rover does that steers like a car (measured on ArduPilot: 0.1 to 2.2 m)."""
 
 
 def stops_within(*, radius: float, speed: float) -> float:
@@ -20,8 +23,22 @@ def stops_within(*, radius: float, speed: float) -> float:
     return max(radius, STOPS_AFTER_S * speed)
 
 
-def why_beside(mission: Mission, kind: Autopilot, radius: float) -> str:
-    """What to tell of a mission whose stops ask for more than that; empty if they do not."""
+def why_beside(mission: Mission, kind: Autopilot, values: Mapping[str, float]) -> str:
+    """What to tell of a mission that asks for more than the vehicle's parameters allow; empty if it does not.
+
+    `values`: as far as it tells them, its radius for waypoints and what its steering is told by.
+    """
+    fixed = kind.why_no_pivot(values)
+    if fixed:
+        return (
+            f"this vehicle does not keep to a mission: {fixed}; {LEAVES_LEGS}; use one with two driven sides"
+        )
+    radius = values.get(kind.radius_parameter)
+    return "" if radius is None else _why_beside(mission, kind, radius)
+
+
+def _why_beside(mission: Mission, kind: Autopilot, radius: float) -> str:
+    """Of one whose stops must be met within less than it stops within."""
     least = min(stop.tolerance_m for stop in mission.stops)
     speed = mission.robot.speed
     within = stops_within(radius=radius, speed=speed)

@@ -145,7 +145,8 @@ def on_board(
     RobotUnreachable
         If no vehicle is heard, or it does not tell its position.
     InputError
-        If several are heard and none was named, or it is of a kind that cannot be driven.
+        If several are heard and none was named, or it is of a kind that cannot be driven, or steers like a
+        car.
     """
     with (
         wire(url, me=ON_BOARD, signing_key=signing_key) as opened,
@@ -158,7 +159,7 @@ def on_board(
             autopilot.await_pose(timeout_s)
             with suppress(RobotUnreachable):
                 peer.origin(patience_s=ORDER_S)  # so that it is known to the first who asks
-            autopilot.ask_when_it_gives_up()
+            autopilot.ask_how_it_drives()
             yield autopilot
         finally:
             autopilot.close()
@@ -218,10 +219,23 @@ class OnboardAutopilot:
                 )
             self._closing.wait(KEEP_S)
 
-    def ask_when_it_gives_up(self) -> None:
-        """Learn how long it drives on by a velocity that is not told again."""
+    def ask_how_it_drives(self) -> None:
+        """Learn how long it drives on by a velocity that is not told again.
+
+        Raises
+        ------
+        InputError
+            If it says that it cannot turn on the spot.
+        """
         name = self.kind.driving.gives_up_parameter
-        told = read_parameters(self.peer, [name]).get(name)
+        values = read_parameters(self.peer, [name, *self.kind.steering.parameters])
+        fixed = self.kind.why_no_pivot(values)
+        if fixed:
+            raise InputError(
+                f"--controller: {self.peer}: {fixed}, as it must at the corners of a mission's legs;"
+                " drive one with two driven sides"
+            )
+        told = values.get(name)
         if told is not None:
             self.gives_up_s = max(SOONEST_GIVEN_UP_S, told)
 

@@ -40,6 +40,9 @@ class Chassis:
         self.speed += (throttle * tuning["SIM_TOP_SPEED"] - self.speed) * _share(dt, tuning["SIM_LAG"])
         top = math.radians(tuning["SIM_TURN_TOP"])
         self.turning += (steering * top - self.turning) * _share(dt, tuning["SIM_TURN_LAG"])
+        if not tuning.pivots:
+            most = abs(self.speed) / tuning["SIM_TURN_RADIUS"]
+            self.turning = max(-most, min(most, self.turning))
         self.heading = math.remainder(self.heading + self.turning * dt, math.tau)
         x = self.x + self.speed * dt * math.cos(self.heading)
         y = self.y + self.speed * dt * math.sin(self.heading)

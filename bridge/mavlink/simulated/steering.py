@@ -100,7 +100,7 @@ class ArduPilotLaw:
     def set_out(self, straight: RunningStraight, here: Estimate) -> None:
         off = abs(_off(_bearing(here, straight.end), here))
         angle = math.radians(self._p["WP_PIVOT_ANGLE"])
-        straight.turning = angle > PIVOTED_RAD and off > angle
+        straight.turning = self._p.pivots and angle > PIVOTED_RAD and off > angle
 
     def follow(self, straight: RunningStraight, here: Estimate, speed: float, dt: float) -> Want:
         if straight.turning:
@@ -233,7 +233,7 @@ class Px4Law:
     def steer(self, course: Course, here: Estimate) -> Want:
         """Turn on the spot while the bearing is far off, else drive."""
         p, off = self._p, _off(course.heading, here)
-        self._spot = abs(off) > p["RD_TRANS_TRN_DRV" if self._spot else "RD_TRANS_DRV_TRN"]
+        self._spot = p.pivots and abs(off) > p["RD_TRANS_TRN_DRV" if self._spot else "RD_TRANS_DRV_TRN"]
         turn = _limit(p["RO_YAW_P"] * off, math.radians(p["RO_YAW_RATE_LIM"]))
         return (0.0 if self._spot else _limit(course.speed, p["RO_SPEED_LIM"])), turn
 

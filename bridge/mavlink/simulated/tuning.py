@@ -10,11 +10,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from mission.mavlink.autopilots import AUTOPILOTS
+from mission.mavlink.autopilots.ardupilot import ARDUPILOT
+
 CHASSIS = {
     "SIM_TOP_SPEED": 4.0,  # m/s at full throttle
     "SIM_LAG": 0.4,  # s until most of a change of throttle has become speed: drive 0.29, servos the rest
     "SIM_TURN_TOP": 280.0,  # degrees a second at full steering
     "SIM_TURN_LAG": 0.1,  # s
+    "SIM_TURN_RADIUS": 0.9,  # m, of one that steers like a car
     "SIM_STICTION": 0.0,  # throttle below which wheels that stand do not begin to turn
     "SIM_POS_DRIFT": 0.006,  # m by which the estimated place wanders (standard deviation)
     "SIM_POS_NOISE": 0.001,  # m from one estimate to the next
@@ -39,15 +43,28 @@ PX4_ROVER = {
     "RO_YAW_P": 2.0, "RO_YAW_RATE_LIM": 60.0, "RO_YAW_ACCEL_LIM": 120.0,
     "RD_TRANS_DRV_TRN": 0.174533, "RD_TRANS_TRN_DRV": 0.0872665, "RD_WHEEL_TRACK": 0.5,
     "PP_LOOKAHD_GAIN": 1.0, "PP_LOOKAHD_MIN": 1.0, "PP_LOOKAHD_MAX": 10.0,
-    "NAV_ACC_RAD": 0.5, "COM_OF_LOSS_T": 1.0,
+    "NAV_ACC_RAD": 0.5, "COM_OF_LOSS_T": 1.0, "CA_AIRFRAME": 6.0,
 }  # fmt: skip
+SERVOS = {
+    **dict.fromkeys(ARDUPILOT.steering.parameters, 0.0),
+    "SERVO1_FUNCTION": 73.0,
+    "SERVO3_FUNCTION": 74.0,
+}
+"""Outputs for each side, so that it turns on the spot."""
 STRICT = {"WP_RADIUS": 0.1}
 OF_KIND: Mapping[str, Mapping[str, float]] = {
-    "ardupilot": {**ARDUPILOT_ROVER, **CHASSIS},
+    "ardupilot": {**ARDUPILOT_ROVER, **SERVOS, **CHASSIS},
     "px4": {**PX4_ROVER, **CHASSIS},
     "generic": STRICT,
 }
-MUST_BE_MORE = ("SIM_TOP_SPEED", "SIM_TURN_TOP", "CRUISE_SPEED", "CRUISE_THROTTLE", "RO_MAX_THR_SPEED")
+MUST_BE_MORE = (
+    "SIM_TOP_SPEED",
+    "SIM_TURN_TOP",
+    "SIM_TURN_RADIUS",
+    "CRUISE_SPEED",
+    "CRUISE_THROTTLE",
+    "RO_MAX_THR_SPEED",
+)
 HIGHEST = 10_000.0
 
 
@@ -55,7 +72,10 @@ class Tuning:
     """The parameters of one vehicle, as they are now."""
 
     def __init__(self, kind: str, **changed: float) -> None:
+        self._kind = AUTOPILOTS[kind]
         self.values = {**OF_KIND[kind], **changed}
+        self.pivots = not self._kind.why_no_pivot(self.values)
+        """It turns on the spot; else it steers like a car."""
 
     def __getitem__(self, name: str) -> float:
         return self.values[name]
@@ -66,4 +86,5 @@ class Tuning:
         if name not in self.values or not (math.isfinite(value) and least <= value <= HIGHEST):
             return False
         self.values[name] = value
+        self.pivots = not self._kind.why_no_pivot(self.values)
         return True

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from mission.mavlink.autopilots.kind import (
@@ -18,6 +19,7 @@ from mission.mavlink.autopilots.kind import (
     Mode,
     Modes,
     ParameterRule,
+    Steering,
 )
 from mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag, VehicleType
 from mission.mavlink.fields import (
@@ -196,6 +198,20 @@ PARAMETERS = (
     ),
 )
 
+GROUND_STEERING, THROTTLE_LEFT, THROTTLE_RIGHT = 26, 73, 74
+"""Functions of servo outputs."""
+
+
+def like_a_car(values: Mapping[str, float]) -> str:
+    """Source (AP_MotorsUGV::have_skid_steering): with an output for each side it turns on the spot."""
+    found = {int(value): name for name, value in values.items() if name in SERVOS}
+    if GROUND_STEERING not in found or {THROTTLE_LEFT, THROTTLE_RIGHT} <= found.keys():
+        return ""
+    return f"{found[GROUND_STEERING]} is {GROUND_STEERING}, ground steering"
+
+
+SERVOS = tuple(f"SERVO{number}_FUNCTION" for number in range(1, 17))
+
 # Source: get_next_nav_cmd gives a waypoint without hold its next leg, and AR_WPNav then calls it reached when
 # the moving target passes it ("fast waypoint"), the robot being behind or cutting the corner. With a hold of
 # a second or more it stops there first. Delays are milliseconds in uint32 (mode_auto.cpp). Measured: more
@@ -211,5 +227,6 @@ ARDUPILOT = Autopilot(
     radius_parameter="WP_RADIUS",
     reached="within its parameter WP_RADIUS, or once past it", turns=False, gives_items="any order",
     modes=MODES, in_auto=in_auto, driving=DRIVING, drivable=True, habits=HABITS,
+    steering=Steering(SERVOS, like_a_car),
     parameters=PARAMETERS,
 )  # fmt: skip

@@ -180,6 +180,20 @@ class ParameterRule:
 
 
 @dataclass(frozen=True)
+class Steering:
+    """How a rover tells by its parameters in what way it turns."""
+
+    parameters: tuple[str, ...]
+    like_a_car: Callable[[Mapping[str, float]], str]
+    """The parameter that says that it steers its wheels, with its value; empty if none does."""
+
+
+def turns_anyhow(values: Mapping[str, float]) -> str:
+    """Of a kind of which nothing is known."""
+    return ""
+
+
+@dataclass(frozen=True)
 class Autopilot:
     """A kind of autopilot."""
 
@@ -227,8 +241,14 @@ class Autopilot:
     habits: Habits
     parameters: tuple[ParameterRule, ...] = ()
     """What its parameters must be for a mission."""
+    steering: Steering = Steering((), turns_anyhow)
     whole_bytewise: bool = False
     """A whole number's four bytes stand in PARAM_VALUE as they are; else it is told as a float."""
+
+    def why_no_pivot(self, values: Mapping[str, float]) -> str:
+        """Why it cannot turn on the spot, by its `steering.parameters`; empty if it can, or does not tell."""
+        told = self.steering.like_a_car(values)
+        return f"it steers like a car ({told}) and cannot turn on the spot" if told else ""
 
     def kept(self, item: Item) -> Item:
         """The item as the vehicle will read it back."""

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 from mission.mavlink.autopilots.kind import (
@@ -18,6 +19,7 @@ from mission.mavlink.autopilots.kind import (
     Mode,
     Modes,
     ParameterRule,
+    Steering,
 )
 from mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag
 from mission.mavlink.fields import as_sent, float32
@@ -129,6 +131,14 @@ PARAMETERS = (
     ),
 )
 
+ACKERMANN = 5
+
+
+def like_a_car(values: Mapping[str, float]) -> str:
+    """Source (rc.rover_ackermann_defaults)."""
+    return f"CA_AIRFRAME is {ACKERMANN}, Ackermann" if values.get("CA_AIRFRAME") == ACKERMANN else ""
+
+
 # Source: navigation.h allows 500 items on flight controllers (2 000 in older releases, 50 on the smallest
 # boards, 65 534 on Linux); only multicopters brake for a hold (Mission::setActiveMissionItems), wait for a
 # heading, and take a waypoint's own radius (MissionBlock::is_mission_item_reached); a transfer ends when an
@@ -143,5 +153,6 @@ PX4 = Autopilot(
     radius_parameter="NAV_ACC_RAD",
     reached="within its parameter NAV_ACC_RAD, 10 m unless set", turns=False, gives_items="in order",
     modes=MODES, in_auto=in_auto, driving=DRIVING, drivable=True, habits=HABITS,
+    steering=Steering(("CA_AIRFRAME",), like_a_car),
     parameters=PARAMETERS, whole_bytewise=True,
 )  # fmt: skip

@@ -147,3 +147,12 @@ def test_nobody_there_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) ->
     assert main(["doctor", "--mavlink", f"udpout:127.0.0.1:{free_port()}", "--timeout", "0.3"]) == 1
     assert "no vehicle within 0.3 s" in capsys.readouterr().out
     assert main(["doctor", "--mavlink", "nonsense"]) == 2
+
+
+def test_one_that_steers_like_a_car_is_wrong_for_a_mission(capsys: pytest.CaptureFixture[str]) -> None:
+    port = free_port()
+    setting = Setting(PROFILES["px4"], changed={"CA_AIRFRAME": 5.0})
+    with vehicle_on(Url("udpin", "127.0.0.1", port), setting):
+        assert main(["doctor", "--mavlink", f"udpout:127.0.0.1:{port}"]) == 1
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("WRONG  steering")]
+    assert "CA_AIRFRAME is 5, Ackermann" in line and "two driven sides" in line

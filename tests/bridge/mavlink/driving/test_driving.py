@@ -361,6 +361,20 @@ def test_a_vehicle_that_is_not_known_to_be_drivable_is_refused(tmp_path: Path) -
         _strict(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("profile", "changed"), [("ardupilot", {"SERVO1_FUNCTION": 26.0}), ("px4", {"CA_AIRFRAME": 5.0})]
+)
+def test_one_that_steers_like_a_car_is_refused_for_it_cannot_turn_at_corners(
+    tmp_path: Path, profile: str, changed: dict[str, float]
+) -> None:
+    with (
+        rover(tmp_path, profile, changed=changed) as (vehicle, _),
+        pytest.raises(InputError, match=r"steers like a car .* cannot turn on the spot"),
+        gateway(tmp_path, vehicle.url),
+    ):
+        pass
+
+
 def _strict(tmp_path: Path) -> None:
     from tests.bridge.mavlink.driving.world import Rover
 

@@ -91,6 +91,21 @@ def test_without_pivot_turns_it_leaves_the_way() -> None:
     assert max(driven_to_north) > 300
 
 
+@pytest.mark.parametrize(
+    ("profile", "changed"), [("ardupilot", {"SERVO1_FUNCTION": 26.0}), ("px4", {"CA_AIRFRAME": 5.0})]
+)
+def test_one_that_steers_like_a_car_turns_only_as_it_drives(profile: str, changed: dict[str, float]) -> None:
+    bench = Bench(profile, at=Pose(x=0.0, y=0.0, heading=0.0), seed=1, **changed)
+    chassis = bench.vehicle.rover.motion.chassis
+    for _ in range(100):
+        chassis.move(0.0, 1.0, 0.02)
+    assert chassis.heading == 0.0
+    for _ in range(500):
+        chassis.move(0.2, 1.0, 0.02)
+    assert abs(chassis.turning) == pytest.approx(abs(chassis.speed) / 0.9)
+    assert len(driven(Bench(profile, at=START, seed=1, **changed))) == len(CORNERS)
+
+
 def test_the_same_seed_drives_the_same_way() -> None:
     first, again, other = (driven(Bench("ardupilot", at=START, seed=seed)) for seed in (1, 1, 2))
     assert first == again != other
