@@ -12,6 +12,7 @@ import sqlite3
 import threading
 import uuid
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import msgspec
 
@@ -47,6 +48,15 @@ SETTLE_LIMIT_S = 30.0
 def new_boot_id() -> str:
     """What tells one start of a robot's program from every other."""
     return uuid.uuid4().hex[:12]
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """What an order leads to, if nothing has changed since of what it was decided by."""
+
+    run: Run
+    lease: Lease | None
+    decision: Decision | Refused
 
 
 class Controller:
@@ -145,20 +155,38 @@ class Controller:
     # Orders and missions, from the link's threads
 
     def obey(self, order: Order) -> Answer:
-        """Carry out an order once, however often it comes, and remember what was answered."""
+        """Carry out an order once, however often it comes, and remember what was answered.
+
+        Whether a robot may drive takes long to say of a long mission, and is weighed without the lock: a stop
+        must not wait for it. One that stops is decided at once.
+        """
+        while True:
+            weighed = None if order.verb in FREE_VERBS else self._weigh(order)
+            with self._lock:
+                before = self._unstored.answered(order) or answered(self._journal, order, self._run)
+                if before is not None:
+                    return before
+                if weighed is None:
+                    return self._decided(order, decide(order, self._situation()))
+                if (weighed.run, weighed.lease) == (self._run, self.lease):
+                    return self._decided(order, weighed.decision)
+
+    def _weigh(self, order: Order) -> Weighed:
+        """What an order would lead to as all is now."""
         with self._lock:
-            before = self._unstored.answered(order) or answered(self._journal, order, self._run)
-            if before is not None:
-                return before
-            decision = decide(order, self._situation())
-            answer = self._answer(order, decision)
-            try:
-                run = self._store_decision(order, decision, answer)
-            except sqlite3.OperationalError as error:
-                return self._obeyed_unstored(order, decision, error)
-            if isinstance(decision, Decision):
-                self._adopt(run, ordered=True)
-            return answer
+            run, mission, lease = self._run, self._mission, self.lease
+        return Weighed(run, lease, decide(order, self._situation_of(run, mission)))
+
+    def _decided(self, order: Order, decision: Decision | Refused) -> Answer:
+        """Store what was decided, and its answer, and let it be so."""
+        answer = self._answer(order, decision)
+        try:
+            run = self._store_decision(order, decision, answer)
+        except sqlite3.OperationalError as error:
+            return self._obeyed_unstored(order, decision, error)
+        if isinstance(decision, Decision):
+            self._adopt(run, ordered=True)
+        return answer
 
     def _store_decision(self, order: Order, decision: Decision | Refused, answer: Answer) -> Run:
         run = self._run
@@ -180,8 +208,11 @@ class Controller:
                 self._adopt(self._write(runs.held(self._run, reason)), ordered=True)
 
     def _situation(self) -> Situation:
+        return self._situation_of(self._run, self._mission)
+
+    def _situation_of(self, run: Run, mission: Mission | None) -> Situation:
         return situation_of(
-            self._journal, self._mission, run=self._run, pose=self._base.pose(), now_ns=self._clock.now_ns(),
+            self._journal, mission, run=run, pose=self._base.pose(), now_ns=self._clock.now_ns(),
             command_ns=self._command_clock.now_ns(), battery=self._base.battery(),
             endurance_s=self._base.endurance_s(), not_ready=self._base.not_ready(), boot_id=self.boot_id,
         )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from bridge.link.protocol import encode
 from mission.errors import AnswerIsNo, OutcomeUnknown
 from mission.events import STOPS_LISTED, TakenOver
 from mission.run.lease import LEASE_S, Lease, claimed
-from mission.run.orders import Refused, Verb
+from mission.run.orders import Answer, Refused, Verb
 from tests.bridge.world import Field, corridor
 
 ALICE = Lease(commander="alice", fence=3, until_ns=10_000_000_000)
@@ -248,3 +249,48 @@ def test_what_a_robot_has_done_and_cannot_be_told_is_unknown_not_unsent(
         monkeypatch.undo()
         with contextlib.suppress(OSError):
             full.close()
+
+
+def test_a_stop_does_not_wait_until_it_is_decided_whether_a_robot_may_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As of a mission of thousands of stops, whose schedule takes a second."""
+    field, weighing, go_on = Field(), threading.Event(), threading.Event()
+    field.station().push(corridor())
+
+    def endurance_s() -> float:
+        weighing.set()
+        assert go_on.wait(60)
+        return 1e6
+
+    monkeypatch.setattr(field.base, "endurance_s", endurance_s)
+    answers: list[Answer] = []
+    starting = threading.Thread(target=lambda: answers.append(field.order("start")))
+    starting.start()
+    assert weighing.wait(60)
+    monkeypatch.setattr(field.base, "endurance_s", lambda: 1e6)
+    stopping = threading.Thread(target=lambda: answers.append(field.order("abort")))
+    stopping.start()
+    stopping.join(60)
+    assert [answer.verb for answer in answers] == ["abort"]
+    go_on.set()
+    starting.join(60)
+    assert [answer.verb for answer in answers] == ["abort", "start"]
+
+
+def test_an_order_that_was_weighed_before_the_run_changed_is_weighed_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    field, given = Field(), iter(range(2))
+    field.station().push(corridor())
+    known = field.base.endurance_s
+
+    def endurance_s() -> float | None:
+        if next(given, None) == 0:  # somebody else starts it meanwhile
+            assert field.order("start").outcome == "ok"
+        return known()
+
+    monkeypatch.setattr(field.base, "endurance_s", endurance_s)
+    answer = field.order("start")
+    assert (answer.outcome, answer.reason) == ("refused", "wrong_state")
+    assert field.told().count("Started") == 1
