@@ -7,7 +7,6 @@ to, `commands` what each order does. This module is where they meet the robot, t
 from __future__ import annotations
 
 import contextlib
-import math
 import sqlite3
 import threading
 import uuid
@@ -19,17 +18,17 @@ import msgspec
 from bridge.link.clock import Clock
 from bridge.link.protocol import Commit, Rejected
 from bridge.robot.answers import answer_to, answered, remember_answer, situation_of
-from bridge.robot.base import Base, Rest, Scanner
+from bridge.robot.base import Base, Scanner
 from bridge.robot.journal import Journal
+from bridge.robot.mission_fitness import follows, weighed_by, why_unfit
 from bridge.robot.mission_reading import read_mission
+from bridge.robot.present_work import faces, has_work, label, moved, same_work
 from bridge.robot.runner import Position
 from bridge.robot.unstored import Unstored
-from mission.document import Mission, Stop
+from mission.document import Mission
 from mission.events import AnyEvent, Pose
-from mission.files.file_name import file_name
 from mission.run import revision, way
 from mission.run import states as runs
-from mission.run.battery import what_is_missing
 from mission.run.decision import Decision, Situation, decide, handed_over
 from mission.run.lease import Lease, claimed, lasting_ns
 from mission.run.orders import FREE_VERBS, Answer, Order, Refused
@@ -39,8 +38,6 @@ from mission.run.states import Change, Run
 from mission.tolerance import deviation, is_outside
 
 SETTLE_SAMPLE_S = 0.1
-FACING_RAD = math.radians(2)
-"""A robot that is turned by more goes on turning; every base stands truer than this."""
 SETTLE_LIMIT_S = 30.0
 """How much longer than `settle_s` a robot may take to stand still."""
 
@@ -130,7 +127,7 @@ class Controller:
         stop = runs.stop_of(run, self._mission)
         if stop is None or run.stop_state != "SCANNING":
             return None
-        return self._scanner.what_became(_label(run, stop))
+        return self._scanner.what_became(label(run, stop))
 
     def _mend_lease(self) -> None:
         """A lease from a time when the date was far ahead would last until then."""
@@ -229,9 +226,11 @@ class Controller:
         """
         while True:
             run, held = self.snapshot()
-            unfit = None if _follows(run, mission) else self._unfit(run, held, mission)
+            unfit = None
+            if not follows(run, mission):
+                unfit = why_unfit(mission, base=self._base, run=run, held=held, revisions=self._revisions)
             with self._lock:
-                if _weighed(run) == _weighed(self._run):
+                if weighed_by(run) == weighed_by(self._run):
                     return self._take(commit, mission, unfit)
 
     def _take(self, commit: Commit, mission: Mission, unfit: Refused | None) -> Rejected | None:
@@ -242,7 +241,7 @@ class Controller:
         )  # fmt: skip
         if isinstance(lease, Refused):
             return Rejected(reason=lease.reason, messages=(lease.message,))
-        known = _follows(self._run, mission)
+        known = follows(self._run, mission)
         refused = self._out_of_time(commit, known) or unfit
         if refused:
             return Rejected(reason=refused.reason, messages=(refused.message,))
@@ -279,31 +278,6 @@ class Controller:
         if not known and self._journal.nonce(commit.nonce) is not None:
             return Refused("replayed", "this commit was taken before, and another mission since; push again")
         return None
-
-    def _unfit(self, run: Run, held: Mission | None, mission: Mission) -> Refused | None:
-        """Why a mission cannot be taken: by this base, during the present run, or with this battery."""
-        unfit = self._base.unfit(mission)
-        if unfit:
-            return Refused("infeasible", unfit)
-        if run.over or held is None:
-            return self._too_long(mission, first=0)
-        return self._unfit_now(run, held, mission) or self._too_long(mission, first=run.at)
-
-    def _unfit_now(self, run: Run, held: Mission, mission: Mission) -> Refused | None:
-        """Why the run cannot go on by `mission` from the next stop on."""
-        if mission.id != held.id:
-            return Refused("running", f"the robot is {run.state} with mission {held.id}")
-        if self._revisions == "refuse":
-            return Refused("running", f"the robot is {run.state} and takes no revision during a run")
-        if run.homing and run.then != "PAUSED":
-            return Refused("running", "the robot is on its way home for good")
-        differs = revision.what_differs(run, held, mission)
-        return Refused("way_differs", f"revision {mission.revision}: {differs}") if differs else None
-
-    def _too_long(self, mission: Mission, *, first: int) -> Refused | None:
-        battery, endurance_s = self._base.battery(), self._base.endurance_s()
-        missing = what_is_missing(mission, battery=battery, endurance_s=endurance_s, first=first)
-        return Refused("infeasible", missing) if missing else None
 
     def hear_of_link(self, silent_s: float) -> None:
         """Told how long no station has been heard; the mission's policy may want something of it."""
@@ -380,7 +354,7 @@ class Controller:
         path = ((stop.x, stop.y),) if at_stop else way.forward(mission.stops[run.leg].approach, pose)
         outcome = "arrived"
         stands = at_stop and not is_outside(deviation(pose, stop), stop.tolerance_m)
-        if not (stands and _faces(pose, stop)):
+        if not (stands and faces(pose, stop)):
             heading = stop.heading if run.leg >= run.at else None
             outcome = self._base.goto(path, heading=heading, limits=mission.robot, interrupt=self._interrupt)
         here = self._base.pose()
@@ -418,7 +392,7 @@ class Controller:
 
     def _scan(self, run: Run, mission: Mission) -> None:
         stop = mission.stops[run.at]
-        result = self._scanner.scan(_label(run, stop), stop.scan, interrupt=self._interrupt)
+        result = self._scanner.scan(label(run, stop), stop.scan, interrupt=self._interrupt)
         self._advance(run, lambda now: runs.scan_ended(now, mission, result))
 
     def _verify(self, run: Run, mission: Mission) -> None:
@@ -545,48 +519,3 @@ WORK: dict[str, Callable[[Controller, Run, Mission], None]] = {
     "SCANNING": Controller._scan,
     "VERIFYING": Controller._verify,
 }
-
-
-def _faces(pose: Pose, stop: Stop) -> bool:
-    """Whether the robot has turned to the stop's heading; a pause may have ended its turn."""
-    return abs(math.remainder(pose.heading - stop.heading, math.tau)) <= FACING_RAD
-
-
-def _label(run: Run, stop: Stop) -> str:
-    """Names one scan, and no other, however often the stop is scanned."""
-    return f"{run.run_id}-{file_name(stop.id)}-{run.scans}"
-
-
-def _follows(run: Run, mission: Mission) -> bool:
-    """Whether this is the mission to be run already, now or from the next stop on."""
-    return run.mission_id == mission.id and mission.revision in (run.revision, run.next_revision)
-
-
-def _weighed(run: Run) -> tuple[object, ...]:
-    """What of a run decides whether a mission can be taken; a pause changes none of it."""
-    wanted = (run.mission_id, run.revision, run.next_revision)
-    return (*wanted, run.run_id, run.at, run.over, run.homing, run.then)
-
-
-def has_work(run: Run) -> bool:
-    """A paused robot still ends the scan it was in."""
-    if run.state == "PAUSED":
-        return run.stop_state in ("SCANNING", "VERIFYING")
-    return run.state in ("RUNNING", "HOMING")
-
-
-def same_work(then: Run, now: Run) -> bool:
-    """Whether what was begun in `then` still counts: nothing has changed, or the same scan goes on."""
-    if now is then:
-        return True
-    if now.next_revision != then.next_revision:  # a revision that waits changes nothing of the present work
-        return runs.changed(now, next_revision=then.next_revision) == then
-    scanning = then.stop_state == now.stop_state == "SCANNING"
-    return scanning and (then.run_id, then.at, then.attempt) == (now.run_id, now.at, now.attempt)
-
-
-def moved(before: Pose, after: Pose, rest: Rest) -> bool:
-    """Whether the robot moved by more than one that stands still seems to."""
-    if math.hypot(after.x - before.x, after.y - before.y) > rest.metres:
-        return True
-    return abs(math.remainder(after.heading - before.heading, math.tau)) > rest.radians

@@ -1,0 +1,52 @@
+"""Whether a robot can take a mission: by its base, during its present run, and with its battery."""
+
+from __future__ import annotations
+
+from bridge.robot.base import Base
+from mission.document import Mission
+from mission.run import revision
+from mission.run.battery import what_is_missing
+from mission.run.orders import Refused
+from mission.run.revision import RevisionPolicy
+from mission.run.states import Run
+
+
+def why_unfit(
+    mission: Mission, *, base: Base, run: Run, held: Mission | None, revisions: RevisionPolicy
+) -> Refused | None:
+    """Why a mission cannot be taken; `None` if it can. `held` is the mission of the run."""
+    unfit = base.unfit(mission)
+    if unfit:
+        return Refused("infeasible", unfit)
+    if run.over or held is None:
+        return _too_long(mission, base, first=0)
+    return _unfit_now(mission, run, held, revisions) or _too_long(mission, base, first=run.at)
+
+
+def _unfit_now(mission: Mission, run: Run, held: Mission, revisions: RevisionPolicy) -> Refused | None:
+    """Why the run cannot go on by `mission` from the next stop on."""
+    if mission.id != held.id:
+        return Refused("running", f"the robot is {run.state} with mission {held.id}")
+    if revisions == "refuse":
+        return Refused("running", f"the robot is {run.state} and takes no revision during a run")
+    if run.homing and run.then != "PAUSED":
+        return Refused("running", "the robot is on its way home for good")
+    differs = revision.what_differs(run, held, mission)
+    return Refused("way_differs", f"revision {mission.revision}: {differs}") if differs else None
+
+
+def _too_long(mission: Mission, base: Base, *, first: int) -> Refused | None:
+    battery, endurance_s = base.battery(), base.endurance_s()
+    missing = what_is_missing(mission, battery=battery, endurance_s=endurance_s, first=first)
+    return Refused("infeasible", missing) if missing else None
+
+
+def follows(run: Run, mission: Mission) -> bool:
+    """Whether this is the mission to be run already, now or from the next stop on."""
+    return run.mission_id == mission.id and mission.revision in (run.revision, run.next_revision)
+
+
+def weighed_by(run: Run) -> tuple[object, ...]:
+    """What of a run decides whether a mission can be taken; a pause changes none of it."""
+    wanted = (run.mission_id, run.revision, run.next_revision)
+    return (*wanted, run.run_id, run.at, run.over, run.homing, run.then)
