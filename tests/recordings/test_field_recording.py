@@ -16,7 +16,7 @@ import pytest
 from mission.__main__ import main
 from mission.document import Mission
 from mission.errors import InputError
-from mission.events import PoseReport, StateReport
+from mission.events import Pose, PoseReport, Scanned, StateReport
 from mission.run_log import Track
 from recordings import entities, pieces
 from recordings.compact import compact
@@ -101,6 +101,28 @@ def test_deviation_and_distance_from_the_route_are_plotted(field: Path) -> None:
     driving = [value[0] for time, value in beside.items() if 62 * NS < time < 67 * NS]
     assert driving == pytest.approx([1000 * run.OFFSET] * len(driving), abs=1e-3)
     assert driving
+
+
+def test_a_scan_from_outside_its_tolerance_is_told_by_log_report_and_plot(
+    tmp_path: Path, mission: Mission
+) -> None:
+    path, first = tmp_path / "field.rrd", mission.stops[0]
+    aside = Pose(x=first.x + 0.12, y=first.y, heading=first.heading)
+    with FieldRecording(path, mission) as recording:
+        for report in run.reports(mission):
+            moved = isinstance(report, Scanned) and report.stop == first.id
+            tell(recording, msgspec.structs.replace(report, pose=aside) if moved else report)
+    words = "120 mm beside its place (50 mm are tolerated)"
+    names = entities.RunEntities(run.RUN)
+    log = on(path, names.log, "TextLog:text", entities.MISSION_TIME)
+    levels = on(path, names.log, "TextLog:level", entities.MISSION_TIME)
+    (at,) = [time for time, (text,) in log.items() if words in text]
+    assert log[at][0].startswith(f"Scanned {first.id}") and levels[at] == ["WARN"]
+    reports = on(path, names.flat(entities.RUN_REPORT), "TextDocument:text", entities.MISSION_TIME)
+    final = reports[max(reports)][0]
+    assert f"| 120.0 | scanned {words} |" in final and "2 of 2 stops scanned" in final
+    deviation = on(path, f"{entities.METRIC_DEVIATION}/{run.RUN}", "Scalars:scalars", entities.MISSION_TIME)
+    assert deviation[at] == pytest.approx([120.0])
 
 
 def test_states_are_told_on_both_clocks(field: Path) -> None:
