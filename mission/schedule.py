@@ -6,8 +6,10 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+import numpy as np
+
 from mission.document import Mission, Point, RobotSpec
-from mission.geometry import frozen
+from mission.geometry import FloatArray, frozen
 from mission.planning import Schedule
 
 
@@ -57,3 +59,9 @@ def straight_time(length: float, *, speed: float, acceleration: float) -> float:
     if length >= speed**2 / acceleration:
         return length / speed + speed / acceleration
     return 2 * math.sqrt(length / acceleration)
+
+
+def straight_times(lengths: FloatArray, *, speed: float, acceleration: float) -> FloatArray:
+    """`straight_time` of many lengths at once, to the same last digit."""
+    short: FloatArray = 2 * np.sqrt(lengths / acceleration)
+    return np.where(lengths >= speed**2 / acceleration, lengths / speed + speed / acceleration, short)

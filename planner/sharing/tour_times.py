@@ -15,7 +15,7 @@ import numpy as np
 from mission.document import RobotSpec
 from mission.geometry import FloatArray, IntArray, frozen
 from mission.planning import Selection
-from mission.schedule import leg_times, straight_time, turn_time
+from mission.schedule import leg_times, straight_times, turn_time
 from mission.specs import robot_of
 from planner.routing import legs_between
 from planner.routing.legs import Legs
@@ -122,8 +122,7 @@ class TourTimes:
         Corners are counted on ways to the nearest points and to the starts only.
         """
         speed, acceleration = self.robot.speed, self.robot.acceleration
-        one = np.vectorize(lambda d: straight_time(d, speed=speed, acceleration=acceleration), otypes=[float])
-        times: FloatArray = one(self.legs.lengths)
+        times = straight_times(self.legs.lengths, speed=speed, acceleration=acceleration)
         for a, near in enumerate(self._near()):
             for b in (*near.tolist(), *self.starts):
                 if a != b:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from mission.document import Mission
-from mission.schedule import schedule, straight_time, turn_time
+from mission.schedule import schedule, straight_time, straight_times, turn_time
 from tests.mission.worlds import mission_of, square_tour, stop
 
 
@@ -23,6 +24,12 @@ def test_a_short_straight_is_a_triangle() -> None:
 def test_trapezoid_and_triangle_meet_where_speed_is_just_reached() -> None:
     short = straight_time(0.5 - 1e-12, speed=0.5, acceleration=0.5)
     assert short == pytest.approx(straight_time(0.5, speed=0.5, acceleration=0.5))
+
+
+def test_many_straights_take_what_each_takes() -> None:
+    lengths = np.concatenate([[0.0, 0.25, 0.5], np.random.default_rng(1).uniform(0, 3, 200)])
+    each = [straight_time(length, speed=0.5, acceleration=0.5) for length in lengths.tolist()]
+    assert straight_times(lengths, speed=0.5, acceleration=0.5).tolist() == each
 
 
 def test_a_turn_goes_the_short_way_round() -> None:
