@@ -53,13 +53,13 @@ def route(selection: Selection) -> Route:
     space = selection.visibility.candidates.space
     settings = space.settings
     router = variant("router", settings.router, ROUTERS)
-    points, ends = _points_and_ends(selection)
+    points, ends = points_and_ends(selection)
     ways = legs_between(space, points)
     if not np.isfinite(ways.lengths).all():
         raise AnswerIsNo(f"{space.floor.name}: the route's end is not connected with its stops")
     sequence, bound, method = _ordered(ways.lengths, ends, router, seed=settings.seed)
     method += "" if settings.graph == "exact" else f", over the ways of --graph {settings.graph}"
-    return _assembled(selection, points, ways, sequence, ends, bound, method)
+    return assembled(selection, points, ways, sequence, ends, bound, method)
 
 
 def legs_between(space: NavigableSpace, points: FloatArray) -> Legs:
@@ -68,7 +68,7 @@ def legs_between(space: NavigableSpace, points: FloatArray) -> Legs:
     return Legs(graph, graph.noun(graph.called(space, points), Ways), points)
 
 
-def _points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:
+def points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:
     """The stops, then the start and the end where they are given."""
     settings = selection.visibility.candidates.space.settings
     points, first, last = [*selection.xy], None, None
@@ -100,7 +100,15 @@ def check_place(candidates: Candidates, name: str, place: tuple[float, ...]) -> 
 
 def _stop_at_door(selection: Selection) -> tuple[int | None, str]:
     """The stop nearest the widest exterior door of the planned rooms, if there is one."""
-    candidates = selection.visibility.candidates
+    rank, reason = rank_at_door(selection.visibility.candidates, selection.chosen)
+    return (None if rank is None else int(np.argmin(rank))), reason
+
+
+def rank_at_door(candidates: Candidates, rows: IntArray) -> tuple[IntArray | None, str]:
+    """How near these rows are to the widest exterior door, 0 the nearest (n,), if there is one; in words.
+
+    Those in the door's room come first: a stop behind a wall may be nearer.
+    """
     space = candidates.space
     doors = [item for item in space.openings if item.why.startswith("exterior")]
     entered = {space.rooms[k].room for k in candidates.room[candidates.kept]} - {None}
@@ -108,11 +116,12 @@ def _stop_at_door(selection: Selection) -> tuple[int | None, str]:
     if not doors:
         return None, "the tour's best end"
     widest = max(doors, key=lambda item: (round(item.clear_width, 6), item.opening.id))
-    away = np.round(np.hypot(*(selection.xy - widest.opening.line.mean(axis=0)).T), 6)
-    rooms = candidates.room[candidates.kept[selection.chosen]]
-    behind = np.array([space.rooms[k].room in set(widest.rooms) - {None} for k in rooms])
-    order = np.lexsort((away, ~behind))  # a stop behind a wall may be nearer than one in the door's room
-    return int(order[0]), f"the stop nearest the widest exterior door, {widest.opening.id}"
+    at = candidates.kept[rows]
+    away = np.round(np.hypot(*(candidates.xy[at] - widest.opening.line.mean(axis=0)).T), 6)
+    behind = np.array([space.rooms[k].room in set(widest.rooms) - {None} for k in candidates.room[at]])
+    rank = np.empty(len(rows), dtype=np.int64)
+    rank[np.lexsort((away, ~behind))] = np.arange(len(rows))
+    return rank, f"the stop nearest the widest exterior door, {widest.opening.id}"
 
 
 def _ordered(
@@ -179,7 +188,7 @@ def _sequence(order: IntArray, ends: Ends, points: int) -> list[int]:
     return tour
 
 
-def _assembled(
+def assembled(
     selection: Selection,
     points: FloatArray,
     ways: Legs,
@@ -188,6 +197,7 @@ def _assembled(
     bound: float,
     method: str,
 ) -> Route:
+    """The route over points (stops first) in an order, with what no route over them is shorter than."""
     stops = len(selection.chosen)
     visited = [k for k in sequence if k < stops]
     places = [sequence[0], *visited[1 if sequence[0] < stops else 0 :]]
@@ -227,8 +237,11 @@ __all__ = [
     "Ends",
     "Graph",
     "Router",
+    "assembled",
     "check_place",
     "legs_between",
+    "points_and_ends",
+    "rank_at_door",
     "route",
     "tour_bound",
     "tour_matrix",

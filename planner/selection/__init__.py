@@ -153,9 +153,7 @@ def select_further(visibility: Visibility, done: IntArray) -> Selection:
     """
     settings = visibility.candidates.space.settings
     method = variant("selector", settings.selector, METHODS)
-    whole = cover_of(visibility, demands_of(visibility))
-    not_offered = np.union1d(done, visibility.candidates.extra_rows)
-    problem = whole.after(done).offering(np.setdiff1d(np.arange(whole.rows), not_offered))
+    whole, problem = left_by(visibility, done)
     rows, bound = _solved(method, problem, settings)
     both = np.concatenate([done, in_greedy_order(problem, rows)]).astype(np.int64)
     made = _selection(visibility, whole, both, len(done) + bound, method)
@@ -165,6 +163,13 @@ def select_further(visibility: Visibility, done: IntArray) -> Selection:
         coverage_steps=frozen(made.coverage_steps[len(done) :]),
         bound=bound,
     )
+
+
+def left_by(visibility: Visibility, done: IntArray) -> tuple[Cover, Cover]:
+    """The whole problem, and what the rows `done` leave of it to others."""
+    whole = cover_of(visibility, demands_of(visibility))
+    not_offered = np.union1d(done, visibility.candidates.extra_rows)
+    return whole, whole.after(done).offering(np.setdiff1d(np.arange(whole.rows), not_offered))
 
 
 def _solved(method: Variant[Selector], problem: Cover, settings: Settings) -> tuple[IntArray, int]:
@@ -211,4 +216,4 @@ def coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
     return np.array(steps)
 
 
-__all__ = ["METHODS", "Selector", "coverage_steps", "posed", "quick", "select", "select_further"]
+__all__ = ["METHODS", "Selector", "coverage_steps", "left_by", "posed", "quick", "select", "select_further"]
