@@ -67,10 +67,14 @@ class Parameter:
     option: str = ""
     """The option's name, where it is another. Such an option, as every list of lists, may be repeated."""
     quiet: bool = False
-    """Where it is undecided, missions do not tell of it, so that they stay what they were before it came."""
+    """Where it is as by default, missions do not tell of it: they stay what they were before it came."""
     name: str = ""
     type: Any = None
     default: Any = None
+
+    def left_out(self, value: Any) -> bool:
+        """Whether missions do not tell of this value."""
+        return self.quiet and bool(value == self.default)
 
     @property
     def meaning(self) -> str:

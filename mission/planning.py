@@ -352,6 +352,25 @@ class Selection:
         return frozen(candidates.xy[candidates.kept[self.chosen]].reshape(-1, 2))
 
 
+@dataclass(frozen=True)
+class LeastTime:
+    """What a route takes whose stops and order were chosen together, for the least time."""
+
+    seconds: float
+    """By the mission's schedule."""
+    two_step_s: float
+    """What fewest stops and then a shortest route over them would take …"""
+    two_step_stops: int
+    """… with so many stops."""
+    bound: float
+    """No plan over these candidates takes less."""
+
+    @property
+    def saved_s(self) -> float:
+        """What it takes less."""
+        return self.two_step_s - self.seconds
+
+
 @dataclass(frozen=True, eq=False)
 class Route:
     """The order of the stops and the way between them."""
@@ -371,6 +390,8 @@ class Route:
     bound: float
     """No route over these stops is shorter."""
     method: str
+    time: LeastTime | None = None
+    """None where stops were to be fewest."""
 
     @cached_property
     def length(self) -> float:
@@ -421,6 +442,7 @@ __all__ = [
     "TOO_SMALL",
     "UNREACHABLE",
     "Candidates",
+    "LeastTime",
     "NavigableSpace",
     "OpeningState",
     "Room",

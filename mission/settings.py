@@ -99,6 +99,13 @@ class Settings:
     graph: Annotated[str, _plan("exact, or grid (the paper's room grids)")] = "exact"
     den_grid_min: Annotated[float, _plan("Least nodes of a room's grid", "per m²", least=0)] = 0.5
     max_err_dist: Annotated[float, _plan("Stop to the grid's node that stands for it", "m", above=0)] = 0.5
+    minimise: Annotated[
+        Literal["stops", "time"],
+        _plan(
+            "What is made least: stops, then the way over them; or the mission's time",
+            quiet=True,
+        ),
+    ] = "stops"
     coverage: Annotated[
         float, _plan("Least share of all that is visible", above=0, most=1, why="0.9 is 90 %")
     ] = 0.9
@@ -394,7 +401,7 @@ def told_of(settings: Settings) -> dict[str, Any]:
     import msgspec
 
     told = msgspec.to_builtins(settings)
-    return {name: value for name, value in told.items() if value is not None or not PARAMETERS[name].quiet}
+    return {name: value for name, value in told.items() if not PARAMETERS[name].left_out(value)}
 
 
 def check_settings(settings: Settings) -> None:

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mission.division import DividedRoute
     from mission.floor import FloorPlan
     from mission.plan import PartPlan, Plan
-    from mission.planning import Candidates, NavigableSpace
+    from mission.planning import Candidates, NavigableSpace, Route, Selection
     from mission.settings import Settings
 
 Observe = Callable[[Any], None]
@@ -51,21 +52,40 @@ def plan(
 
 def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
     """Plan from candidates on; `planned` are all parts of the floor that the plan enters."""
-    from mission.plan import PartPlan
-    from planner.anywhere import SELECTOR, anywhere
-    from planner.appraisal.figures_of_route import figures_of
-    from planner.assemble import assemble
-    from planner.refine import refined
     from planner.routing import route
+
+    selection = _selected(found, observe)
+    settings = found.space.settings
+    driven = _in_least_time(route(selection)) if settings.minimise == "time" else None
+    observe(selection if driven is None else driven.selection)
+    return _part(driven or route(selection), number, planned, observe)
+
+
+def _selected(found: Candidates, observe: Observe) -> Selection:
+    """The fewest stops."""
+    from planner.anywhere import SELECTOR, anywhere
+    from planner.refine import refined
     from planner.selection import select
     from planner.visibility import visibility
 
     observe(found)
     seen = visibility(found)
     observe(seen)
-    selection = (anywhere if found.space.settings.selector == SELECTOR else refined)(select(seen))
-    observe(selection)
-    driven = route(selection)
+    return (anywhere if found.space.settings.selector == SELECTOR else refined)(select(seen))
+
+
+def _in_least_time(route: Route) -> Route:
+    from planner.covering_tour import in_least_time
+
+    return in_least_time(route)
+
+
+def _part(driven: Route, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
+    """The plan that drives a route."""
+    from mission.plan import PartPlan
+    from planner.appraisal.figures_of_route import figures_of
+    from planner.assemble import assemble
+
     observe(driven)
     figures = figures_of(driven, planned=planned)
     observe(figures)
@@ -84,10 +104,11 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
     from mission.plan import DividedPlan, PartPlan, Plan
     from planner.appraisal.figures_of_route import figures_of_share
     from planner.assemble import assemble
-    from planner.sharing.dividing import divided
 
-    whole = _plan_part(found, UNDIVIDED, planned, observe)
-    out = divided(whole.route)
+    selection = _selected(found, observe)
+    driven, out = _shared_out(selection)
+    observe(driven.selection)
+    whole = _part(driven, UNDIVIDED, planned, observe)
     shares = []
     for k, route in enumerate(out.routes):
         share = MissionShare(kind=out.kind, number=k + 1, of=len(out.routes))
@@ -96,6 +117,24 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
     made = DividedPlan(out.kind, whole, tuple(shares), out.limit_s, out.bound, out.method)
     observe(made)
     return Plan(made.shares, made)
+
+
+def _shared_out(selection: Selection) -> tuple[Route, DividedRoute]:
+    """The route over all stops, and how they are shared out.
+
+    For the least time it is done both with the route of least time and with that of fewest stops: what is
+    quicker for one robot need not be quicker shared out.
+    """
+    from planner.covering_tour import as_before
+    from planner.routing import route
+    from planner.sharing.dividing import divided, taken_by
+
+    driven = route(selection)
+    if selection.visibility.candidates.space.settings.minimise == "stops":
+        return driven, divided(driven)
+    quicker = _in_least_time(driven)
+    both = [(one, divided(one)) for one in (as_before(driven, quicker), quicker)]
+    return min(both, key=lambda one: taken_by(one[1]))
 
 
 def parts_to_plan(space: NavigableSpace) -> list[Candidates]:

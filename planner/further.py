@@ -28,6 +28,7 @@ from mission.settings import Settings
 from mission.specs import limits_spec_of
 from planner.assemble import assemble
 from planner.candidates import candidates
+from planner.covering_tour import in_least_time
 from planner.floors import options_of, read_floor
 from planner.routing import route
 from planner.selection import select_further
@@ -158,7 +159,10 @@ def top_up(
     selection = select_further(seen, done)
     if not len(selection.chosen):
         return None
-    mission = assemble(route(selection))
+    driven = route(selection)
+    if planned.settings.minimise == "time":
+        driven = in_least_time(driven, done=done)
+    mission = assemble(driven)
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
     once = replace(ledger_of(known.seen), asked=frozen([1], np.int64))
     alone = once.shares(_seen_by(_views(known.space, SightLines(known.space), stops), once))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,8 +14,9 @@ from mission.figures import Figures, Share, percent
 from mission.floor import Finding, Rank
 from mission.network import network_lines, network_table
 from mission.plan import PartPlan
+from mission.planning import Route
 from mission.schedule import schedule
-from mission.table import printable
+from mission.table import duration, printable
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +95,7 @@ class PlanReport:
                 "scan_s": times.scan_s,
                 "total_s": times.total_s,
             },
+            **time_told(self.part.route),
             "unreached": [
                 {"room": item.room, "why": item.why, "area_m2": item.area_m2}
                 for item in self.figures.unreached
@@ -131,6 +134,7 @@ class PlanReport:
             *self._way_lines(told["route"]),
             f"  time        {times['total_s'] / 60:.0f} min: drive {times['drive_s']:.0f} s, "
             f"turn {times['turn_s']:.0f} s, settle {times['settle_s']:.0f} s, scan {times['scan_s']:.0f} s",
+            *self._time_lines(),
             *quality_lines(figures),
             *network_lines(self.mission),
             *coverage_lines(figures),
@@ -148,8 +152,41 @@ class PlanReport:
             f"(no route is below {route['bound_m']:.1f} m), from {route['start']}"
         ]
 
+    def _time_lines(self) -> list[str]:
+        return time_lines(self.part.route)
+
     def _file_lines(self) -> list[str]:
         return [f"  {key:<11} {path}" for key, path in self.files.items()]
+
+
+def time_told(route: Route) -> dict[str, Any]:
+    """What was saved and what can be, for JSON; nothing where stops were to be fewest."""
+    time = route.time
+    if time is None:
+        return {}
+    return {
+        "least_time": {
+            "total_s": time.seconds,
+            "bound_s": time.bound,
+            "bound_over": "these candidates",
+            "two_step_s": time.two_step_s,
+            "two_step_stops": time.two_step_stops,
+            "saved_s": time.saved_s,
+        }
+    }
+
+
+def time_lines(route: Route, whose: str = "") -> list[str]:
+    """What was saved against fewest stops and then the shortest way, and what no plan is below."""
+    time = route.time
+    if time is None:
+        return []
+    before = f"{duration(time.two_step_s)} with {time.two_step_stops} stops"
+    saved = f"{duration(time.saved_s)} less than" if time.saved_s >= 0.5 else "not less than"
+    return [
+        f"  least time  {whose}{duration(time.seconds)}, {saved} by fewest stops first ({before}); "
+        f"no plan over these candidates takes less than {duration(math.floor(time.bound))}"
+    ]
 
 
 def quality_told(figures: Figures) -> dict[str, Any]:

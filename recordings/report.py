@@ -52,7 +52,10 @@ def plan_report(nouns: Nouns, origin: LocalOrigin) -> str:
     return "\n".join(lines)
 
 
-FIRST = ("stops", "stops_bound", "coverage", "coverage_required", "route_m", "route_bound_m", "planned_s")
+FIRST = (
+    *("stops", "stops_bound", "coverage", "coverage_required", "route_m", "route_bound_m"),
+    *("planned_s", "least_time_bound_s", "two_step_s"),
+)
 """What a reader looks for first."""
 
 
@@ -108,6 +111,18 @@ def _route(route: Route) -> dict[str, Any]:
         "tour": route.tour,
         "router": route.method,
         "begins_at": route.start_reason,
+        **_least_time(route),
+    }
+
+
+def _least_time(route: Route) -> dict[str, Any]:
+    time = route.time
+    if time is None:
+        return {}
+    return {
+        "least_time_bound_s": round(float(time.bound), 1),
+        "two_step_s": round(float(time.two_step_s), 1),
+        "two_step_stops": time.two_step_stops,
     }
 
 

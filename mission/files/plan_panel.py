@@ -74,6 +74,7 @@ def facts_of(
         ("Clearances", f"d_sec {settings.d_sec:g} m, robot {robot.radius:g} m, edge {settings.edge:g} m"),
         ("Route", _way(route, shared) + f", {robot.speed:g} m/s"),
         ("Planned time", _times([schedule(item).total_s for item in shared or (mission,)])),
+        *_least_time(route, shared),
         ("Made by", f"stopgo {mission.origin.stopgo}"),
     ]
 
@@ -123,6 +124,15 @@ def _times(seconds: list[float]) -> str:
     if len(seconds) == 1:
         return _time(seconds[0])
     return f"longest {_time(max(seconds))}, together {duration(sum(seconds))}"
+
+
+def _least_time(route: Route, shared: Sequence[Mission]) -> list[tuple[str, str]]:
+    """What choosing stops and tour together saved, and what no plan is below."""
+    time = route.time
+    if time is None or shared:
+        return []
+    told = f"{duration(time.saved_s)} saved, none below {duration(math.floor(time.bound))}"
+    return [("Least time", told)]
 
 
 def _required(share: float) -> str:

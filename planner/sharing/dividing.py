@@ -12,7 +12,9 @@ from mission.division import DividedRoute
 from mission.errors import AnswerIsNo, InputError
 from mission.geometry import IntArray, frozen, polyline_length
 from mission.planning import Route, Selection
+from mission.schedule import schedule
 from mission.settings import Settings
+from planner.assemble import assemble
 from planner.routing import Ends, check_place, tour_bound
 from planner.selection import coverage_steps
 from planner.selection.cover import cover_of
@@ -45,6 +47,12 @@ def divided(route: Route) -> DividedRoute:
     """
     settings = route.selection.visibility.candidates.space.settings
     return _fleet(route, settings) if settings.robots is not None else _shifts(route, settings)
+
+
+def taken_by(divided: DividedRoute) -> tuple[float, float]:
+    """What a division is judged by: the longest tour, or how many there are; then the time of all (s)."""
+    times = [schedule(assemble(route)).total_s for route in divided.routes]
+    return (max(times) if divided.kind == "robot" else float(len(times))), sum(times)
 
 
 def _fleet(route: Route, settings: Settings) -> DividedRoute:

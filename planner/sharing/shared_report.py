@@ -11,7 +11,7 @@ from mission.document import Mission
 from mission.plan import DividedPlan
 from mission.schedule import schedule
 from mission.table import duration
-from planner.report import PlanReport
+from planner.report import PlanReport, time_lines
 
 
 def shared_report(divided: DividedPlan, reports: Sequence[PlanReport]) -> SharedReport:
@@ -94,6 +94,9 @@ class SharedReport(PlanReport):
                 f"(at least {divided.bound:.0f} are needed; in one: {self._alone()})"
             )
         return [head, *map(self._line, self.reports), f"  route       {route['length_m']:.1f} m together"]
+
+    def _time_lines(self) -> list[str]:
+        return time_lines(self.divided.whole.route, "for one robot alone ")
 
     def _alone(self) -> str:
         return duration(schedule(self.divided.whole.mission).total_s)

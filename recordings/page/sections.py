@@ -75,7 +75,7 @@ def _plan_tiles(subject: ReportSubject) -> str:
         tile("stops", str(len(mission.stops)), _bound(subject)),
         tile("coverage", percent(None if share is None else share.coverage), visible),
         tile("route", f"{route_length(mission):.1f} m", "back to the start" if mission.return_ else "open"),
-        tile("run time", duration(times.total_s), f"of which scanning {duration(times.scan_s)}"),
+        tile("run time", duration(times.total_s), _least_time(subject, times.scan_s)),
     ]
     return tag("div", *tiles, class_="tiles")
 
@@ -84,6 +84,16 @@ def _bound(subject: ReportSubject) -> str:
     bound, over = (subject.results.get(name) for name in ("stops_bound", "stops_bound_over"))
     among = f"of {over} " if over else ""  # else of the plan's candidates
     return "" if bound is None else f"{among}at least {bound} are needed"
+
+
+def _least_time(subject: ReportSubject, scan_s: float) -> str:
+    """How much of it is scanning; of a plan for the least time also what no plan is below."""
+    bound, before = subject.results.get("least_time_bound_s"), subject.results.get("two_step_s")
+    if bound is None or before is None:
+        return f"of which scanning {duration(scan_s)}"
+    return (
+        f"scanning {duration(scan_s)}; at least {duration(bound)}; {duration(before)} by fewest stops first"
+    )
 
 
 def _plan_tables(subject: ReportSubject) -> str:

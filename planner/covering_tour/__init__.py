@@ -1,0 +1,81 @@
+"""Route -> route: stops and their order chosen together, so that driving, turning and scanning take least.
+
+The covering tour problem (Gendreau, Laporte and Semet, Operations Research 1997): a tour over some of the
+places, from which enough is seen. From the fewest stops and the shortest route over them on, stops are
+exchanged, left out and added, and stretches turned round, by the time that the route then takes. By the
+mission's own schedule the route is never slower than the one that it began with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mission.geometry import IntArray, frozen
+from mission.planning import LeastTime, Route, Selection
+from mission.schedule import schedule
+from planner.assemble import assemble
+from planner.covering_tour.least_time_bound import least_time
+from planner.covering_tour.problem import TourProblem, problem_of
+from planner.covering_tour.search import shorter_line
+from planner.covering_tour.timed_line import PointLine
+from planner.routing import assembled, legs_between, points_and_ends, tour_bound
+from planner.selection import coverage_steps
+from planner.selection.greedy import in_greedy_order
+
+METHOD = "stops and tour together, by tabu search"
+
+
+def in_least_time(route: Route, *, done: IntArray | None = None) -> Route:
+    """The route with its stops and their order chosen for the least time, and what no plan is below.
+
+    Rows `done` see what they see already, and are not driven to.
+    """
+    problem = problem_of(route, done)
+    found = _driven(route, problem, shorter_line(problem.times, problem.task, problem.line))
+    two_step_s, seconds = _seconds(route), _seconds(found)
+    best = found if seconds < two_step_s else route
+    bound = max(0.0, min(seconds, two_step_s, least_time(problem.asked)))
+    return replace(best, time=LeastTime(min(seconds, two_step_s), two_step_s, len(route.order), bound))
+
+
+def as_before(two_step: Route, quicker: Route) -> Route:
+    """The route of fewest stops, with what is known of its time from the quicker one."""
+    told = quicker.time
+    return two_step if told is None else replace(two_step, time=replace(told, seconds=told.two_step_s))
+
+
+def _seconds(route: Route) -> float:
+    """What the route takes, by its mission's schedule."""
+    return schedule(assemble(route)).total_s
+
+
+def _driven(route: Route, problem: TourProblem, line: PointLine) -> Route:
+    """The route that drives a line."""
+    stops = problem.stops_of(line)
+    selection = _selected(route.selection, problem, np.array(stops, dtype=np.int64))
+    place = {int(row): k for k, row in enumerate(selection.chosen)}
+    points, ends = points_and_ends(selection)
+    order = [place[int(problem.rows[stop])] for stop in stops]
+    ends = replace(ends, first=order[0] if ends.first is not None and ends.first < len(order) else ends.first)
+    first = [ends.first] if ends.first is not None and ends.first >= len(order) else []
+    last = [ends.last] if ends.last is not None else []
+    sequence = [*first, *order, *last]
+    legs = legs_between(selection.visibility.candidates.space, points)
+    bound = tour_bound(legs.lengths, sequence, ends)
+    return assembled(selection, points, legs, sequence, ends, bound, METHOD)
+
+
+def _selected(before: Selection, problem: TourProblem, stops: IntArray) -> Selection:
+    """The selection of these stops, in the order in which they add to what is seen."""
+    stay = problem.task.stays[stops]
+    others = in_greedy_order(problem.task.cover, np.sort(stops[~stay]))
+    rows = problem.rows[np.concatenate([np.sort(stops[stay]), others]).astype(np.int64)]
+    steps = coverage_steps(problem.whole, np.concatenate([problem.done, rows]))[len(problem.done) :]
+    fewest = ", proved fewest" if len(rows) == before.bound and "proved fewest" in before.method else ""
+    method = f"{before.method.partition(', proved fewest')[0]}, then with the tour{fewest}"
+    return replace(before, chosen=frozen(rows, np.int64), coverage_steps=frozen(steps), method=method)
+
+
+__all__ = ["as_before", "in_least_time"]

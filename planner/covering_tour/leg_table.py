@@ -1,0 +1,125 @@
+"""Ways between all points, with the time that each takes, in whole microseconds as a search adds them up.
+
+A heading is told as the microseconds that turning to it takes from +x on, so that turns are differences.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.csgraph import dijkstra
+
+from mission.document import RobotSpec
+from mission.geometry import FloatArray, IntArray, frozen
+from mission.schedule import straight_times, turn_time
+from planner.routing.legs import Legs
+from planner.routing.ways import Ways
+from planner.shapes import SLACK
+
+MICROSECONDS = 1e6
+"""Per second."""
+NO_HEADING = -1
+"""Where nothing is driven, or it does not matter whence or whither."""
+NO_WAY_S = 1e9
+"""Between points that no way joins."""
+SOURCES = 128
+"""Points from which ways are followed at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class LegTable:
+    """What the ways between points take, and how they begin and end (points, points)."""
+
+    spent: IntArray
+    """Microseconds of a way from rest to rest, with the turns at its own corners."""
+    leaving: IntArray
+    """Heading with which a way begins …"""
+    arriving: IntArray
+    """… and ends."""
+    whole_turn: int
+    """Microseconds that a turn all round would take."""
+
+    def turns(self, a: IntArray, b: IntArray) -> IntArray:
+        """Microseconds to turn from headings to others, the short way round; 0 where there is none."""
+        apart = np.abs(a - b)
+        least: IntArray = np.where((a < 0) | (b < 0), 0, np.minimum(apart, self.whole_turn - apart))
+        return least
+
+    def heading(self, radians: float) -> int:
+        """A heading in this table's unit."""
+        return round(radians / math.tau * self.whole_turn) % self.whole_turn
+
+
+def leg_table(legs: Legs, robot: RobotSpec) -> LegTable:
+    """The table of all ways between the points of `legs`.
+
+    Of a graph that is another's the ways are taken to be straight: only their lengths are at hand.
+    """
+    whole_turn = round(2 * turn_time(math.pi, turn_rate=robot.turn_rate) * MICROSECONDS)
+    if legs.graph.ours:
+        seconds, leaving, arriving = _followed(legs.ways, len(legs.points), robot)
+    else:
+        step = legs.points[None, :, :] - legs.points[:, None, :]
+        seconds = straight_times(legs.lengths, speed=robot.speed, acceleration=robot.acceleration)
+        leaving = arriving = np.arctan2(step[..., 1], step[..., 0])
+    driven = legs.lengths > 0
+    seconds = np.where(np.isfinite(legs.lengths), seconds, NO_WAY_S)
+    told = [
+        np.rint(angle / math.tau * whole_turn).astype(np.int64) % whole_turn for angle in (leaving, arriving)
+    ]
+    return LegTable(
+        spent=frozen(np.where(driven, np.rint(seconds * MICROSECONDS), 0), np.int64),
+        leaving=frozen(np.where(driven, told[0], NO_HEADING), np.int64),
+        arriving=frozen(np.where(driven, told[1], NO_HEADING), np.int64),
+        whole_turn=whole_turn,
+    )
+
+
+def _followed(ways: Ways, count: int, robot: RobotSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Seconds (n, n) of the ways between the first points, and headings at their beginnings and ends."""
+    seconds, leaving, arriving = (np.zeros((count, count)) for _ in range(3))
+    for first in range(0, count, SOURCES):
+        source = np.arange(first, min(count, first + SOURCES))
+        before = dijkstra(ways.graph, False, source, return_predecessors=True)[1]
+        start, end = np.nonzero(source[:, None] < np.arange(count)[None, :])
+        found = _back(ways.xy, before, source, start, end, robot)
+        for table, values in zip((seconds, leaving, arriving), found, strict=True):
+            table[source[start], end] = values
+    for table, other in ((seconds, seconds), (leaving, arriving), (arriving, leaving)):
+        low = np.tril_indices(count, -1)
+        table[low] = other.T[low] + (0.0 if table is seconds else math.pi)
+    return seconds, leaving, arriving
+
+
+def _back(
+    xy: FloatArray, before: IntArray, source: IntArray, start: IntArray, end: IntArray, robot: RobotSpec
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Of ways (k,) from `source[start]` to `end`, followed from their ends: seconds, first and last heading.
+
+    Pieces in one line are one, as they are driven.
+    """
+    count = len(start)
+    seconds, run, heading, last = (np.zeros(count) for _ in range(4))
+    here, going = end.copy(), np.arange(count)
+    first_piece = True
+    while len(going):
+        there = before[start[going], here[going]]
+        step = xy[here[going]] - xy[np.maximum(there, 0)]
+        length, angle = np.hypot(*step.T), np.arctan2(step[:, 1], step[:, 0])
+        length[there < 0] = 0.0
+        if first_piece:
+            last[going], heading[going] = angle, angle
+            first_piece = False
+        turn = np.abs(np.remainder(heading[going] - angle + math.pi, math.tau) - math.pi)
+        bends = turn * np.minimum(length, run[going]) > SLACK
+        bent = going[bends]
+        seconds[bent] += straight_times(run[bent], speed=robot.speed, acceleration=robot.acceleration)
+        seconds[bent] += turn[bends] / robot.turn_rate
+        run[going] = np.where(bends, 0.0, run[going]) + length
+        heading[going] = np.where(bends, angle, heading[going])
+        here[going] = there
+        going = going[(there >= 0) & (there != source[start[going]])]
+    seconds += straight_times(run, speed=robot.speed, acceleration=robot.acceleration)
+    return seconds, heading, last

@@ -1,0 +1,17 @@
+"""Small floors are done with after a few steps of the search."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+import planner.covering_tour.search
+from tests.faults.sizes import size
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _few_steps() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(planner.covering_tour.search, "STEPS", size(short=60, full=400))
+        yield
