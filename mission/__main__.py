@@ -28,7 +28,7 @@ COMPLETING = "_STOPGO_COMPLETE"
 """Set by the shell's completion that `--install-completion` sets up."""
 
 EXTRAS = {
-    "shapely": "plan", "scipy": "plan", "ezdxf": "plan", "highspy": "plan",
+    "shapely": "plan", "scipy": "plan", "networkx": "plan", "ezdxf": "plan", "highspy": "plan",
     "numba": "plan", "pyproj": "plan", "ifcopenshell": "bim",
     "rerun": "record", "rosbags": "record", "pyulog": "record",
     "laspy": "clouds", "pye57": "clouds", "reportlab": "plan",

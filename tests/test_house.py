@@ -221,7 +221,7 @@ def test_what_a_run_is_knows_no_clock_no_disk_and_no_line(name: str) -> None:
 
 @pytest.mark.parametrize("statement", ["import mission, bridge", "import planner, recordings"])
 def test_importing_a_folder_loads_nothing_slow(statement: str) -> None:
-    slow = {"shapely", "scipy", "rerun", "numba", "ezdxf", "highspy", "pyarrow", "pyproj"}
+    slow = {"shapely", "scipy", "rerun", "numba", "ezdxf", "networkx", "highspy", "pyarrow", "pyproj"}
     code = f"{statement}; import sys; print(*sorted({slow} & set(sys.modules)))"
     assert run(sys.executable, "-c", code).split() == []
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import heapq
 from dataclasses import dataclass
 
+import networkx as nx
 import numpy as np
 
 from mission.geometry import FloatArray, IntArray
@@ -119,23 +120,10 @@ def _fixed(low: IntArray, high: IntArray, edge: int, times: int) -> tuple[IntArr
 
 def _better(cost: IntArray, edges: IntArray, known: Proof) -> Proof:
     """The tour made of `edges` if it is one and shorter than the best one known."""
-    order = ring(edges, len(cost))
-    if order is None:
+    graph = nx.Graph(edges.tolist())
+    ring = nx.is_connected(graph) and len(graph) == len(cost) and all(d == 2 for _, d in graph.degree)
+    if not ring:
         return known
+    order = np.array([a for a, _ in nx.find_cycle(graph, 0)], dtype=np.int64)
     length = length_of(cost, order)
     return Proof(order, length, known.bound) if length < known.length else known
-
-
-def ring(edges: IntArray, count: int) -> IntArray | None:
-    """All points in the order of the one ring that edges (n, 2) make, from 0; None where they make none."""
-    near: dict[int, dict[int, None]] = {point: {} for point in range(count)}
-    for a, b in edges.tolist():
-        near[a][b] = near[b][a] = None
-    if any(len(beside) != 2 for beside in near.values()):
-        return None
-    before, here, order = 0, next(iter(near[0])), [0]
-    while here != 0:
-        order.append(here)
-        one, other = near[here]
-        before, here = here, other if one == before else one
-    return np.array(order, dtype=np.int64) if len(order) == count else None

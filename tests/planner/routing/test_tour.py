@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from itertools import pairwise, permutations
 
-import networkx as nx
 import numpy as np
 import pytest
 
 from mission.errors import InputError
 from planner.routing import Ends, far_edge, tour_matrix
 from planner.routing.cuts import violated_cuts
-from planner.routing.proof import proved, ring
+from planner.routing.proof import proved
 from planner.routing.subsets import best_of_all
 from planner.routing.tour import (
     canonical,
@@ -142,22 +141,6 @@ def test_branching_proves_what_comparing_all_tours_finds(lengths, monkeypatch: p
                 proof = proved(cost, poor)
             assert proof.closed
             assert proof.bound <= shortest <= proof.length <= shortest + 1_000
-
-
-@pytest.mark.parametrize("n", range(3, 9))
-def test_edges_are_a_tour_where_they_are_one_ring_of_all_points(n: int) -> None:
-    for seed in range(20):
-        order = np.random.default_rng(seed).permutation(n)
-        edges = np.column_stack([order, np.roll(order, -1)])
-        graph = nx.Graph(edges.tolist())
-        tour = ring(edges, n)
-        assert tour is not None
-        assert tour.tolist() == [point for point, _ in nx.find_cycle(graph, 0)]
-        beside = np.concatenate([edges, edges + n])
-        pinched = np.concatenate([edges, [[order[0], order[2]]]])
-        assert ring(beside, 2 * n) is None
-        assert ring(edges[1:], n) is None
-        assert n == 3 or ring(pinched, n) is None
 
 
 @pytest.mark.parametrize("n", [13, 20, 35, 50])
