@@ -5,6 +5,7 @@ from __future__ import annotations
 import lzma
 import sqlite3
 import struct
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -122,15 +123,22 @@ def _plain(file: Path, folder: Path) -> Path:
 
 @contextmanager
 def _damage_told() -> Iterator[None]:
+    try:
+        yield
+    except _damage() as error:
+        raise Damaged(_reason(error)) from error
+
+
+def _damage() -> tuple[type[Exception], ...]:
+    """What reading a damaged file raises; of rosbags' own SQLite, too, where it has come with one."""
     from rosbags.highlevel import AnyReaderError
     from rosbags.rosbag1 import ReaderError as Error1
     from rosbags.rosbag2 import ReaderError as Error2
     from rosbags.typesys import TypesysError
 
-    try:
-        yield
-    except (AnyReaderError, Error1, Error2, TypesysError, *LOW_LEVEL) as error:
-        raise Damaged(_reason(error)) from error
+    apsw = sys.modules.get("apsw")
+    of_database = () if apsw is None else (apsw.Error,)
+    return (AnyReaderError, Error1, Error2, TypesysError, *LOW_LEVEL, *of_database)
 
 
 LOW_LEVEL = (

@@ -69,6 +69,17 @@ def test_a_log_that_is_cut_off_gives_what_is_there_and_says_so(tmp_path: Path, n
     assert np.allclose(log.poses[0].xy, np.array(long)[which, :2])
 
 
+@pytest.mark.parametrize("page", [40, 60, 61])
+def test_a_database_with_a_damaged_page_gives_the_rest_and_says_so(tmp_path: Path, page: int) -> None:
+    long = [(0.01 * k, 0.0, 0.0) for k in range(400)]
+    data = bytearray(only_file(written(tmp_path, "a.db3", long)).read_bytes())
+    begin = page * int.from_bytes(data[16:18], "big") + 200
+    data[begin : begin + 30] = bytes(30)
+    (tmp_path / "damaged.db3").write_bytes(data)
+    log = read_log(tmp_path / "damaged.db3")
+    assert 0.9 * len(long) < len(log.poses[0].ns) <= len(long)
+
+
 @pytest.mark.parametrize("name", CONTAINERS)
 def test_nothing_readable_is_refused_by_name(tmp_path: Path, name: str) -> None:
     whole = only_file(written(tmp_path, name)).read_bytes()
