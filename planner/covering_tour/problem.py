@@ -147,9 +147,11 @@ class TourProblem:
 
     @cached_property
     def asked(self) -> RouteAsked:
-        """The same problem for its bound, over all candidates that a stop may be at."""
+        """The same problem for its bound, over all candidates; where there are too many, the stops alone."""
         settings = self.settings
         rows = np.union1d(self.offered, self.stays).astype(np.int64)
+        if len(rows) > MOST_BOUNDED:
+            return self._stops_alone
         start = len(rows) if settings.start is not None else None
         end = len(rows) + (start is not None) if settings.end is not None else None
         lengths, seconds = self._ways_over(rows)
@@ -168,6 +170,23 @@ class TourProblem:
             robot=robot_of(settings),
         )
 
+    @property
+    def _stops_alone(self) -> RouteAsked:
+        """The problem as if all places were one."""
+        settings, none = self.settings, np.zeros((1, 1))
+        return RouteAsked(
+            lengths=none,
+            seconds=none,
+            offered=np.arange(1),
+            zones=[],
+            start=None,
+            end=None,
+            closed=False,
+            stops=self.route.selection.bound,
+            pause_s=settings.settle + settings.scan_time,
+            robot=robot_of(settings),
+        )
+
     def _ways_over(self, rows: IntArray) -> tuple[FloatArray, FloatArray]:
         """Metres and seconds between rows, start and end; of very many rows as the crow flies."""
         given = len(self._ends) - (self.begin is not None)
@@ -176,9 +195,7 @@ class TourProblem:
             seconds = self.times.table.spent[:points, :points] / MICROSECONDS
             return self.legs.lengths[:points, :points], seconds
         xy = np.concatenate([self.candidates.xy[self.candidates.kept[rows]], self._ends[:given]])
-        if len(rows) > MOST_BOUNDED:
-            xy = np.zeros_like(xy)
-        lengths = np.hypot(*(xy[:, None, :] - xy[None, :, :]).transpose(2, 0, 1))
+        lengths = np.hypot(*(np.subtract.outer(axis, axis) for axis in xy.T))
         robot = robot_of(self.settings)
         return lengths, straight_times(lengths, speed=robot.speed, acceleration=robot.acceleration)
 

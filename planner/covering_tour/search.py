@@ -73,7 +73,8 @@ class _Search:
         self._board = Board(task.cover, [p for p in self._places(self._line) if not task.stays[p]])
         self.best, self._least = self._line, times.total(self._line)
         start = max(1, self._least * SCALE // max(1, int(task.cover.needed.max(initial=1))))
-        self._dearest, self._cheapest = start * RANGE, max(1, start // RANGE)
+        most = NEVER // max(1, int(task.cover.needed.sum()))  # so that no sum of costs leaves 64 bits
+        self._dearest, self._cheapest = min(start * RANGE, most), max(1, min(start // RANGE, most))
         self._board.weight = np.full(len(task.cover.needed), start, dtype=np.int64)
         self._left: list[int] = []
         self._made = 0

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import planner.covering_tour.problem
 from mission.planning import Route
 from mission.schedule import leg_times, schedule, turn_time
 from mission.settings import Settings
@@ -272,6 +273,19 @@ def test_scans_that_are_to_register_still_do() -> None:
     pieces = [len(pieces_of(links, one.selection.chosen)) for one in (driven, made)]
     assert pieces[1] <= pieces[0]
     assert made.time is not None and made.time.seconds <= made.time.two_step_s
+
+
+@pytest.mark.parametrize("bounded", [5, 5000])
+def test_of_very_many_candidates_the_nearest_are_tried_and_the_bound_is_lower(
+    bounded: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    every = joint("rooms", 2).time
+    monkeypatch.setattr(planner.covering_tour.problem, "MOST_PLACES", 8)
+    monkeypatch.setattr(planner.covering_tour.problem, "MOST_BOUNDED", bounded)
+    some = in_least_time(two_step("rooms", 2)).time
+    assert every is not None and some is not None
+    assert 0 < some.bound <= every.bound
+    assert some.seconds <= some.two_step_s
 
 
 def test_one_stop_stays_one() -> None:
