@@ -22,7 +22,8 @@ from planner.covering_tour.zones import Zone, zones_of
 from planner.overlap import links_of
 from planner.routing import legs_between, rank_at_door
 from planner.routing.legs import Legs
-from planner.selection import left_by, posed
+from planner.selection import METHODS, left_by, posed
+from planner.selection.bound import lower_bound
 from planner.selection.cover import Cover
 from planner.selection.hanging_together import JoinedCover
 
@@ -165,10 +166,18 @@ class TourProblem:
             start=start,
             end=end,
             closed=self.closed,
-            stops=self.route.selection.bound,
+            stops=self._fewest,
             pause_s=settings.settle + settings.scan_time,
             robot=robot_of(settings),
         )
+
+    @cached_property
+    def _fewest(self) -> int:
+        """How many stops there are at least; what another's selector says of it is not taken for proved."""
+        selection = self.route.selection
+        if self.settings.selector in METHODS:
+            return selection.bound
+        return len(self.stays) + lower_bound(self.cover, found=len(selection.chosen) - len(self.stays))
 
     @property
     def _stops_alone(self) -> RouteAsked:
@@ -182,7 +191,7 @@ class TourProblem:
             start=None,
             end=None,
             closed=False,
-            stops=self.route.selection.bound,
+            stops=self._fewest,
             pause_s=settings.settle + settings.scan_time,
             robot=robot_of(settings),
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import redirect_stdout
+from dataclasses import replace
 from functools import cache
 from io import StringIO
 from pathlib import Path
@@ -135,6 +136,22 @@ def test_a_further_mission_is_for_the_least_time_too() -> None:
         found[what] = further
     assert found["time"].origin.parameters["minimise"] == "time"
     assert found["time"].stops
+
+
+def all_and_sure(cover: Any, settings: Settings) -> tuple[Any, int]:
+    """A selector that takes every candidate, and says that no fewer will do."""
+    return np.arange(cover.rows), cover.rows
+
+
+def test_a_bound_that_another_selector_claims_is_not_believed() -> None:
+    floor = hall(8.0, 6.0, column("c", 4.0, 3.0, 0.8))
+    selector = f"{__name__}:all_and_sure"
+    settings = Settings(range=5.0, d_dis=0.2, grid=1.5, selector=selector, minimise="time", refine=False)
+    found = plan(floor, settings)
+    plain = plan(floor, replace(settings, selector="default"))
+    assert found.route.time is not None and plain.route.time is not None
+    assert found.route.time.bound == pytest.approx(plain.route.time.bound)
+    assert found.route.time.bound < found.route.time.seconds
 
 
 @pytest.mark.parametrize(
