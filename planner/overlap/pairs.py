@@ -20,8 +20,14 @@ from planner.visibility.runs import ranges
 
 LEVER_M = 0.01 / math.radians(0.1)
 """A turn counts as the way it makes at this distance: 0.1° as much as 1 cm, what is allowed of each."""
+LEAST_STRETCH_M = 0.35
+"""Narrower stretches seen by both do not count, such as the jambs of a door: where points are thinned to one
+per 7.5 cm they have no direction of their own, and a long wall beside them outweighs them."""
 DIGITS = 6
 """Figures of a pair are whole micrometres and millionths, so that both ends of a pair have the same."""
+
+
+EPSILON_M = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +95,7 @@ class Overlaps:
         there, mine = self._order[ranges(begin, counts)], np.repeat(own, counts)
         low = np.maximum(seen.begin[mine], seen.begin[there])
         high = np.minimum(seen.end[mine], seen.end[there])
-        both = (high > low) & (self._row[there] != row)
+        both = (high - low > LEAST_STRETCH_M - EPSILON_M) & (self._row[there] != row)
         return there[both], low[both], high[both]
 
     def _pairs(self, row: int, *, first: int) -> Pairs:

@@ -98,3 +98,14 @@ def test_a_pair_is_the_same_from_both_ends(name: str) -> None:
     links = links_of(found)
     assert (links != links.T).nnz == 0
     assert not links.diagonal().any()
+
+
+@pytest.mark.parametrize(("deep", "holds"), [(0.2, False), (0.4, True)])
+def test_what_is_too_narrow_to_have_a_direction_holds_nothing(deep: float, holds: bool) -> None:
+    """A wall 20 m long and a pillar on it: its sides face along the wall, and nothing else does."""
+    pillar = wall("p", box(29.5, 10 - deep, 30.5, 10))
+    floor = floor_of(box(0, 0, 60, 10), elements=(wall("w", box(0, 10, 60, 10.2)), pillar))
+    settings = replace(SETTINGS, overlap_range=15.0)
+    pairs = overlaps_of(standing(floor, settings, (26, 5), (27, 4))).of(0)
+    assert pairs.common_m[0] > 15
+    assert bool(pairs.hold_m[0] > 0.05) == holds
