@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import msgspec
+from msgspec.structs import replace
 
 from mission.document import Mission, Overlap
 from mission.figures import percent
@@ -47,6 +48,11 @@ class Network:
                 taken.append(overlap)
         return taken[-1] if taken else None
 
+    def renamed(self, names: Mapping[str, str]) -> Network:
+        """The same with other names for all stops."""
+        pairs = (replace(item, a=names[item.a], b=names[item.b]) for item in self.overlaps)
+        return Network(tuple(names[stop] for stop in self.stops), tuple(pairs))
+
     def among(self, stops: Collection[str]) -> Network:
         """What is left of it where only these stops were scanned."""
         return Network(
@@ -76,9 +82,8 @@ def apart_in_words(mission: Mission, acquired: Collection[str]) -> str:
     return f"the scans fall into {len(left.pieces)} pieces{told}: apart from the others {pieces}"
 
 
-def network_table(mission: Mission) -> dict[str, Any]:
-    """The network for JSON, under its key; nothing where the mission has none."""
-    network = network_of(mission)
+def network_table(network: Network | None) -> dict[str, Any]:
+    """The network for JSON, under its key; nothing where there is none."""
     if network is None:
         return {}
     table = {
@@ -90,9 +95,8 @@ def network_table(mission: Mission) -> dict[str, Any]:
     return {"network": table}
 
 
-def network_lines(mission: Mission) -> list[str]:
+def network_lines(network: Network | None) -> list[str]:
     """The network for a terminal: pieces, the weakest pair, and pairs that nothing stands in for."""
-    network = network_of(mission)
     if network is None:
         return []
     number, pairs = len(network.pieces), len(network.overlaps)

@@ -7,6 +7,7 @@ from typing import Any
 
 import msgspec
 
+from mission.document import MissionShare
 from mission.figures import percent
 from mission.plan_proof import (
     ALLOWED_SHARE,
@@ -141,6 +142,8 @@ def network_words(proof: PlanProof) -> list[str]:
     """Whether the scans join, and where they do not."""
     network = proof.network
     joins = "all scans join" if network.closed else f"the scans fall into {len(network.pieces)} pieces"
+    if isinstance(share := proof.mission.share, MissionShare):
+        joins = f"of this mission, one of {share.of}, {joins}"
     told = [f"{joins}: {network.registered} of {len(network.pairs)} pairs that share surfaces register"]
     if network.closing_m is not None:
         told.append(

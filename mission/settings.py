@@ -464,11 +464,6 @@ def _check_division(settings: Settings) -> None:
             f"robots = {settings.robots}: no robot has a start; give --start X,Y,HEADING once for all, "
             "or once for each"
         )
-    if settings.overlap:
-        raise InputError(
-            f"overlap = {settings.overlap:g}: is not done with {what}: pairs of scans are told within one "
-            "mission; leave one of them out"
-        )
     if settings.end is not None:
         raise InputError(f"end and {what} are both given; leave one of them out")
     if settings.tour_limit is not None and settings.tour == "open":

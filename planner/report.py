@@ -12,7 +12,7 @@ from typing import Any
 from mission.document import Mission
 from mission.figures import Figures, Share, percent
 from mission.floor import Finding, Rank
-from mission.network import network_lines, network_table
+from mission.network import Network, network_lines, network_of, network_table
 from mission.plan import PartPlan
 from mission.planning import Route
 from mission.schedule import schedule
@@ -34,6 +34,11 @@ class PlanReport:
     @property
     def figures(self) -> Figures:
         return self.part.figures
+
+    @property
+    def network(self) -> Network | None:
+        """How the scans hang together; None where nobody asked for it."""
+        return network_of(self.mission)
 
     @property
     def answer(self) -> int:
@@ -78,7 +83,7 @@ class PlanReport:
                 "bound_over": selection.among,
                 "method": selection.method,
             },
-            **network_table(self.mission),
+            **network_table(self.network),
             "coverage": coverage_table(self.figures),
             **quality_told(self.figures),
             "route": {
@@ -136,7 +141,7 @@ class PlanReport:
             f"turn {times['turn_s']:.0f} s, settle {times['settle_s']:.0f} s, scan {times['scan_s']:.0f} s",
             *self._time_lines(),
             *quality_lines(figures),
-            *network_lines(self.mission),
+            *network_lines(self.network),
             *coverage_lines(figures),
         ]
         lines += [

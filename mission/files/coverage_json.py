@@ -17,7 +17,7 @@ from mission.figures import Figures, Share
 from mission.files.atomic import write_atomic
 from mission.floor import Element
 from mission.geometry import FloatArray, IntArray
-from mission.network import network_table
+from mission.network import network_of, network_table
 from mission.planning import Route, Targets
 from mission.seen import runs_of, seen_units
 
@@ -129,7 +129,7 @@ def coverage_json(route: Route, mission: Mission, figures: Figures | None = None
         "total": counts.summary(targets),
         "kinds": {kind: counts.summary(rows) for kind, rows in sorted(by_kind.items())},
         **({} if figures is None else {"rooms": [_room(share) for share in figures.rooms]}),
-        **network_table(mission),
+        **network_table(network_of(mission)),
     }
     segments = _segments_by_element(route)
     elements = [

@@ -13,7 +13,7 @@ from mission.seen import seen_units
 from planner.appraisal.plausible import doubts_of, near_legs
 from planner.appraisal.quality import NOT_MET, not_met, quality_of
 from planner.appraisal.unreached import unreached
-from planner.overlap.registered import scans_apart
+from planner.overlap.registered import SCANS_APART, scans_apart
 from planner.shapes import local_origin, to_shape
 from planner.space.reach import reach_of
 
@@ -47,7 +47,8 @@ def figures_of_share(route: Route, whole: Figures) -> Figures:
     shares = shares_of(route.selection, why={item.room: item.why for item in whole.unreached})
     space = route.selection.visibility.candidates.space
     doubts = doubts_of(route, reached_m2=whole.reached_m2)
-    findings = (*space.findings, *doubts, *(item for item in whole.findings if item.code == NOT_MET))
+    of_all = (item for item in whole.findings if item.code in (NOT_MET, *SCANS_APART))
+    findings = (*space.findings, *doubts, *of_all)
     return replace(
         whole,
         whole=replace(shares.whole, required=None),

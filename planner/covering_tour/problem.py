@@ -22,7 +22,7 @@ from planner.covering_tour.zones import Zone, zones_of
 from planner.overlap import links_of
 from planner.routing import legs_between, rank_at_door
 from planner.routing.legs import Legs
-from planner.selection import METHODS, left_by, posed
+from planner.selection import METHODS, left_by, offered_further, posed
 from planner.selection.bound import lower_bound
 from planner.selection.cover import Cover
 from planner.selection.hanging_together import JoinedCover
@@ -214,12 +214,15 @@ def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
     visibility, chosen = route.selection.visibility, np.unique(route.selection.chosen)
     stays: IntArray = np.empty(0, dtype=np.int64)
     together: Together = _any_rows
+    joins = visibility.candidates.space.settings.least_overlap > 0
     if done is not None:
         whole, cover = left_by(visibility, done)
+        if joins:
+            cover, together = _joined(visibility, whole, done, chosen, offered_further(visibility, done))
     else:
         whole, stays, cover = posed(visibility)
-        if visibility.candidates.space.settings.least_overlap > 0:
-            cover, together = _joined(visibility, whole, stays, chosen)
+        if joins:
+            cover, together = _joined(visibility, whole, stays, chosen, np.arange(whole.rows))
     offered = np.flatnonzero(np.diff(cover.sees.indptr)).astype(np.int64)
     nearest = _nearest(visibility.candidates, offered, chosen)
     return TourProblem(
@@ -239,14 +242,17 @@ def _any_rows(rows: IntArray) -> bool:
 
 
 def _joined(
-    visibility: Visibility, whole: Cover, stays: IntArray, chosen: IntArray
+    visibility: Visibility, whole: Cover, fixed: IntArray, chosen: IntArray, offered: IntArray
 ) -> tuple[Cover, Together]:
-    """What is left to see where scans must register, and whether rows hang together as the chosen ones do."""
-    cover = whole.with_one_of_each([np.array([row]) for row in stays])
-    task = JoinedCover(cover, links_of(visibility.candidates), np.arange(whole.rows))
-    most = task.parts(chosen)
-    left = whole.after(stays).offering(np.sort(np.concatenate(task.grounds)))
-    return left, lambda rows: task.parts(rows) <= most
+    """What is left to see where scans must register, and whether rows hang together as the chosen ones do.
+
+    Rows `fixed` stay or were scanned before; they hang together with the others.
+    """
+    cover = whole.with_one_of_each([np.array([row]) for row in fixed])
+    task = JoinedCover(cover, links_of(visibility.candidates), offered)
+    most = task.parts(np.union1d(chosen, fixed))
+    left = whole.after(fixed).offering(np.sort(np.concatenate(task.grounds)))
+    return left, lambda rows: task.parts(np.union1d(rows, fixed)) <= most
 
 
 def _nearest(candidates: Candidates, offered: IntArray, chosen: IntArray) -> IntArray:

@@ -15,12 +15,14 @@ LEAST_HOLD_M = 0.15
 """Metres of wall that must face the weakest move of a pair of scans, so that it registers."""
 LEAST_COMMON_M = 1.0
 """Metres of boundary that both must see."""
+USUAL_SHARE = 0.1
+"""Of a scan, that its neighbour must see too where nobody says how much."""
 
 
 @kept
 def overlaps_of(candidates: Candidates) -> Overlaps:
     """What the kept candidates see in common."""
-    return Overlaps(shown(candidates))
+    return Overlaps(shown(candidates, np.arange(len(candidates.kept))))
 
 
 def registers(pairs: Pairs, *, share: float) -> IntArray:
@@ -40,4 +42,13 @@ def links_of(candidates: Candidates) -> csr_array:
     return (later + later.T).tocsr()
 
 
-__all__ = ["LEAST_COMMON_M", "LEAST_HOLD_M", "Overlaps", "Pairs", "links_of", "overlaps_of", "registers"]
+__all__ = [
+    "LEAST_COMMON_M",
+    "LEAST_HOLD_M",
+    "USUAL_SHARE",
+    "Overlaps",
+    "Pairs",
+    "links_of",
+    "overlaps_of",
+    "registers",
+]

@@ -61,20 +61,33 @@ def boundary_of(space: NavigableSpace) -> Boundary:
     return Boundary(frozen(ends[:, 0]), frozen(ends[:, 1]), frozen(pieces, np.int64))
 
 
-def shown(candidates: Candidates) -> Shown:
-    """What the kept candidates see of the boundary within `overlap_range` and the scanner's field of view."""
+def shown(candidates: Candidates, rows: IntArray) -> Shown:
+    """What some rows see of the boundary within `overlap_range` and the scanner's field of view.
+
+    `rows` (n,) are indices into `kept`; what is shown is in their order.
+    """
     space = candidates.space
     origin = local_origin(space.floor)
     boundary = boundary_of(space)
-    places, row = viewpoints_of(candidates)
+    places, row = _viewpoints(candidates, rows)
     faces = np.ones(len(boundary.a), dtype=bool)
     scene = scene_of(open_space(candidates), boundary.a, boundary.b, boundary.pieces, faces)
     runs = sight(scene, to_grid(places - origin), reach=space.settings.farthest_overlap)
     start = (np.cumsum(boundary.pieces) - boundary.pieces)[runs.segment]
     stretches = _Stretches(np.repeat(row, np.diff(runs.pointer)), start + runs.low, start + runs.high)
-    xy, kept = candidates.xy[candidates.kept] - origin, candidates.kept
-    heading = candidates.heading[kept] if len(candidates.heading) else None
-    return shown_by(boundary, xy, stretches.pieces(len(kept)), heading, space.settings)
+    taken = candidates.kept[rows]
+    heading = candidates.heading[taken] if len(candidates.heading) else None
+    return shown_by(
+        boundary, candidates.xy[taken] - origin, stretches.pieces(len(rows)), heading, space.settings
+    )
+
+
+def _viewpoints(candidates: Candidates, rows: IntArray) -> tuple[FloatArray, IntArray]:
+    """Where each of these rows looks from (n, 2), and its place among them (n,), ascending."""
+    places, of = viewpoints_of(candidates)
+    first = np.searchsorted(of, rows)
+    counts = np.searchsorted(of, rows, side="right") - first
+    return places[ranges(first, counts)], np.repeat(np.arange(len(rows)), counts)
 
 
 @dataclass(frozen=True, eq=False)

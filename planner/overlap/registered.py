@@ -12,49 +12,75 @@ from mission.floor import Finding
 from mission.geometry import FloatArray, IntArray
 from mission.network import Network
 from mission.planning import OpeningState, Route
+from mission.settings import Settings
 from mission.specs import rounded
 from planner.kept import kept
-from planner.overlap import overlaps_of, registers
+from planner.overlap import USUAL_SHARE, Overlaps, registers
+from planner.overlap.boundary import shown
 from planner.shapes import local_origin
 
 
 @kept
 def registered_pairs(route: Route) -> tuple[Overlap, ...]:
-    """Pairs of the route's stops that register with one another, in the order of driving."""
-    candidates = route.selection.visibility.candidates
-    overlaps, share = overlaps_of(candidates), candidates.space.settings.least_overlap
-    rows = route.selection.chosen[route.order]
-    names = stop_names(len(rows))
+    """Pairs of the route's stops that register with one another, in the order of driving.
+
+    By the share in the settings; by the usual one where none is asked for.
+    """
+    overlaps, share = _overlaps_of_stops(route), _settings(route).least_overlap or USUAL_SHARE
+    names = stop_names(overlaps.rows)
     found = []
-    for k, row in enumerate(rows.tolist()):
-        pairs = overlaps.of(row)
-        at = {int(pairs.other[index]): int(index) for index in registers(pairs, share=share)}
-        for later, other in enumerate(rows[k + 1 :].tolist(), start=k + 1):
-            if other in at:
-                figures = (float(values[at[other]]) for values in (pairs.common_m, pairs.share, pairs.hold_m))
+    for k in range(overlaps.rows):
+        pairs = overlaps.of(k)
+        for at in registers(pairs, share=share):
+            if (later := int(pairs.other[at])) > k:
+                figures = (float(values[at]) for values in (pairs.common_m, pairs.share, pairs.hold_m))
                 found.append(Overlap(names[k], names[later], *map(rounded, figures)))
     return tuple(found)
 
 
+@kept
+def _overlaps_of_stops(route: Route) -> Overlaps:
+    """What the stops see in common; row k is the k-th that is driven to."""
+    selection = route.selection
+    return Overlaps(shown(selection.visibility.candidates, selection.chosen[route.order]))
+
+
+def _settings(route: Route) -> Settings:
+    return route.selection.visibility.candidates.space.settings
+
+
+SCANS_APART = ("scans_apart", "scans_not_joined")
+"""Codes of findings about scans that do not hang together: as was asked for, and where nothing was asked."""
+
+
 def scans_apart(route: Route) -> Iterator[Finding]:
-    """For each piece of the network that lies apart: what would join it."""
-    settings = route.selection.visibility.candidates.space.settings
-    if settings.least_overlap == 0 or len(route.order) < 2:
+    """What would join each piece of the network; where none was asked for, how many pieces there are."""
+    settings, count = _settings(route), len(route.order)
+    names = stop_names(count)
+    _, *others = Network(tuple(names), registered_pairs(route)).pieces or ((),)
+    if settings.least_overlap == 0:
+        if others:
+            yield Finding(
+                "scans_not_joined",
+                f"the scans fall into {len(others) + 1} pieces that no overlap joins; set up target spheres, "
+                f"or plan with --overlap {USUAL_SHARE:g}",
+            )
         return
-    names = stop_names(len(route.order))
-    network = Network(tuple(names), registered_pairs(route))
-    _, *others = network.pieces
+    called = names if not settings.divided else [f"the stop at ({x:.1f}, {y:.1f})" for x, y in route.xy]
     for piece in others:
         here = np.array([names.index(stop) for stop in piece])
-        told = f"{_listed(piece)} {'does' if len(piece) == 1 else 'do'} not register with the other scans; "
-        way_out, at = _way_out(route, here, np.setdiff1d(np.arange(len(names)), here), names)
-        yield Finding("scans_apart", told + way_out, at=at)
+        told = [called[k] for k in here]
+        verb = "does" if len(piece) == 1 else "do"
+        way_out, at = _way_out(route, here, np.setdiff1d(np.arange(count), here), called)
+        yield Finding(
+            "scans_apart", f"{_listed(told)} {verb} not register with the other scans; {way_out}", at=at
+        )
 
 
 MOST_TOLD = 6
 
 
-def _listed(stops: tuple[str, ...]) -> str:
+def _listed(stops: list[str]) -> str:
     rest = f" and {len(stops) - MOST_TOLD} more" if len(stops) > MOST_TOLD else ""
     return ", ".join(stops[:MOST_TOLD]) + rest
 
@@ -63,23 +89,22 @@ def _way_out(
     route: Route, here: IntArray, there: IntArray, names: list[str]
 ) -> tuple[str, tuple[float, float] | None]:
     """What would join two sets of stops, and where: spheres that two of them see, else an opening."""
-    candidates = route.selection.visibility.candidates
-    overlaps = overlaps_of(candidates)
-    rows = route.selection.chosen[route.order]
+    space = route.selection.visibility.candidates.space
+    overlaps = _overlaps_of_stops(route)
     best = None
     for k in here.tolist():
-        pairs = overlaps.of(int(rows[k]))
-        for index, other in enumerate(pairs.other.tolist()):
-            for j in there[rows[there] == other].tolist():
-                worth = (float(pairs.hold_m[index]), float(pairs.common_m[index]))
-                best = max(best, (worth, k, j)) if best else (worth, k, j)
+        pairs = overlaps.of(k)
+        for index in np.flatnonzero(np.isin(pairs.other, there)).tolist():
+            worth = (float(pairs.hold_m[index]), float(pairs.common_m[index]))
+            found = (worth, k, int(pairs.other[index]))
+            best = max(best, found) if best else found
     if best is not None:
         (hold, common), k, j = best
-        x, y = overlaps.middle_of_common(int(rows[k]), int(rows[j])) + local_origin(candidates.space.floor)
+        x, y = overlaps.middle_of_common(k, j) + local_origin(space.floor)
         told = f"target spheres that {names[k]} and {names[j]} both see would join them, such as near "
         seen = f" (they see {common:.1f} m of boundary in common, which hold as {hold:.2f} m do)"
         return f"{told}({x:.1f}, {y:.1f}){seen}", (x, y)
-    opening = _nearest_opening(candidates.space.openings, route.xy[here], route.xy[there])
+    opening = _nearest_opening(space.openings, route.xy[here], route.xy[there])
     if opening is None:
         return (
             "no opening lies between them: set target spheres, or measure the stops with a total station",

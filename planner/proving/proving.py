@@ -9,6 +9,7 @@ from importlib import import_module
 
 import numpy as np
 import shapely
+from msgspec import UNSET
 
 from mission.document import Mission, Stop
 from mission.errors import AnswerIsNo, InputError
@@ -201,6 +202,8 @@ class _Promise:
 
     space: NavigableSpace
     coverage: Coverage | None
+    alone: bool
+    """Whether the mission sees the floor by itself; of one of several no room's or kind's share is asked."""
     weight: FloatArray
     """Metres, or 1, of each unit."""
     units: BoolArray | None
@@ -212,7 +215,14 @@ class _Promise:
         paper = space.settings.coverage_rule == "paper"
         weight = frozen(weights_of(space.targets, space.settings) * (1.0 if paper else 1e-6))
         units = None if coverage is None else _promised(coverage, space.targets, space.floor)
-        return cls(space, coverage, weight, units, sum(stop.sees.new_units for stop in mission.stops))
+        return cls(
+            space,
+            coverage,
+            mission.share is UNSET,
+            weight,
+            units,
+            sum(stop.sees.new_units for stop in mission.stops),
+        )
 
     def whole(self, seen: BoolArray) -> PromisedShare:
         every = np.ones(len(seen), dtype=bool)
@@ -222,7 +232,9 @@ class _Promise:
             kept, beyond = min(got, self.claimed) * mean, max(0, got - self.claimed) * mean
             return PromisedShare("all", self.claimed * mean, kept, beyond)
         told = None if self.coverage is None else self.coverage.total.coverage
-        return self._share("all", every, seen, coverage=told, required=self.space.settings.coverage)
+        return self._share(
+            "all", every, seen, coverage=told, required=self._asked(self.space.settings.coverage)
+        )
 
     def rooms(self, seen: BoolArray) -> tuple[PromisedShare, ...]:
         """Rooms of which something is promised or acquired, in the floor's order."""
@@ -234,7 +246,7 @@ class _Promise:
                 self.space.unit_room == k,
                 seen,
                 coverage=told.get(name) if names.count(name) == 1 else None,
-                required=self.space.settings.least_of_room,
+                required=self._asked(self.space.settings.least_of_room),
             )
             for k, name in enumerate(names)
         ]
@@ -251,10 +263,13 @@ class _Promise:
                 kind == name,
                 seen,
                 coverage=told[name].coverage if name in told else None,
-                required=self.space.settings.least_of_kind,
+                required=self._asked(self.space.settings.least_of_kind),
             )
             for name in np.unique(kind)
         )
+
+    def _asked(self, share: float | None) -> float | None:
+        return share if self.alone else None
 
     def missed(self, seen: BoolArray, sighted: BoolArray) -> dict[str, float]:
         """What of the promised units was missed, by reason; `sighted` have their midpoint in sight."""

@@ -73,7 +73,8 @@ def select(visibility: Visibility) -> Selection:
     method = variant("selector", settings.selector, METHODS)
     whole, fixed, problem = posed(visibility)
     if settings.least_overlap > 0:
-        return _select_connected(visibility, whole, fixed, method)
+        rows, bound = _connected(visibility, whole, fixed, np.arange(whole.rows), method)
+        return _selection(visibility, whole, rows, bound, method)
     rows, bound = _solved(method, problem, settings)
     chosen = np.concatenate([fixed, in_greedy_order(problem, rows)]).astype(np.int64)
     return _selection(visibility, whole, chosen, len(fixed) + bound, method)
@@ -100,13 +101,16 @@ def posed(visibility: Visibility) -> tuple[Cover, IntArray, Cover]:
     return whole, fixed, whole.after(fixed).offering(offered)
 
 
-def _select_connected(
-    visibility: Visibility, whole: Cover, fixed: IntArray, method: Variant[Selector]
-) -> Selection:
-    """Stops whose scans register with one another: one network, or as few as the candidates allow."""
+def _connected(
+    visibility: Visibility, whole: Cover, fixed: IntArray, offered: IntArray, method: Variant[Selector]
+) -> tuple[IntArray, int]:
+    """Rows whose scans register with one another, and a bound: one network, or as few as are possible.
+
+    `fixed` come first, and are among those `offered`.
+    """
     settings = visibility.candidates.space.settings
     cover = whole.with_one_of_each([np.array([row]) for row in fixed])
-    task = JoinedCover(cover, links_of(visibility.candidates), np.arange(whole.rows))
+    task = JoinedCover(cover, links_of(visibility.candidates), offered)
     if method.name == "exact":
         rows, bound = connected(task, Searches.exact(settings), rounds=EXACT_ROUNDS)
     elif method.name == "default":
@@ -117,7 +121,7 @@ def _select_connected(
         bound = max(bound, lower_bound(task.problem, found=len(rows)))
     problem = whole.after(fixed)
     others = in_greedy_order(problem, np.setdiff1d(rows, fixed))
-    return _selection(visibility, whole, np.concatenate([fixed, others]), bound, method)
+    return np.concatenate([fixed, others]).astype(np.int64), bound
 
 
 class Searches:
@@ -146,6 +150,8 @@ class Searches:
 def select_further(visibility: Visibility, done: IntArray) -> Selection:
     """As few candidates as see what the rows `done` leave of what is asked for; none where that is nothing.
 
+    Where scans are to register with one another, they join those that were taken, too.
+
     Raises
     ------
     AnswerIsNo
@@ -153,16 +159,27 @@ def select_further(visibility: Visibility, done: IntArray) -> Selection:
     """
     settings = visibility.candidates.space.settings
     method = variant("selector", settings.selector, METHODS)
-    whole, problem = left_by(visibility, done)
-    rows, bound = _solved(method, problem, settings)
-    both = np.concatenate([done, in_greedy_order(problem, rows)]).astype(np.int64)
-    made = _selection(visibility, whole, both, len(done) + bound, method)
+    if settings.least_overlap > 0:
+        whole = cover_of(visibility, demands_of(visibility))
+        both, bound = _connected(visibility, whole, done, offered_further(visibility, done), method)
+    else:
+        whole, problem = left_by(visibility, done)
+        rows, more = _solved(method, problem, settings)
+        both, bound = np.concatenate([done, in_greedy_order(problem, rows)]), len(done) + more
+    made = _selection(visibility, whole, both.astype(np.int64), bound, method)
     return replace(
         made,
         chosen=frozen(both[len(done) :], np.int64),
         coverage_steps=frozen(made.coverage_steps[len(done) :]),
         bound=bound,
     )
+
+
+def offered_further(visibility: Visibility, done: IntArray) -> IntArray:
+    """Rows that a further mission may join scans by, with those that were taken."""
+    candidates = visibility.candidates
+    left_out = np.setdiff1d(candidates.extra_rows, np.union1d(done, candidates.doorway_rows))
+    return np.setdiff1d(np.arange(visibility.rows), left_out)
 
 
 def left_by(visibility: Visibility, done: IntArray) -> tuple[Cover, Cover]:
@@ -216,4 +233,14 @@ def coverage_steps(cover: Cover, rows: IntArray) -> FloatArray:
     return np.array(steps)
 
 
-__all__ = ["METHODS", "Selector", "coverage_steps", "left_by", "posed", "quick", "select", "select_further"]
+__all__ = [
+    "METHODS",
+    "Selector",
+    "coverage_steps",
+    "left_by",
+    "offered_further",
+    "posed",
+    "quick",
+    "select",
+    "select_further",
+]

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from mission.document import Mission
-from mission.plan import DividedPlan
+from mission.network import Network, network_of
+from mission.plan import DividedPlan, PartPlan
 from mission.schedule import schedule
 from mission.table import duration
 from planner.report import PlanReport, time_lines
@@ -35,6 +36,19 @@ class SharedReport(PlanReport):
     def mission(self) -> Mission:
         """The first of the missions."""
         return self.reports[0].mission
+
+    @property
+    def network(self) -> Network | None:
+        """Of the scans of all missions: stop s03 of the first is 1:s03."""
+        whole = self.divided.whole
+        name = {
+            row: f"{number}:{stop.id}"
+            for number, report in enumerate(self.reports, 1)
+            for row, stop in zip(_rows(report.part), report.mission.stops, strict=True)
+        }
+        named = {stop.id: name[row] for row, stop in zip(_rows(whole), whole.mission.stops, strict=True)}
+        joined = network_of(whole.mission)
+        return None if joined is None else joined.renamed(named)
 
     @property
     def answer(self) -> int:
@@ -113,3 +127,9 @@ class SharedReport(PlanReport):
 
     def _file_lines(self) -> list[str]:
         return [line for report in self.reports for line in PlanReport._file_lines(report)]
+
+
+def _rows(part: PartPlan) -> list[int]:
+    """The candidates that a plan stops at, in the order of driving."""
+    rows: list[int] = part.selection.chosen[part.route.order].tolist()
+    return rows

@@ -5,14 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 
 import msgspec
+import numpy as np
 import pytest
 
+from mission.document import stop_names
 from mission.floor import FloorPlan
-from mission.network import network_of
+from mission.network import Network, network_of
 from mission.settings import Settings
 from planner import plan
+from planner.candidates import candidates
 from planner.checking.network_claims import network_overclaims
+from planner.further import PlannedFloor, top_up
+from planner.overlap import links_of
+from planner.overlap.registered import SCANS_APART, registered_pairs
 from planner.report import PlanReport
+from planner.selection.separators import pieces_of
+from planner.space.navigable import navigable
 from tests.planner.worlds import box, door, floor_of, room, shell, wall
 
 ASKED = Settings(d_sec=0.4, edge=0.0, overlap=0.1, seed=1)
@@ -75,3 +83,36 @@ def test_rooms_that_cannot_see_one_another_are_told_with_a_way_out() -> None:
     assert "spheres" in apart[0].message
     assert report.strict_answer == 1
     assert "PIECES" in report.as_text()
+
+
+def test_a_plan_that_nobody_asked_to_register_tells_into_how_many_pieces_its_scans_fall() -> None:
+    report = PlanReport(plan(three_rooms(), replace(ASKED, overlap=0.0, range=3.0)).first, {}, {})
+    (told,) = [item for item in report.figures.findings if item.code == "scans_not_joined"]
+    joined = Network(tuple(stop_names(len(report.mission.stops))), registered_pairs(report.part.route))
+    assert len(joined.pieces) > 1
+    assert told.message.startswith(f"the scans fall into {len(joined.pieces)} pieces that no overlap joins")
+    assert told.message in report.as_text()
+    assert report.strict_answer == 0, "a surveyor may have spheres"
+
+
+def test_a_plan_whose_scans_join_anyway_says_nothing() -> None:
+    made = plan(floor_of(box(0, 0, 6, 4), elements=(shell(0, 0, 6, 4),)), replace(ASKED, overlap=0.0))
+    assert not [item for item in made.first.figures.findings if item.code in SCANS_APART]
+
+
+def test_a_further_mission_joins_the_scans_that_were_taken(made: PlanReport) -> None:
+    """All is seen from one place in each outer room but the middle one; its further stops join both."""
+    space = made.part.space
+    planned = PlannedFloor(
+        space.floor, replace(space.settings, coverage=0.5, room_coverage=0.0), made.mission
+    )
+    driven = np.array([(2.0, 1.0, 0.0), (10.4, 3.0, 0.0)])
+    loose = top_up(replace(planned, settings=replace(planned.settings, overlap=0.0)), driven)
+    joining = top_up(planned, driven)
+    assert joining is not None
+    assert loose is None or len(loose.stops) <= len(joining.stops)
+    places = [*driven[:, :2].tolist(), *((stop.x, stop.y) for stop in joining.stops)]
+    asked = replace(planned.settings, use=tuple(map(tuple, places)))
+    rows = candidates(navigable(space.floor, asked))
+    taken = np.array([np.flatnonzero((rows.xy[rows.kept] == place).all(axis=1))[0] for place in places])
+    assert len(pieces_of(links_of(rows), taken)) == 1

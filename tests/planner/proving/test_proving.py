@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as changed
 
+from mission.document import MissionShare
 from mission.errors import AnswerIsNo
 from mission.files.coverage_json import Coverage, coverage_json
 from mission.floor import FloorPlan
 from mission.geometry import FloatArray, frozen
 from mission.plan_proof import PlanProof, Simulation
 from mission.planning import NavigableSpace
+from mission.proof_text import network_words
 from mission.settings import Settings
 from planner import plan
 from planner.proving.casting import RayFan, SolidScene
@@ -102,6 +104,15 @@ def test_a_stop_that_was_removed_is_caught() -> None:
     assert not proof.met
     assert "coverage" in proof.unmet[0]
     assert sum(proof.missed.values()) > 1.0
+
+
+def test_of_one_mission_of_several_no_share_is_asked_that_is_asked_of_all() -> None:
+    made = plan(hall(3, 2), Settings(range=10.0))
+    share = changed(made.mission, share=MissionShare(kind="robot", number=1, of=2))
+    alone, one_of_two = (prove(item, made.space, COARSEST, None) for item in (made.mission, share))
+    assert all(item.required for item in (*alone.rooms[:1], *alone.kinds))
+    assert not any(item.required for item in (one_of_two.whole, *one_of_two.rooms, *one_of_two.kinds))
+    assert network_words(one_of_two)[0].startswith("of this mission, one of 2, all scans join")
 
 
 def test_a_mission_without_stops_is_no() -> None:

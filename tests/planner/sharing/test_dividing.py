@@ -19,6 +19,7 @@ from mission.errors import AnswerIsNo, InputError
 from mission.files.coverage_json import coverage_json
 from mission.files.plan_svg import plan_svg
 from mission.files.plan_toml import read_settings
+from mission.network import network_of
 from mission.parameter import seconds
 from mission.plan import DividedPlan, Plan
 from mission.planning import Route
@@ -26,8 +27,11 @@ from mission.problems import problems_of
 from mission.schedule import schedule
 from mission.settings import Settings, told_of
 from planner import plan
+from planner.checking.network_claims import network_overclaims
 from planner.further import PlannedFloor, top_up
+from planner.report import PlanReport
 from planner.sharing.least_times import least_makespan, least_tours
+from planner.sharing.shared_report import shared_report
 from planner.sharing.tour_times import TourTimes, tour_times
 from tests.planner.worlds import column, hall, planned, two_rooms
 
@@ -176,6 +180,24 @@ def test_further_robots_start_where_they_are_told_to() -> None:
     assert made.shares[1].mission.start.heading == pytest.approx(math.pi / 2, abs=1e-6)
 
 
+def test_the_scans_of_all_robots_are_one_network_told_by_mission_and_stop() -> None:
+    made = settled("rooms", robots=2, overlap=0.1, d_sec=0.4)
+    report = shared_report(made, [PlanReport(part, {}, {}) for part in made.shares])
+    network = report.network
+    assert network is not None
+    assert len(network.pieces) == 1
+    stops = {f"{k}:{stop.id}" for k, part in enumerate(made.shares, 1) for stop in part.mission.stops}
+    assert set(network.stops) == stops
+    own = [network_of(part.mission) for part in made.shares]
+    for k, of_one in enumerate(own, 1):
+        assert of_one is not None
+        names = {stop: f"{k}:{stop}" for stop in of_one.stops}
+        assert set(of_one.renamed(names).overlaps) == set(network.among(set(names.values())).overlaps)
+    across = [item for item in network.overlaps if item.a[0] != item.b[0]]
+    assert across, "the robots' scans join"
+    assert not [item for part in made.shares for item in network_overclaims(part.mission, part.space)]
+
+
 def test_a_stop_too_far_for_a_shift_is_named() -> None:
     with pytest.raises(AnswerIsNo, match=r"shift = 66 s: stop \d+ of the route, at \(\d"):
         settled("hall", shift=66.0)
@@ -193,7 +215,6 @@ def test_a_stop_too_far_for_a_shift_is_named() -> None:
         ({"shift": math.nan}, "shift = nan: must be a finite number"),
         ({"robots": 2, "shift": 600.0}, "robots and shift are both given"),
         ({"shift": 600.0, "tour": "open"}, "tour = open"),
-        ({"robots": 2, "overlap": 0.1}, "overlap = 0.1: is not done with robots"),
         ({"robots": 2, "end": [1, 1]}, "end and robots are both given"),
     ],
     ids=str,
