@@ -12,6 +12,7 @@ from pathlib import Path
 from bridge.commands.spawn import robot_process
 from bridge.robot.journal import open_journal
 from bridge.station.station import Station, connect
+from mission.document import Mission
 from mission.errors import AnswerIsNo
 from tests.bridge.world import Field, corridor
 
@@ -55,7 +56,7 @@ def with_a_process(folder: Path) -> None:
         robot_process("r1", folder / "state") as endpoint,
         connect(endpoint, robot="r1", timeout_s=30.0) as station,
     ):
-        station.push(corridor())
+        station.push(an_hours_drive())
         station.command("start")
         until(lambda: station.status().stop_state == "NAVIGATING")
         paused = station.command("pause")
@@ -71,14 +72,26 @@ def with_a_process(folder: Path) -> None:
         print(*[type(event).__name__ for event in station.log(since=newest)])
 
 
+def an_hours_drive() -> Mission:
+    """Only orders are stored on the way: a robot that arrives and cannot store that is held, not paused."""
+    return corridor(stops=1, closed=False, x=1800.0, approach=((0.0, 0.0), (1800.0, 0.0)))
+
+
 def go_on(station: Station, ballast: Path) -> None:
-    """Let the paused robot drive; held for want of room, it is given a little."""
+    """Let the paused robot drive, and store that it does; held for want of room, it is given a little."""
+
+    def drives() -> bool:
+        status = station.status()
+        if status.state == "HELD":
+            os.truncate(ballast, max(0, ballast.stat().st_size - ROOM_BYTES))
+            station.command("retry")
+        return (status.state, status.stop_state) == ("RUNNING", "NAVIGATING")
+
     try:
         station.command("resume")
     except AnswerIsNo as no:
         assert no.reason == "storage"
-        os.truncate(ballast, max(0, ballast.stat().st_size - ROOM_BYTES))
-        station.command("retry")
+    until(drives)
 
 
 def until(reached: Callable[[], bool]) -> None:
