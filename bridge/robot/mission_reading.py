@@ -49,15 +49,19 @@ def _stop(number: int, body: msgspec.Raw) -> Stop:
         raise msgspec.ValidationError(told) from None
 
 
+MANY_PARTS = 20_000
+"""So many new parts are collected in some 2 ms, and need no care."""
+
+
 @contextmanager
 def _nothing_collected() -> Iterator[None]:
-    """What is read meanwhile counts as old at once, so that the next quick collection passes it over."""
+    """Where much is read meanwhile it counts as old at once: the next quick collection passes it over."""
     collects = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        if not gc.get_freeze_count():  # unfreezing is of all or nothing
+        if gc.get_count()[0] > MANY_PARTS and not gc.get_freeze_count():  # unfreezing is of all or nothing
             gc.freeze()
             gc.unfreeze()
         if collects:
