@@ -7,7 +7,7 @@ What is asked for may be missed on the way: what is missing costs time, the more
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -162,7 +162,7 @@ class _Search:
         more = [] if change.into is None else [change.into]
         return np.array(sorted({*self._places(rest), *more}), dtype=np.int64)
 
-    def _changes(self):  # type: ignore[no-untyped-def]
+    def _changes(self) -> Iterator[tuple[int | None, IntArray]]:
         """For each stop that may leave, and for none: what each place that may come then costs (places,).
 
         Also what it costs if nobody comes (1,). All is told less the line's own time.
