@@ -144,6 +144,7 @@ def test_a_hold_during_a_silence_is_the_autopilots_own_or_somebodys(
         assert operator.mode() == "HOLD"
         if by_hand:
             operator.hold()
+        world.sleep(0.5)  # the line loses what was told before that, too
         line.roughness = Roughness()
         state = until(reports, is_state("FINISHED", "HELD"))
         held = [event.reason for event in events_of(station) if isinstance(event, Held)]
