@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import uuid
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 
 from bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
@@ -19,7 +18,16 @@ from mission.mavlink.enums import MessageId
 from mission.mavlink.following import steps as progress
 from mission.mavlink.following.listed_mission import ListedMission
 from mission.mavlink.following.observer import CLOCKS, Observer
-from mission.mavlink.following.steps import SOMEBODY, TELLS_LATE, Observation, steps, tried_again
+from mission.mavlink.following.steps import (
+    AT_STOP,
+    COUNTS_NOT_YET,
+    SOMEBODY,
+    Observation,
+    has_left,
+    since_left,
+    steps,
+    tried_again,
+)
 from mission.mavlink.read_back import differences
 from mission.mavlink.telemetry import began_again
 from mission.run import states as runs
@@ -30,11 +38,6 @@ SETTLED_NS = 1_500_000_000
 REMEMBERED_NS = 60 * 10**9
 """An order whose outcome was unknown is taken to be the cause of what the vehicle does so much later."""
 AGAIN_S = 1.0
-GRACE_NS = 2 * 10**9
-"""How long a confirmation may come after the end of a scan's wait, if the next stop is not reached before."""
-EARLY = ("NAVIGATING", "SETTLING", "SCANNING")
-"""A scan that was told of does not count yet."""
-AT_STOP = ("SETTLING", "SCANNING", "VERIFYING")
 
 
 class AutoFollower:
@@ -116,7 +119,7 @@ class AutoFollower:
                 lambda run: () if run != before else self._happened(run, listed, observed),
                 partial(self._pending_after, listed),
             )
-            waiting = self.run.at == before.at and self.run.stop_state in EARLY
+            waiting = self.run.at == before.at and self.run.stop_state in COUNTS_NOT_YET
             if capture is not None and self.run != before and not waiting:
                 self._book.use(*capture.name)
         if self.run.state == "RUNNING" and before.state in ("READY", "PAUSED", "HELD"):
@@ -127,16 +130,14 @@ class AutoFollower:
         """The vehicle as it is seen now; asked once more for a scan of a stop that it has left."""
         run, now_ns = self.run, self._book.clock.now_ns()
         observed = self._observer.observe(run, listed, self._arrived(listed), after=self._book.used)
-        at_work = run.stop_state in TELLS_LATE and run.at < len(listed.stops)
-        if observed is None or not at_work or observed.place < listed.stops[run.at].after:
+        if observed is None or not has_left(run, listed, observed):
             return observed
         stop = (run.run_id or "", run.at, run.attempt)
         if self._left is None or self._left[0] != stop:
             self._left = (stop, now_ns)
         if observed.scan is None:
             self._commands.ask_for(MessageId.CAMERA_IMAGE_CAPTURED)
-        beyond = run.at + 1 < len(listed.stops) and observed.place > listed.stops[run.at + 1].at
-        return replace(observed, in_vain=beyond or now_ns > self._left[1] + GRACE_NS)
+        return since_left(run, listed, observed, now_ns - self._left[1])
 
     def _busy(self) -> bool:
         """Whether the vehicle is being told something: what it does until then is neither here nor there."""

@@ -14,16 +14,20 @@ from mission.mavlink.autopilots.kind import Autopilot
 from mission.mavlink.captures import NEAR_M, Picture
 from mission.mavlink.following.listed_mission import ListedMission
 from mission.mavlink.following.observer import CLOCKS, NONE_YET, Observer
-from mission.mavlink.following.steps import SOMEBODY, TELLS_LATE, Observation, steps, taken_over
+from mission.mavlink.following.steps import (
+    AT_STOP,
+    COUNTS_NOT_YET,
+    GRACE_NS,
+    SOMEBODY,
+    Observation,
+    has_left,
+    since_left,
+    steps,
+    taken_over,
+)
 from mission.mavlink.telemetry import Message, began_again
 from mission.run import states as runs
 from mission.run.states import Change, Run, changed, told_of
-
-GRACE_NS = 2 * 10**9
-"""How long a confirmation may come after the end of a scan's wait, if the next stop is not reached before."""
-COUNTS_NOT_YET = ("NAVIGATING", "SETTLING", "SCANNING")
-"""At these a scan that was told of does not count yet."""
-AT_STOP = ("SETTLING", "SCANNING", "VERIFYING")
 
 
 class FollowedRun:
@@ -85,14 +89,12 @@ class FollowedRun:
         return self._run.at > before.at
 
     def _observe(self, now_ns: int) -> Observation | None:
-        run, stops = self._run, self._listed.stops
-        observed = self._observer.observe(run, self._listed, self._arrived(), after=self._used)
-        at_work = run.stop_state in TELLS_LATE and run.at < len(stops)
-        if observed is None or not at_work or observed.place < stops[run.at].after:
+        run, listed = self._run, self._listed
+        observed = self._observer.observe(run, listed, self._arrived(), after=self._used)
+        if observed is None or not has_left(run, listed, observed):
             return observed
         self._left_ns = now_ns if self._left_ns is None else self._left_ns
-        beyond = run.at + 1 < len(stops) and observed.place > stops[run.at + 1].at
-        return replace(observed, in_vain=beyond or now_ns > self._left_ns + GRACE_NS)
+        return since_left(run, listed, observed, now_ns - self._left_ns)
 
     def _happened(self, observed: Observation, now_ns: int) -> tuple[Change, ...]:
         if self._run.over:

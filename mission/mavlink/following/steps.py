@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import msgspec
@@ -26,6 +26,11 @@ SOMEBODY = "the vehicle's operator"
 """Who gives orders that were not given here."""
 TELLS_LATE = ("NAVIGATING", "SCANNING")
 """Of a stop that was left in these, the scanner's word is still waited for."""
+GRACE_NS = 2 * 10**9
+"""How long a confirmation may come after the end of a scan's wait, if the next stop is not reached before."""
+COUNTS_NOT_YET = ("NAVIGATING", "SETTLING", "SCANNING")
+"""At these a scan that was told of does not count yet."""
+AT_STOP = ("SETTLING", "SCANNING", "VERIFYING")
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,18 @@ class Observation:
     def drives(self) -> bool:
         """Whether it follows its mission."""
         return self.mode == "AUTO" and self.armed
+
+
+def has_left(run: Run, listed: ListedMission, observed: Observation) -> bool:
+    """Whether it has left the present stop, of which the scanner's word may still come."""
+    at_work = run.stop_state in TELLS_LATE and run.at < len(listed.stops)
+    return at_work and observed.place >= listed.stops[run.at].after
+
+
+def since_left(run: Run, listed: ListedMission, observed: Observation, waited_ns: int) -> Observation:
+    """The same of a stop that was left so long ago: whether the scanner's word is waited for in vain."""
+    beyond = run.at + 1 < len(listed.stops) and observed.place > listed.stops[run.at + 1].at
+    return replace(observed, in_vain=beyond or waited_ns > GRACE_NS)
 
 
 def steps(run: Run, listed: ListedMission, observed: Observation) -> tuple[Change, ...]:
