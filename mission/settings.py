@@ -456,9 +456,9 @@ def _check_division(settings: Settings) -> None:
         )
     if not settings.divided:
         return
-    what = "robots" if settings.robots is not None else settings.tour_limit[0]  # type: ignore[index]
     if settings.robots is not None and settings.tour_limit is not None:
         raise InputError(f"robots and {settings.tour_limit[0]} are both given; plan for one of them")
+    what = "robots" if settings.tour_limit is None else settings.tour_limit[0]
     if settings.robots is not None and not starts:
         raise InputError(
             f"robots = {settings.robots}: no robot has a start; give --start X,Y,HEADING once for all, "

@@ -52,7 +52,7 @@ class Site:
 
     folder: Path
     profile: str = "ardupilot"
-    mission: Mission = field(default_factory=lambda: real_tour())  # noqa: PLW0108
+    mission: Mission = field(default_factory=real_tour)
     faults: Sequence[str] = ()
     trigger: Any = "auto"
     origin: SiteOrigin | None = None
