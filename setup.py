@@ -1,21 +1,14 @@
-"""Where the four folders go when stopgo is installed: below `_stopgo`, as their names are common ones.
+"""Where the folders of the tree go when stopgo is installed: below `stopgo`, the one name that it takes.
 
-`pip install mission` would write over a folder `mission` beside it. Whoever imports stopgo finds the four
-under their own names all the same (`_own_folders_first` in stopgo.py). An editable install leaves them where
-they are.
+The links `stopgo/mission -> ../mission` and so on say the same to mypy and editors. The build does not follow
+them, so that it also works where a checkout has no links, as on Windows.
 """
-
-import sys
 
 from setuptools import find_packages, setup
 
 FOLDERS = ("mission", "planner", "bridge", "recordings")
 
-found = find_packages(include=[f"{folder}*" for folder in FOLDERS])
-if "editable_wheel" in sys.argv:
-    setup(packages=found)
-else:
-    setup(
-        packages=[f"_stopgo.{name}" for name in found],
-        package_dir={f"_stopgo.{folder}": folder for folder in FOLDERS},
-    )
+linked = [f"stopgo.{folder}{below}" for folder in FOLDERS for below in ("", ".*")]
+own = find_packages(include=["stopgo", "stopgo.*"], exclude=linked)
+mapped = [f"stopgo.{name}" for folder in FOLDERS for name in find_packages(include=[folder, f"{folder}.*"])]
+setup(packages=[*own, *mapped], package_dir={f"stopgo.{folder}": folder for folder in FOLDERS})

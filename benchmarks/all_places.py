@@ -7,14 +7,14 @@ from pathlib import Path
 
 from benchmarks.shares import FLOORS
 from benchmarks.table import put, table, versions
-from mission.settings import Settings
-from planner.anywhere import SELECTOR, anywhere
-from planner.candidates import candidates
-from planner.floors import read_floor
-from planner.refine import refined
-from planner.selection import select
-from planner.space.navigable import navigable
-from planner.visibility import visibility
+from stopgo.mission.settings import Settings
+from stopgo.planner.anywhere import SELECTOR, anywhere
+from stopgo.planner.candidates import candidates
+from stopgo.planner.floors import read_floor
+from stopgo.planner.refine import refined
+from stopgo.planner.selection import select
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.visibility import visibility
 
 
 def main() -> None:

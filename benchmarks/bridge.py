@@ -24,14 +24,14 @@ from pathlib import Path
 
 import msgspec
 
-from bridge.commands.spawn import end_robot, robot_process, start_robot
-from bridge.link.authority import init_site, issue
-from bridge.link.keys import now_utc
-from bridge.station.station import Station, connect
-from bridge.station.window import Window
-from mission.document import Mission, sealed
-from mission.ports import free_port
-from mission.run.orders import Verb
+from stopgo.bridge.commands.spawn import end_robot, robot_process, start_robot
+from stopgo.bridge.link.authority import init_site, issue
+from stopgo.bridge.link.keys import now_utc
+from stopgo.bridge.station.station import Station, connect
+from stopgo.bridge.station.window import Window
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.ports import free_port
+from stopgo.mission.run.orders import Verb
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor
 from tests.faults.full_disk import fill

@@ -10,9 +10,9 @@ import shapely
 from shapely.affinity import translate
 
 from benchmarks.table import put, table, versions
-from mission.errors import InputError
-from mission.floor import FloorPlan
-from planner.floors import read_floor
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan
+from stopgo.planner.floors import read_floor
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 RUNS = 3

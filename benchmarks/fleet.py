@@ -15,12 +15,12 @@ from pathlib import Path
 
 import msgspec
 
-from bridge.commands.spawn import end_robot, start_robot
-from bridge.link.protocol import KeyExpressions
-from bridge.link.zenoh_link import connecting
-from bridge.station.fleet import fleet
-from mission.events import PoseReport
-from mission.ports import free_port
+from stopgo.bridge.commands.spawn import end_robot, start_robot
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.link.zenoh_link import connecting
+from stopgo.bridge.station.fleet import fleet
+from stopgo.mission.events import PoseReport
+from stopgo.mission.ports import free_port
 from tests.bridge.station.test_fleet import router
 
 

@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from mission.floor import Element, FloorPlan, Opening, Room
-from mission.floor_source import FloorSource
-from mission.geometry import Polygon, frozen
-from mission.kinds import KINDS
+from stopgo.mission.floor import Element, FloorPlan, Opening, Room
+from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.geometry import Polygon, frozen
+from stopgo.mission.kinds import KINDS
 
 WALL = 0.2
 DOOR = 0.9

@@ -32,8 +32,8 @@ STAGES = ("navigable", "candidates", "visibility", "selection", "route")
 ONE = """
 import json, resource, sys, time
 from benchmarks.floors import office
-from mission.settings import Settings
-from planner import plan
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
 width, height = float(sys.argv[1]), float(sys.argv[2])
 floor, laps, last = office(width, height, seed=1), {}, [time.perf_counter()]
 def observe(noun):

@@ -8,17 +8,17 @@ from typing import Any
 
 from benchmarks.shares import FLOORS
 from benchmarks.table import put, table, versions
-from mission.planning import Route
-from mission.settings import Settings
-from mission.table import duration
-from planner.candidates import candidates
-from planner.covering_tour import in_least_time
-from planner.floors import read_floor
-from planner.refine import refined
-from planner.routing import route
-from planner.selection import select
-from planner.space.navigable import navigable
-from planner.visibility import visibility
+from stopgo.mission.planning import Route
+from stopgo.mission.settings import Settings
+from stopgo.mission.table import duration
+from stopgo.planner.candidates import candidates
+from stopgo.planner.covering_tour import in_least_time
+from stopgo.planner.floors import read_floor
+from stopgo.planner.refine import refined
+from stopgo.planner.routing import route
+from stopgo.planner.selection import select
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.visibility import visibility
 
 SCANS: dict[str, dict[str, Any]] = {"60 s": {}, "10 s": {"scan_time": 10.0}}
 """Slow scans, where stops cost most, and quick ones."""

@@ -31,7 +31,7 @@ MARK = 1234.5678
 OURS = """
 import json, resource, sys, time
 from pathlib import Path
-from recordings.logs import read_log
+from stopgo.recordings.logs import read_log
 begin = time.process_time()
 track = read_log(Path(sys.argv[1])).poses[0]
 print(json.dumps({

@@ -16,17 +16,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.table import put, table, versions
-from bridge.mavlink.line.peer import Peer, reached
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_process import vehicle_on
-from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.upload import upload
-from mission.errors import StopgoError
-from mission.mavlink.items import ItemList
-from mission.mavlink.read_back import differences, upload_of
-from mission.ports import free_port
+from stopgo.bridge.mavlink.line.peer import Peer, reached
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.transfer.download import download
+from stopgo.bridge.mavlink.transfer.upload import upload
+from stopgo.mission.errors import StopgoError
+from stopgo.mission.mavlink.items import ItemList
+from stopgo.mission.mavlink.read_back import differences, upload_of
+from stopgo.mission.ports import free_port
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 

@@ -22,7 +22,7 @@ STOREYS = {
 READING = """
 import json, resource, sys, time
 from pathlib import Path
-from planner.floors import FloorOptions, read_floor
+from stopgo.planner.floors import FloorOptions, read_floor
 begin = time.perf_counter()
 floor = read_floor(Path(sys.argv[1]), FloorOptions(storey=sys.argv[2]))
 seconds = time.perf_counter() - begin

@@ -9,13 +9,13 @@ from pathlib import Path
 
 from benchmarks.shares import FLOORS
 from benchmarks.table import put, table, versions
-from mission.document import Overlap, stop_names
-from mission.network import Network
-from mission.plan import PartPlan
-from mission.settings import Settings
-from planner import plan
-from planner.floors import FloorOptions, read_floor
-from planner.overlap.registered import registered_pairs
+from stopgo.mission.document import Overlap, stop_names
+from stopgo.mission.network import Network
+from stopgo.mission.plan import PartPlan
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.floors import FloorOptions, read_floor
+from stopgo.planner.overlap.registered import registered_pairs
 
 SHARES = (0.1, 0.3)
 DOOR_SCAN = "--door-scan"

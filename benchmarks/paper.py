@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.table import median_seconds, put, table, versions
-from mission.errors import AnswerIsNo
-from mission.floor import FloorPlan
-from mission.geometry import BoolArray
-from mission.planning import (
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import BoolArray
+from stopgo.mission.planning import (
     IN_HOLE,
     OUTSIDE,
     SLIVER,
@@ -30,18 +30,18 @@ from mission.planning import (
     Selection,
     Visibility,
 )
-from mission.settings import Settings
-from planner.candidates import candidates
-from planner.floors import FloorOptions, read_floor
-from planner.routing import GRAPHS, ROUTERS, route
-from planner.selection import select
-from planner.selection.cover import cover_of
-from planner.selection.demands import demands_of
-from planner.selection.greedy import greedy as choose_greedily
-from planner.sight import sight
-from planner.space.navigable import navigable
-from planner.visibility.bresenham import bresenham
-from planner.visibility.exact_sight import exact
+from stopgo.mission.settings import Settings
+from stopgo.planner.candidates import candidates
+from stopgo.planner.floors import FloorOptions, read_floor
+from stopgo.planner.routing import GRAPHS, ROUTERS, route
+from stopgo.planner.selection import select
+from stopgo.planner.selection.cover import cover_of
+from stopgo.planner.selection.demands import demands_of
+from stopgo.planner.selection.greedy import greedy as choose_greedily
+from stopgo.planner.sight import sight
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.visibility.bresenham import bresenham
+from stopgo.planner.visibility.exact_sight import exact
 from tests.planner.worlds import moved, turned
 
 FLOORS = Path(__file__).parents[2] / "shared" / "data" / "paper"

@@ -9,11 +9,11 @@ from typing import Any
 
 from benchmarks.shares import FLOORS
 from benchmarks.table import put, table, versions
-from mission.figures import percent
-from mission.files.plan_toml import read_settings
-from mission.planning import Selection, Visibility
-from planner import plan
-from planner.floors import options_of, read_floor
+from stopgo.mission.figures import percent
+from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.planning import Selection, Visibility
+from stopgo.planner import plan
+from stopgo.planner.floors import options_of, read_floor
 
 SCANNER: dict[str, Any] = {"scanner": "rtc360-medium"}
 ASKED: dict[str, dict[str, Any]] = {

@@ -8,16 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.table import put, table, versions
-from mission.figures import Figures, Share, percent
-from mission.planning import Selection, Visibility
-from mission.settings import Settings
-from planner import plan
-from planner.candidates import candidates
-from planner.floors import FloorOptions, read_floor
-from planner.refine import refined
-from planner.selection import select
-from planner.space.navigable import navigable
-from planner.visibility import visibility
+from stopgo.mission.figures import Figures, Share, percent
+from stopgo.mission.planning import Selection, Visibility
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.candidates import candidates
+from stopgo.planner.floors import FloorOptions, read_floor
+from stopgo.planner.refine import refined
+from stopgo.planner.selection import select
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.visibility import visibility
 
 HOME = Path(__file__).parents[1]
 SHARED = HOME.parent / "shared" / "data"
@@ -103,7 +103,7 @@ def plan_rows(name: str, path: Path, options: dict[str, float]) -> Iterator[list
 
 def _by_length(selection: Selection, figures: Figures) -> Figures:
     """The figures of a selection by length, whatever rule it was made by."""
-    from planner.appraisal.figures_of_route import shares_of
+    from stopgo.planner.appraisal.figures_of_route import shares_of
 
     space = selection.visibility.candidates.space
     by_length = replace(space, settings=replace(space.settings, coverage_rule="length"))

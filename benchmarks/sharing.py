@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.table import put, table, versions
-from mission.floor import FloorPlan
-from mission.schedule import schedule
-from mission.settings import Settings
-from mission.table import duration
-from planner import plan
-from planner.floors import FloorOptions, read_floor
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.schedule import schedule
+from stopgo.mission.settings import Settings
+from stopgo.mission.table import duration
+from stopgo.planner import plan
+from stopgo.planner.floors import FloorOptions, read_floor
 
 ROOT = Path(__file__).parents[1]
 FLOORS = {

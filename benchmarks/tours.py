@@ -20,16 +20,16 @@ import shapely
 
 from benchmarks.floors import office
 from benchmarks.table import put, table, versions
-from mission.geometry import FloatArray, IntArray
-from mission.planning import NavigableSpace
-from mission.settings import Settings
-from planner.routing.colony import ant_colony
-from planner.routing.grid_graph import RESOLUTIONS, ways_on_grids
-from planner.routing.proof import Proof, proved
-from planner.routing.roadmap import ways_between
-from planner.routing.tour import length_of, nanometres, searched, shortest_tour, trials
-from planner.routing.ways import Ways
-from planner.space.navigable import navigable
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.planning import NavigableSpace
+from stopgo.mission.settings import Settings
+from stopgo.planner.routing.colony import ant_colony
+from stopgo.planner.routing.grid_graph import RESOLUTIONS, ways_on_grids
+from stopgo.planner.routing.proof import Proof, proved
+from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.routing.tour import length_of, nanometres, searched, shortest_tour, trials
+from stopgo.planner.routing.ways import Ways
+from stopgo.planner.space.navigable import navigable
 
 SIDE = 100.0
 """Points lie in a square of this many metres."""

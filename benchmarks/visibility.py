@@ -14,15 +14,15 @@ import shapely
 
 from benchmarks.floors import office
 from benchmarks.table import median_seconds, put, table, versions
-from mission.floor import FloorPlan
-from mission.settings import Settings
-from planner.candidates import candidates
-from planner.floors import FloorOptions, read_floor
-from planner.shapes import local_origin, to_grid, to_shape
-from planner.sight import sight as sight_module
-from planner.sight.sight import Scene, scene_of, sight
-from planner.space.navigable import navigable
-from planner.visibility.exact_sight import open_space
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.settings import Settings
+from stopgo.planner.candidates import candidates
+from stopgo.planner.floors import FloorOptions, read_floor
+from stopgo.planner.shapes import local_origin, to_grid, to_shape
+from stopgo.planner.sight import sight as sight_module
+from stopgo.planner.sight.sight import Scene, scene_of, sight
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.visibility.exact_sight import open_space
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 PAPER = ("case1_structural", "case2_structural", "case1_rooms", "case2_rooms")

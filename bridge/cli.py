@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from bridge.commands.conform_commands import conform_commands
-from bridge.commands.doctor import doctor
-from bridge.commands.key_commands import key_commands
-from bridge.commands.mission_commands import clear, fetch_mission, push
-from bridge.commands.order_commands import add_orders
-from bridge.commands.robot_commands import robot
-from bridge.commands.simulate_commands import simulate_commands
-from bridge.commands.tunnel_commands import tunnel_commands
-from bridge.commands.watch_commands import watch_by
-from bridge.console import say
-from mission.errors import InputError
+from stopgo.bridge.commands.conform_commands import conform_commands
+from stopgo.bridge.commands.doctor import doctor
+from stopgo.bridge.commands.key_commands import key_commands
+from stopgo.bridge.commands.mission_commands import clear, fetch_mission, push
+from stopgo.bridge.commands.order_commands import add_orders
+from stopgo.bridge.commands.robot_commands import robot
+from stopgo.bridge.commands.simulate_commands import simulate_commands
+from stopgo.bridge.commands.tunnel_commands import tunnel_commands
+from stopgo.bridge.commands.watch_commands import watch_by
+from stopgo.bridge.console import say
+from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
-    from mission.heard_run import HeardRun, RunTaker
-    from recordings.carried.reading import Recording
+    from stopgo.mission.heard_run import HeardRun, RunTaker
+    from stopgo.recordings.carried.reading import Recording
 
 
 def add_commands(app: typer.Typer) -> None:
@@ -47,7 +47,7 @@ def recording(path: Path | None, plan: Path | None, *, view: bool) -> Iterator[H
 
     Nothing of Rerun is loaded without a recording and a plan.
     """
-    from mission.heard_run import HeardRun
+    from stopgo.mission.heard_run import HeardRun
 
     if path is None and view:
         raise InputError("--view shows what is recorded: say where, with --rrd FIELD.rrd")
@@ -57,19 +57,19 @@ def recording(path: Path | None, plan: Path | None, *, view: bool) -> Iterator[H
 
 
 def _field(path: Path, plan: Recording | None, *, view: bool) -> AbstractContextManager[RunTaker]:
-    from recordings.field import FieldRecording
+    from stopgo.recordings.field import FieldRecording
 
     record = FieldRecording(path, plan=plan, say=say)
     if not view:
         return record
-    from recordings.viewer import Viewed
+    from stopgo.recordings.viewer import Viewed
 
     return Viewed(record)
 
 
 def plan_recording(path: Path) -> Recording:
     """A plan's recording that tells what its stops see."""
-    from recordings.carried.reading import read_recording
+    from stopgo.recordings.carried.reading import read_recording
 
     found = read_recording(path)
     if not found.sights:

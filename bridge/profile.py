@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 
-from mission.errors import InputError
-from mission.toml_file import read_toml
+from stopgo.mission.errors import InputError
+from stopgo.mission.toml_file import read_toml
 
 NAMES = ("robot", "mavlink", "connect", "site", "keys", "as")
 """As in stopgo.toml; options have two hyphens before them, the environment STOPGO_."""

@@ -14,16 +14,16 @@ from ezdxf.addons.drawing import Frontend, RenderContext, layout, svg
 from ezdxf.addons.drawing.config import BackgroundPolicy, Configuration
 from ezdxf.document import Drawing
 
-from mission.document import Mission
-from mission.files.coverage_json import write_coverage
-from mission.files.exports import exported
-from mission.files.exports.format import FloorDrawing, Supplements
-from mission.files.exports.stretches import read_stretches
-from mission.planning import Route
-from mission.settings import Settings
-from planner import plan
-from planner.floors import read_floor
-from planner.floors.dxf import metres_in
+from stopgo.mission.document import Mission
+from stopgo.mission.files.coverage_json import write_coverage
+from stopgo.mission.files.exports import exported
+from stopgo.mission.files.exports.format import FloorDrawing, Supplements
+from stopgo.mission.files.exports.stretches import read_stretches
+from stopgo.mission.planning import Route
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.floors import read_floor
+from stopgo.planner.floors.dxf import metres_in
 
 OFFICE = Path("recordings/samples/office.dxf")
 THINNER = 0.2

@@ -16,13 +16,24 @@ from typing import Any
 
 import numpy as np
 
-from mission.document import Stop
-from mission.files.floor_drawing import LOOKS, kinds_of
-from mission.files.svg import circle, group, line, line_data, path, polygon, rect, ring_data, text, text_width
-from mission.floor import FloorPlan
-from mission.geometry import BoolArray, FloatArray, IntArray, Polygon
-from mission.plan import PartPlan
-from mission.planning import (
+from stopgo.mission.document import Stop
+from stopgo.mission.files.floor_drawing import LOOKS, kinds_of
+from stopgo.mission.files.svg import (
+    circle,
+    group,
+    line,
+    line_data,
+    path,
+    polygon,
+    rect,
+    ring_data,
+    text,
+    text_width,
+)
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon
+from stopgo.mission.plan import PartPlan
+from stopgo.mission.planning import (
     AT_EDGE,
     IN_HOLE,
     KEPT,
@@ -33,11 +44,11 @@ from mission.planning import (
     NavigableSpace,
     Visibility,
 )
-from mission.seen import runs_of, seen_units
-from mission.settings import Settings
-from planner import plan
-from planner.floors import FloorOptions, read_floor
-from planner.visibility.bresenham import bresenham
+from stopgo.mission.seen import runs_of, seen_units
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.floors import FloorOptions, read_floor
+from stopgo.planner.visibility.bresenham import bresenham
 
 OFFICE = Path("recordings/samples/office.dxf")
 VIEW = (15.8, 6.5)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from mission.figures import Share, Shares, how_bad
-from mission.geometry import BoolArray
-from mission.sight import Sight
+from stopgo.mission.figures import Share, Shares, how_bad
+from stopgo.mission.geometry import BoolArray
+from stopgo.mission.sight import Sight
 
 Certainty = Literal["yes", "no", "unknown"]
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mission.errors import InputError
-from mission.parameter import numbers
+from stopgo.mission.errors import InputError
+from stopgo.mission.parameter import numbers
 
 if TYPE_CHECKING:
-    from mission.geometry import FloatArray
-    from mission.rigid_fit import RigidFit
+    from stopgo.mission.geometry import FloatArray
+    from stopgo.mission.rigid_fit import RigidFit
 
 FORM = "write X,Y=MAPX,MAPY in metres, such as 2.5,3=12.1,-4.7"
 FARTHEST = 1e7
@@ -44,8 +44,8 @@ def align(
 
     Example: stopgo align --pair 0,0=12.10,-4.70 --pair 8,0=20.06,-3.91 --pair 8,6=19.47,2.06
     """
-    from mission.page import json_text
-    from mission.rigid_fit import rigid_fit
+    from stopgo.mission.page import json_text
+    from stopgo.mission.rigid_fit import rigid_fit
 
     if (mission is None) != (out is None):
         raise InputError("give --mission FILE and -o FILE together: the mission, and where it is written")
@@ -112,9 +112,9 @@ def _placed(mission: Path, out: Path, fit: RigidFit) -> str:
     """Write the mission with the transform in its frame; its revision as it is told."""
     from msgspec.structs import replace
 
-    from mission.document import sealed
-    from mission.files.atomic import write_checked
-    from mission.files.mission_json import encode, next_revision, read
+    from stopgo.mission.document import sealed
+    from stopgo.mission.files.atomic import write_checked
+    from stopgo.mission.files.mission_json import encode, next_revision, read
 
     document = read(mission)
     placed = replace(document, frame=replace(document.frame, to_map=fit.transform))
@@ -145,7 +145,7 @@ def _told(fit: RigidFit, points: Sequence[PointPair], written: str | None) -> di
 
 
 def _text(fit: RigidFit, points: Sequence[PointPair], written: str | None) -> str:
-    from mission.table import table
+    from stopgo.mission.table import table
 
     header = ("x m", "y m", "map x m", "map y m", "off mm")
     rows = [

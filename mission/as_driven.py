@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from mission.figures import Share, Shares
-from mission.geometry import BoolArray
-from mission.ledger import Ledger
+from stopgo.mission.figures import Share, Shares
+from stopgo.mission.geometry import BoolArray
+from stopgo.mission.ledger import Ledger
 
 
 @dataclass(frozen=True, eq=False)

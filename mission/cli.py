@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mission.align_command import align
-from mission.errors import AnswerIsNo, InputError
+from stopgo.mission.align_command import align
+from stopgo.mission.errors import AnswerIsNo, InputError
 
 if TYPE_CHECKING:
-    from mission.document import Mission
-    from mission.files.exports.format import FloorDrawing, Supplements
-    from mission.problems import Problem
+    from stopgo.mission.document import Mission
+    from stopgo.mission.files.exports.format import FloorDrawing, Supplements
+    from stopgo.mission.problems import Problem
 
 MissionFile = Annotated[Path, typer.Argument(metavar="MISSION", help="A mission.json.")]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout and nothing else.")]
@@ -41,10 +41,10 @@ def show(mission: MissionFile, as_json: AsJson = False) -> None:
 
     Example: stopgo show out/mission.json
     """
-    from mission.files.mission_json import read
-    from mission.page import json_text, page, report
-    from mission.problems import problems_of
-    from mission.schedule import schedule
+    from stopgo.mission.files.mission_json import read
+    from stopgo.mission.page import json_text, page, report
+    from stopgo.mission.problems import problems_of
+    from stopgo.mission.schedule import schedule
 
     document = read(mission)
     for problem in problems_of(document)[:1]:
@@ -72,8 +72,8 @@ def check(
 
     Example: stopgo check out/mission.json --floor office.dxf
     """
-    from mission.files.mission_json import read
-    from mission.page import identity, json_text
+    from stopgo.mission.files.mission_json import read
+    from stopgo.mission.page import identity, json_text
 
     document = read(mission)
     found = _checked(document, floor, coverage)
@@ -82,7 +82,7 @@ def check(
     if as_json:
         typer.echo(json_text(_verdict(mission, document, found)))
     elif found.problems:
-        from mission.table import printable_lines
+        from stopgo.mission.table import printable_lines
 
         typer.echo(printable_lines("\n".join(map(str, found.problems))))
     else:
@@ -104,8 +104,8 @@ class _Checked:
 
 
 def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Checked:
-    from mission.files.coverage_json import read_coverage
-    from mission.problems import problems_of
+    from stopgo.mission.files.coverage_json import read_coverage
+    from stopgo.mission.problems import problems_of
 
     problems = problems_of(mission)
     if floor is None:
@@ -115,7 +115,7 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
     claims = None if coverage is None else read_coverage(coverage, mission)
     other = _other_floor(mission, floor)
     try:
-        from planner.checking.verdict import verdict
+        from stopgo.planner.checking.verdict import verdict
 
         if sys.stderr.isatty():
             typer.echo(f"holding the mission against {floor} …", err=True)
@@ -140,13 +140,13 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
 
 def _is_of_plan(error: ModuleNotFoundError) -> bool:
     """Whether what is missing is a library of the extra, not a part of this program."""
-    return (error.name or "").partition(".")[0] not in ("", "mission", "planner")
+    return (error.name or "").partition(".")[0] not in ("", "stopgo")
 
 
 def _other_floor(mission: Mission, floor: Path) -> tuple[Problem, ...]:
     import hashlib
 
-    from mission.problems import Problem
+    from stopgo.mission.problems import Problem
 
     try:
         digest = hashlib.sha256(floor.read_bytes()).hexdigest()
@@ -216,11 +216,11 @@ def export(
 
     Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
     """
-    from mission.files.atomic import must_not_replace, write_checked
-    from mission.files.exports import check_uses, exported, form_of, format_named
-    from mission.files.exports.placing import moved, placed
-    from mission.files.mission_json import read
-    from mission.problems import problems_of
+    from stopgo.mission.files.atomic import must_not_replace, write_checked
+    from stopgo.mission.files.exports import check_uses, exported, form_of, format_named
+    from stopgo.mission.files.exports.placing import moved, placed
+    from stopgo.mission.files.mission_json import read
+    from stopgo.mission.problems import problems_of
 
     document = read(mission)
     there = placed(document, origin=origin, to_map=map_)
@@ -245,8 +245,8 @@ def _supplements(
     from dataclasses import replace
     from datetime import UTC, datetime
 
-    from mission.files.exports.format import written_as
-    from mission.files.exports.stretches import read_stretches
+    from stopgo.mission.files.exports.format import written_as
+    from stopgo.mission.files.exports.stretches import read_stretches
 
     return replace(
         written_as(writing),
@@ -258,11 +258,11 @@ def _supplements(
 
 def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
     """The drawing the mission was planned on, in the unit it was planned in."""
-    from mission.files.exports.format import FloorDrawing
-    from mission.files.plan_toml import read_settings
-    from planner.floors import options_of
-    from planner.floors.drawing import open_drawing
-    from planner.floors.dxf import metres_in
+    from stopgo.mission.files.exports.format import FloorDrawing
+    from stopgo.mission.files.plan_toml import read_settings
+    from stopgo.planner.floors import options_of
+    from stopgo.planner.floors.drawing import open_drawing
+    from stopgo.planner.floors.dxf import metres_in
 
     if path.suffix.lower() != ".dxf":
         raise InputError(
@@ -278,7 +278,7 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
 
 
 def _say_notes(notes: Iterable[str]) -> None:
-    from mission.table import printable
+    from stopgo.mission.table import printable
 
     for note in notes:
         typer.echo(f"stopgo: {printable(note)}", err=True)
@@ -286,7 +286,7 @@ def _say_notes(notes: Iterable[str]) -> None:
 
 def _say_export(report: dict[str, Any], title: str, as_json: bool) -> None:
     _say_notes(report["notes"])
-    from mission.page import json_text
+    from stopgo.mission.page import json_text
 
     line = f"{report['file']}: {title}, {report['stops']} stops, read back"
     typer.echo(json_text(report) if as_json else line)
@@ -317,12 +317,12 @@ def import_command(
     """
     from msgspec.structs import replace
 
-    from mission.document import sealed
-    from mission.files.atomic import write_checked
-    from mission.files.imports import read_mission
-    from mission.files.mission_json import encode, next_revision, read
-    from mission.files.plan_toml import read_settings
-    from mission.settings import PARAMETERS
+    from stopgo.mission.document import sealed
+    from stopgo.mission.files.atomic import write_checked
+    from stopgo.mission.files.imports import read_mission
+    from stopgo.mission.files.mission_json import encode, next_revision, read
+    from stopgo.mission.files.plan_toml import read_settings
+    from stopgo.mission.settings import PARAMETERS
 
     given = {"origin": origin, "start": start}
     settings = read_settings(parameters, {key: PARAMETERS[key].given(text) for key, text in given.items()})
@@ -338,7 +338,7 @@ UNASKED = (
 
 
 def _say_import(mission: Mission, out: Path, notes: tuple[str, ...], as_json: bool) -> None:
-    from mission.page import identity, json_text, route_length
+    from stopgo.mission.page import identity, json_text, route_length
 
     _say_notes(notes)
     report = {

@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from mission.acquired import Acquired
-from mission.document import Mission
-from mission.events import State
-from mission.geometry import FloatArray, IntArray
-from mission.run_log import RunLog
-from mission.tolerance import beside, is_outside
+from stopgo.mission.acquired import Acquired
+from stopgo.mission.document import Mission
+from stopgo.mission.events import State
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.run_log import RunLog
+from stopgo.mission.tolerance import beside, is_outside
 
 DONE = {"scanned": "scanned", "unconfirmed": "passed"}
 """Outcomes of a stop that is done, in words."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from mission.planning import Route
+from stopgo.mission.planning import Route
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from typing import Any, Final, Literal
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from mission.floor_source import FloorSource
-from mission.settings import FLOOR_PARAMETERS, Settings, told_of
+from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, told_of
 
 SCHEMA: Final = "stopgo/mission"
 VERSION: Final = 1

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 
-from mission.decoding import one_decode_error
+from stopgo.mission.decoding import one_decode_error
 
 State = Literal["IDLE", "READY", "RUNNING", "PAUSED", "HELD", "HOMING", "FINISHED", "ABORTED"]
 StopState = Literal[

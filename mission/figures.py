@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from mission.floor import Finding, Rank
-from mission.planning import Unreached
+from stopgo.mission.floor import Finding, Rank
+from stopgo.mission.planning import Unreached
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from types import MappingProxyType
 
-from mission.floor_source import FloorSource
-from mission.geometry import FloatArray, Polygon
+from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.geometry import FloatArray, Polygon
 
 
 class Rank(IntEnum):

@@ -8,12 +8,12 @@ from typing import Protocol
 
 import numpy as np
 
-from mission.comparing.compare import compare
-from mission.comparison import Comparison
-from mission.document import Mission
-from mission.events import AnyEvent, Health, PoseReport, PosesMissing, StateReport
-from mission.run_log import LogSource, RunLog, Track
-from mission.sight import Sight
+from stopgo.mission.comparing.compare import compare
+from stopgo.mission.comparison import Comparison
+from stopgo.mission.document import Mission
+from stopgo.mission.events import AnyEvent, Health, PoseReport, PosesMissing, StateReport
+from stopgo.mission.run_log import LogSource, RunLog, Track
+from stopgo.mission.sight import Sight
 
 SOURCE = LogSource(name="heard", format="live", digest="", messages=0)
 

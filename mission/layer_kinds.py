@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from mission.errors import InputError
-from mission.kinds import KINDS
-from mission.toml_file import read_toml
+from stopgo.mission.errors import InputError
+from stopgo.mission.kinds import KINDS
+from stopgo.mission.toml_file import read_toml
 
 LAYER_ROLES = ("floor", "rooms", "names", "doors", "openings", "passages", *KINDS, "furniture", "ignore")
 """What a layer of a drawing can stand for; names are of rooms, openings are doors and windows alike."""

@@ -9,9 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from mission.figures import Share, Shares, worst_first
-from mission.geometry import BoolArray, FloatArray, IntArray, frozen
-from mission.planning import Visibility, weights_of
+from stopgo.mission.figures import Share, Shares, worst_first
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
+from stopgo.mission.planning import Visibility, weights_of
 
 OUTSIDE = "in no room"
 """The name of what faces no room."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from msgspec import UNSET, UnsetType
 
-from mission.document import LimitsSpec
-from mission.settings import Settings
+from stopgo.mission.document import LimitsSpec
+from stopgo.mission.settings import Settings
 
 SCANNER_HEIGHT_M = 1.3
 """Of a scanner of which nobody says how high it stands."""

@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mission.figures import Shares
-from mission.geometry import BoolArray, FloatArray, IntArray, Polygon
-from mission.ledger import Ledger
+from stopgo.mission.figures import Shares
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon
+from stopgo.mission.ledger import Ledger
 
 
 @dataclass(frozen=True, eq=False)

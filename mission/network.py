@@ -10,8 +10,8 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from mission.document import Mission, Overlap
-from mission.figures import percent
+from stopgo.mission.document import Mission, Overlap
+from stopgo.mission.figures import percent
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from typing import Any
 
 import msgspec
 
-from mission.document import Mission, Stop
-from mission.geometry import frozen, polyline_length
-from mission.limits import limits_in_words
-from mission.planning import Schedule
-from mission.table import duration, printable, table
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.geometry import frozen, polyline_length
+from stopgo.mission.limits import limits_in_words
+from stopgo.mission.planning import Schedule
+from stopgo.mission.table import duration, printable, table
 
 
 def report(mission: Mission, times: Schedule) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin
 
-from mission.errors import InputError
+from stopgo.mission.errors import InputError
 
 LARGEST = 1e6
 FARTHEST = 1e9

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from mission.document import Mission
-from mission.figures import Figures, percent
-from mission.floor import FloorPlan
-from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
-from mission.schedule import schedule
-from mission.settings import Settings
+from stopgo.mission.document import Mission
+from stopgo.mission.figures import Figures, percent
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
+from stopgo.mission.schedule import schedule
+from stopgo.mission.settings import Settings
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,7 +138,7 @@ class Plan:
 
     def _repr_svg_(self) -> str:
         """The printed plan of the first part, for notebooks."""
-        from mission.files.plan_svg import plan_svg
+        from stopgo.mission.files.plan_svg import plan_svg
 
         whole = self.whole
         return plan_svg(whole.route, whole.mission, whole.figures, self.shared, date="").decode()

@@ -7,10 +7,10 @@ from functools import cached_property
 
 from msgspec import UnsetType
 
-from mission.document import Mission
-from mission.figures import percent
-from mission.geometry import BoolArray, FloatArray
-from mission.planning import Targets
+from stopgo.mission.document import Mission
+from stopgo.mission.figures import percent
+from stopgo.mission.geometry import BoolArray, FloatArray
+from stopgo.mission.planning import Targets
 
 ALLOWED_SHARE = 0.01
 """By how much less than the plan promises may be acquired: what grazes a wall falls between two rays."""

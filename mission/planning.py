@@ -10,9 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mission.floor import Element, Finding, FloorPlan, Opening, Room
-from mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen, polyline_length
-from mission.settings import Settings
+from stopgo.mission.floor import Element, Finding, FloorPlan, Opening, Room
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen, polyline_length
+from stopgo.mission.settings import Settings
 
 
 @dataclass(frozen=True, eq=False)

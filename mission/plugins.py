@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import os
 import sys
-import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from traceback import walk_tb
+from types import FrameType
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mission.errors import InputError, StopgoError
+from stopgo.mission.errors import InputError, StopgoError
 
 T = TypeVar("T")
 
@@ -155,20 +156,24 @@ def _blaming(who: str) -> Iterator[None]:
 def _told(error: Exception) -> str:
     """What went wrong, and where in the file that was called."""
     told = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if not _is_ours(f.filename)]
-    if not frames or isinstance(error, SyntaxError):  # which says itself where
+    theirs = [
+        (frame.f_code.co_filename, line) for frame, line in walk_tb(error.__traceback__) if _is_theirs(frame)
+    ]
+    if not theirs or isinstance(error, SyntaxError):  # which says itself where
         return told
-    last = next(frame for frame in reversed(frames) if frame.filename == frames[0].filename)
-    return f"{told} ({os.path.basename(last.filename)}, line {last.lineno})"
+    file, line = next(found for found in reversed(theirs) if found[0] == theirs[0][0])
+    return f"{told} ({os.path.basename(file)}, line {line})"
 
 
-def _is_ours(file: str) -> bool:
-    """Whether a file is one of ours, or what loads modules."""
-    return file.startswith((*OURS, "<frozen")) or os.path.join("importlib", "__init__") in file
-
-
-_HOME = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-OURS = tuple(os.path.join(_HOME, name, "") for name in ("mission", "planner", "bridge", "recordings"))
+def _is_theirs(frame: FrameType) -> bool:
+    """Whether what runs in a frame is neither ours nor what loads modules."""
+    package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+    return package not in (
+        __name__.partition(".")[0],
+        "importlib",
+        "_frozen_importlib",
+        "_frozen_importlib_external",
+    )
 
 
 def _kind_of(given: object) -> str:

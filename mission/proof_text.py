@@ -7,9 +7,9 @@ from typing import Any
 
 import msgspec
 
-from mission.document import MissionShare
-from mission.figures import percent
-from mission.plan_proof import (
+from stopgo.mission.document import MissionShare
+from stopgo.mission.figures import percent
+from stopgo.mission.plan_proof import (
     ALLOWED_SHARE,
     REGISTERED_DEG,
     REGISTERED_M,
@@ -18,7 +18,7 @@ from mission.plan_proof import (
     ScanPair,
     Simulation,
 )
-from mission.table import printable
+from stopgo.mission.table import printable
 
 SCHEMA = "stopgo/proof"
 VERSION = 1

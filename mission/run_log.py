@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mission.events import Aborted, AnyEvent, Finished, Started
-from mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.events import Aborted, AnyEvent, Finished, Started
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from mission.document import Mission, Point, RobotSpec
-from mission.geometry import FloatArray, frozen
-from mission.planning import Schedule
+from stopgo.mission.document import Mission, Point, RobotSpec
+from stopgo.mission.geometry import FloatArray, frozen
+from stopgo.mission.planning import Schedule
 
 
 def schedule(mission: Mission) -> Schedule:

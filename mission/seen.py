@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.geometry import BoolArray, FloatArray, IntArray, frozen
-from mission.planning import Selection, Targets
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
+from stopgo.mission.planning import Selection, Targets
 
 
 @dataclass(frozen=True, eq=False)

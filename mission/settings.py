@@ -13,11 +13,11 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Annotated, Any, Literal, get_type_hints
 
-from mission.errors import InputError
-from mission.kinds import KINDS
-from mission.layer_kinds import check_entries, entries_in, kinds_by_name
-from mission.parameter import Parameter, seconds, words
-from mission.scanners import SCANNERS, ScannerName
+from stopgo.mission.errors import InputError
+from stopgo.mission.kinds import KINDS
+from stopgo.mission.layer_kinds import check_entries, entries_in, kinds_by_name
+from stopgo.mission.parameter import Parameter, seconds, words
+from stopgo.mission.scanners import SCANNERS, ScannerName
 
 LEAST_SHARE = 0.7
 """Of every room and kind: the most that cost at most one stop on small floors and 5 % on a large one."""

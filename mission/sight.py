@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from mission.document import Mission, Stop
-from mission.figures import Figures, Shares
-from mission.geometry import BoolArray, IntArray, frozen
-from mission.ledger import Ledger, ledger_of
-from mission.planning import Route, Targets
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.figures import Figures, Shares
+from stopgo.mission.geometry import BoolArray, IntArray, frozen
+from stopgo.mission.ledger import Ledger, ledger_of
+from stopgo.mission.planning import Route, Targets
 
 SAME_PLACE_M = 1e-6
 """A stop of another revision within this distance of a planned one sees the same."""

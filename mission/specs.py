@@ -8,10 +8,10 @@ from typing import Any
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from mission import __version__
-from mission.document import LimitsSpec, Origin, Policy, RobotSpec, Scan, ScannerSpec, SiteOrigin
-from mission.limits import blind_range
-from mission.settings import FLOOR_PARAMETERS, Settings, told_of
+from stopgo.mission import __version__
+from stopgo.mission.document import LimitsSpec, Origin, Policy, RobotSpec, Scan, ScannerSpec, SiteOrigin
+from stopgo.mission.limits import blind_range
+from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, told_of
 
 DECIMALS = 6
 """Missions hold micrometres and microradians: finer would be float noise."""

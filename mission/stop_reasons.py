@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.figures import Share, percent
-from mission.geometry import BoolArray, FloatArray, IntArray
-from mission.ledger import OUTSIDE, Ledger, ledger_of
-from mission.planning import Route, Visibility, weights_of
+from stopgo.mission.figures import Share, percent
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.ledger import OUTSIDE, Ledger, ledger_of
+from stopgo.mission.planning import Route, Visibility, weights_of
 
 NEARLY = 0.8
 """A candidate is a runner-up if it would have seen at least this share of what the chosen one newly saw."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
-from mission.document import Mission, Stop
-from mission.events import AnyEvent, Pose, Scanned, Unconfirmed
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.events import AnyEvent, Pose, Scanned, Unconfirmed
 
 MOST_NAMED = 6
 

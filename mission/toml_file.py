@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from mission.errors import InputError
+from stopgo.mission.errors import InputError
 
 
 def read_toml(path: Path, *, way_out: str = "") -> dict[str, Any]:

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mission.division import DividedRoute
-    from mission.floor import FloorPlan
-    from mission.plan import PartPlan, Plan
-    from mission.planning import Candidates, NavigableSpace, Route, Selection
-    from mission.settings import Settings
+    from stopgo.mission.division import DividedRoute
+    from stopgo.mission.floor import FloorPlan
+    from stopgo.mission.plan import PartPlan, Plan
+    from stopgo.mission.planning import Candidates, NavigableSpace, Route, Selection
+    from stopgo.mission.settings import Settings
 
 Observe = Callable[[Any], None]
 
@@ -33,10 +33,10 @@ def plan(
     InputError
         A start, an end or a variant that does not fit the floor.
     """
-    from mission.errors import InputError
-    from mission.plan import Plan
-    from planner.candidates import candidates
-    from planner.space.navigable import navigable
+    from stopgo.mission.errors import InputError
+    from stopgo.mission.plan import Plan
+    from stopgo.planner.candidates import candidates
+    from stopgo.planner.space.navigable import navigable
 
     observe(floor)
     space = navigable(floor, settings)
@@ -52,7 +52,7 @@ def plan(
 
 def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
     """Plan from candidates on; `planned` are all parts of the floor that the plan enters."""
-    from planner.routing import route
+    from stopgo.planner.routing import route
 
     selection = _selected(found, observe)
     settings = found.space.settings
@@ -63,10 +63,10 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
 
 def _selected(found: Candidates, observe: Observe) -> Selection:
     """The fewest stops."""
-    from planner.anywhere import SELECTOR, anywhere
-    from planner.refine import refined
-    from planner.selection import select
-    from planner.visibility import visibility
+    from stopgo.planner.anywhere import SELECTOR, anywhere
+    from stopgo.planner.refine import refined
+    from stopgo.planner.selection import select
+    from stopgo.planner.visibility import visibility
 
     observe(found)
     seen = visibility(found)
@@ -75,16 +75,16 @@ def _selected(found: Candidates, observe: Observe) -> Selection:
 
 
 def _in_least_time(route: Route) -> Route:
-    from planner.covering_tour import in_least_time
+    from stopgo.planner.covering_tour import in_least_time
 
     return in_least_time(route)
 
 
 def _part(driven: Route, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
     """The plan that drives a route."""
-    from mission.plan import PartPlan
-    from planner.appraisal.figures_of_route import figures_of
-    from planner.assemble import assemble
+    from stopgo.mission.plan import PartPlan
+    from stopgo.planner.appraisal.figures_of_route import figures_of
+    from stopgo.planner.assemble import assemble
 
     observe(driven)
     figures = figures_of(driven, planned=planned)
@@ -100,10 +100,10 @@ UNDIVIDED = -1
 
 def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) -> Plan:
     """Plan one part, and share its stops out among robots or tours."""
-    from mission.document import MissionShare
-    from mission.plan import DividedPlan, PartPlan, Plan
-    from planner.appraisal.figures_of_route import figures_of_share
-    from planner.assemble import assemble
+    from stopgo.mission.document import MissionShare
+    from stopgo.mission.plan import DividedPlan, PartPlan, Plan
+    from stopgo.planner.appraisal.figures_of_route import figures_of_share
+    from stopgo.planner.assemble import assemble
 
     selection = _selected(found, observe)
     driven, out = _shared_out(selection)
@@ -125,9 +125,9 @@ def _shared_out(selection: Selection) -> tuple[Route, DividedRoute]:
     For the least time it is done both with the route of least time and with that of fewest stops: what is
     quicker for one robot need not be quicker shared out.
     """
-    from planner.covering_tour import as_before
-    from planner.routing import route
-    from planner.sharing.dividing import divided, taken_by
+    from stopgo.planner.covering_tour import as_before
+    from stopgo.planner.routing import route
+    from stopgo.planner.sharing.dividing import divided, taken_by
 
     driven = route(selection)
     if selection.visibility.candidates.space.settings.minimise == "stops":
@@ -142,7 +142,7 @@ def parts_to_plan(space: NavigableSpace) -> list[Candidates]:
 
     Parts that hold no room are left out where nothing is to be seen from them, as from a landing.
     """
-    from planner.candidates import candidates
+    from stopgo.planner.candidates import candidates
 
     first = candidates(space)
     rooms = {
@@ -154,8 +154,8 @@ def parts_to_plan(space: NavigableSpace) -> list[Candidates]:
 
 
 def _see_anything(found: Candidates) -> bool:
-    from mission.errors import AnswerIsNo
-    from planner.visibility import visibility
+    from stopgo.mission.errors import AnswerIsNo
+    from stopgo.planner.visibility import visibility
 
     try:
         visibility(found)

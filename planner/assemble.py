@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 from msgspec import UNSET, UnsetType
 
-from mission import __version__
-from mission.document import (
+from stopgo.mission import __version__
+from stopgo.mission.document import (
     Frame,
     Mission,
     MissionShare,
@@ -23,11 +23,11 @@ from mission.document import (
     sealed,
     stop_names,
 )
-from mission.errors import StopgoError
-from mission.geometry import FloatArray
-from mission.planning import Candidates, NavigableSpace, Route
-from mission.settings import Settings
-from mission.specs import (
+from stopgo.mission.errors import StopgoError
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.planning import Candidates, NavigableSpace, Route
+from stopgo.mission.settings import Settings
+from stopgo.mission.specs import (
     DECIMALS,
     limits_spec_of,
     origin_of,
@@ -38,12 +38,12 @@ from mission.specs import (
     scanner_of,
     site_origin_of,
 )
-from mission.turning import SAME
-from planner.overlap.registered import registered_pairs
-from planner.routing import GRAPHS
-from planner.shapes import local_origin
-from planner.space.gaps import Walls, keeps_clear
-from planner.space.reach import walls_of
+from stopgo.mission.turning import SAME
+from stopgo.planner.overlap.registered import registered_pairs
+from stopgo.planner.routing import GRAPHS
+from stopgo.planner.shapes import local_origin
+from stopgo.planner.space.gaps import Walls, keeps_clear
+from stopgo.planner.space.reach import walls_of
 
 CLEAR_SLACK = 2e-6
 """What rounding to DECIMALS may cost in clearance."""

@@ -15,20 +15,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mission.errors import InputError, OutcomeUnknown, StopgoError
-from planner.floor_commands import add_floor_commands
+from stopgo.mission.errors import InputError, OutcomeUnknown, StopgoError
+from stopgo.planner.floor_commands import add_floor_commands
 
 if TYPE_CHECKING:
-    from bridge.station.station import Station
-    from mission.comparison import Comparison
-    from mission.document import Mission
-    from mission.floor import FloorPlan
-    from mission.heard_run import HeardRun
-    from mission.plan import PartPlan, Plan
-    from mission.plan_proof import PlanProof
-    from mission.settings import Settings
-    from planner.report import PlanReport
-    from recordings.plan import PlanRecording
+    from stopgo.bridge.station.station import Station
+    from stopgo.mission.comparison import Comparison
+    from stopgo.mission.document import Mission
+    from stopgo.mission.floor import FloorPlan
+    from stopgo.mission.heard_run import HeardRun
+    from stopgo.mission.plan import PartPlan, Plan
+    from stopgo.mission.plan_proof import PlanProof
+    from stopgo.mission.settings import Settings
+    from stopgo.planner.report import PlanReport
+    from stopgo.recordings.plan import PlanRecording
 
 EXAMPLE_PROOF = "Example: stopgo prove plan/mission.json --floor floor.dxf"
 EXAMPLE = "Example: stopgo plan floor.dxf -o plan --range 8 --start 2.5,3.0,90"
@@ -36,7 +36,7 @@ EXAMPLE = "Example: stopgo plan floor.dxf -o plan --range 8 --start 2.5,3.0,90"
 
 def add_commands(app: typer.Typer) -> None:
     """Add this folder's verbs to the front door."""
-    from planner.options import with_options
+    from stopgo.planner.options import with_options
 
     app.command(name="plan", epilog=EXAMPLE)(with_options(plan_command))
     add_floor_commands(app)
@@ -80,8 +80,8 @@ def plan_command(
     Exit code 1: no plan can be made, or the robot would drive over lines that were not read; with --strict
     also where floor is left out or the plan is doubtful.
     """
-    from mission.files.plan_toml import read_settings, settings_json, settings_toml
-    from planner.options import values_of
+    from stopgo.mission.files.plan_toml import read_settings, settings_json, settings_toml
+    from stopgo.planner.options import values_of
 
     settings = read_settings(parameters, values_of(given))
     if print_config:
@@ -90,7 +90,7 @@ def plan_command(
     if floor is None:
         raise InputError("no floor given; name a file, such as: stopgo plan floor.dxf -o plan")
     if all_storeys:
-        from planner.storeys import plan_storeys
+        from stopgo.planner.storeys import plan_storeys
 
         one = partial(_plan_storey, all_parts=all_parts, strict=strict, printed=Printed(sheets, rings))
         return plan_storeys(floor, _folder(out), settings, one, as_json=as_json)
@@ -122,7 +122,7 @@ def _plan_storey(
 
 def _print(reports: list[PlanReport], *, as_json: bool) -> None:
     if not as_json:
-        from mission.table import printable_lines
+        from stopgo.mission.table import printable_lines
 
         typer.echo(printable_lines("\n".join(report.as_text() for report in reports)))
         return
@@ -136,10 +136,10 @@ def plan_files(
     floor: Path, out: Path, settings: Settings, *, all_parts: bool = False, printed: Printed | None = None
 ) -> list[PlanReport]:
     """Plan a floor's file into a folder; one report per part, the main part first."""
-    from mission.files.atomic import must_be_writable
-    from planner import plan
-    from planner.floors import options_of, read_floor
-    from planner.outputs import names
+    from stopgo.mission.files.atomic import must_be_writable
+    from stopgo.planner import plan
+    from stopgo.planner.floors import options_of, read_floor
+    from stopgo.planner.outputs import names
 
     watch = Stopwatch()
     read = read_floor(floor, options_of(settings))
@@ -153,7 +153,7 @@ def plan_files(
     _set_aside(folder, len(reports), read, settings)
     if made.divided is None:
         return reports
-    from planner.sharing.shared_report import shared_report
+    from stopgo.planner.sharing.shared_report import shared_report
 
     return [shared_report(made.divided, reports)]
 
@@ -161,8 +161,8 @@ def plan_files(
 @contextmanager
 def _telling_findings(floor: FloorPlan) -> Iterator[None]:
     """Where no plan can be made, what was odd about the drawing may say why: told on stderr."""
-    from mission.floor import Rank
-    from planner.report import finding_lines
+    from stopgo.mission.floor import Rank
+    from stopgo.planner.report import finding_lines
 
     try:
         yield
@@ -174,7 +174,7 @@ def _telling_findings(floor: FloorPlan) -> Iterator[None]:
 
 
 def _set_aside(folder: Path, parts: int, floor: FloorPlan, settings: Settings) -> None:
-    from planner.outputs import set_aside
+    from stopgo.planner.outputs import set_aside
 
     moved = set_aside(folder, parts, floor.source, settings)
     if moved:
@@ -198,14 +198,14 @@ def _write_part(
     """Write the plan of one part; its files appear together, mission.json last."""
     from dataclasses import replace
 
-    from mission.files.atomic import replacing
-    from mission.files.coverage_json import coverage_json
-    from mission.files.mission_json import encode
-    from mission.files.plan_svg import plan_svg
-    from mission.schedule import schedule
-    from mission.sight import sight_of
-    from planner.outputs import names, set_aside_file
-    from planner.report import PlanReport
+    from stopgo.mission.files.atomic import replacing
+    from stopgo.mission.files.coverage_json import coverage_json
+    from stopgo.mission.files.mission_json import encode
+    from stopgo.mission.files.plan_svg import plan_svg
+    from stopgo.mission.schedule import schedule
+    from stopgo.mission.sight import sight_of
+    from stopgo.planner.outputs import names, set_aside_file
+    from stopgo.planner.report import PlanReport
 
     files = names(folder, number)
     mission = _revised(part.mission, files["mission"])
@@ -247,7 +247,7 @@ def _write_part(
 def _recording(recording_id: str) -> PlanRecording | None:
     """Takes the nouns of a plan; None, with a line that says so, where recordings are not installed."""
     try:
-        from recordings.plan import PlanRecording
+        from stopgo.recordings.plan import PlanRecording
     except ModuleNotFoundError as error:
         _told_without_rerun(error, "plan.rrd")
         return None
@@ -256,7 +256,7 @@ def _recording(recording_id: str) -> PlanRecording | None:
 
 def _sheets(part: PartPlan, mission: Mission, printed: Printed, date: str, path: Path) -> bytes | None:
     """The set of sheets, if it is wanted; None, with a line that says so, where PDFs are not installed."""
-    from mission.files.plan_sheets import needs_sheets, plan_pdf
+    from stopgo.mission.files.plan_sheets import needs_sheets, plan_pdf
 
     if printed.sheets is False or not (printed.sheets or needs_sheets(part.route, mission)):
         return None
@@ -279,8 +279,8 @@ def _revised(mission: Mission, path: Path) -> Mission:
     """The mission with the revision that replaces what is at `path`."""
     from msgspec.structs import replace
 
-    from mission.document import sealed
-    from mission.files.mission_json import next_revision
+    from stopgo.mission.document import sealed
+    from stopgo.mission.files.mission_json import next_revision
 
     return sealed(replace(mission, revision=next_revision(path, mission)))
 
@@ -370,10 +370,10 @@ def prove_command(
     Exit code 1: the plan promises more than the simulated scans show; with --strict also where these do not
     all join.
     """
-    from mission.files.atomic import must_be_writable
-    from mission.proof_text import proof_json, proof_text
-    from mission.table import printable
-    from planner.proving.proof_files import proof_files, prove_file
+    from stopgo.mission.files.atomic import must_be_writable
+    from stopgo.mission.proof_text import proof_json, proof_text
+    from stopgo.mission.table import printable
+    from stopgo.planner.proving.proof_files import proof_files, prove_file
 
     folder = mission.parent if out is None else _folder(out)
     files = proof_files(folder, mission)
@@ -403,13 +403,13 @@ def prove_command(
 
 def _write_proof(proof: PlanProof, floor: FloorPlan, files: dict[str, Path]) -> dict[str, Path]:
     """Write a proof; its files appear together, proof.json last. Those that were written."""
-    from mission.files.atomic import replacing
-    from mission.page import json_text
-    from mission.proof_text import proof_json
+    from stopgo.mission.files.atomic import replacing
+    from stopgo.mission.page import json_text
+    from stopgo.mission.proof_text import proof_json
 
     try:
-        from recordings.page.proof_page import proof_html
-        from recordings.proof_recording import proof_recording
+        from stopgo.recordings.page.proof_page import proof_html
+        from stopgo.recordings.proof_recording import proof_recording
     except ModuleNotFoundError as error:
         _told_without_rerun(error, "proof.rrd and no proof.html")
         files = {"proof": files["proof"]}
@@ -446,11 +446,11 @@ def demo_command(
     import tempfile
     from importlib.resources import as_file, files
 
-    from bridge.commands.spawn import robot_process
-    from bridge.station.station import connect
-    from mission.files.plan_toml import read_settings
+    from stopgo.bridge.commands.spawn import robot_process
+    from stopgo.bridge.station.station import connect
+    from stopgo.mission.files.plan_toml import read_settings
 
-    with as_file(files("recordings") / "samples" / "office.dxf") as floor:
+    with as_file(files("stopgo.recordings") / "samples" / "office.dxf") as floor:
         report = plan_files(floor, out, read_settings(None, {}))[0]
     typer.echo(report.as_text())
     with (
@@ -473,11 +473,11 @@ def demo_command(
 
 def _follow(station: Station, report: PlanReport, path: Path) -> tuple[HeardRun, str]:
     """Record the run to its end; what was told of it, and the state it ended in."""
-    from bridge.station.watch import watch_run
-    from mission.heard_run import HeardRun
-    from mission.sight import sight_of
-    from recordings.carried.reading import read_recording
-    from recordings.field import FieldRecording
+    from stopgo.bridge.station.watch import watch_run
+    from stopgo.mission.heard_run import HeardRun
+    from stopgo.mission.sight import sight_of
+    from stopgo.recordings.carried.reading import read_recording
+    from stopgo.recordings.field import FieldRecording
 
     plan = read_recording(report.files["recording"])
     with FieldRecording(
@@ -490,8 +490,8 @@ def _follow(station: Station, report: PlanReport, path: Path) -> tuple[HeardRun,
 
 
 def _say_demo(comparison: Comparison, ended: str, out: Path) -> int:
-    from mission.comparing.judging import judge
-    from mission.comparing.telling import comparison_text
+    from stopgo.mission.comparing.judging import judge
+    from stopgo.mission.comparing.telling import comparison_text
 
     typer.echo(f"\n{comparison_text(comparison)}\n")
     typer.echo(f"run {comparison.run_id} {ended}")

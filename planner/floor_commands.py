@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mission.errors import InputError
+from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
-    from mission.floor import FloorPlan
-    from planner.floors.reader import FloorOptions
-    from planner.floors.survey import FloorChoice, LayerUse, Survey
+    from stopgo.mission.floor import FloorPlan
+    from stopgo.planner.floors.reader import FloorOptions
+    from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey
 
 
 def add_floor_commands(app: typer.Typer) -> None:
     """Add the verbs about floors' files."""
-    from mission.settings import FLOOR_PARAMETERS
-    from planner.options import with_options
+    from stopgo.mission.settings import FLOOR_PARAMETERS
+    from stopgo.planner.options import with_options
 
     floors = with_options(floors_command, (*FLOOR_PARAMETERS, "layers"))
     convert = with_options(convert_command, (*FLOOR_PARAMETERS, "layers"))
@@ -42,12 +42,12 @@ def floors_command(
 
     Exit code 1: no floor can be made of it as it is; the last line says why, and the way out.
     """
-    from mission.files.atomic import must_not_replace, write_atomic
-    from mission.files.plan_toml import read_settings
-    from mission.table import printable_lines
-    from planner.floors import options_of, survey_floor
-    from planner.floors.layer_map import layer_map
-    from planner.options import values_of
+    from stopgo.mission.files.atomic import must_not_replace, write_atomic
+    from stopgo.mission.files.plan_toml import read_settings
+    from stopgo.mission.table import printable_lines
+    from stopgo.planner.floors import options_of, survey_floor
+    from stopgo.planner.floors.layer_map import layer_map
+    from stopgo.planner.options import values_of
 
     for out in (svg, write_map):
         must_not_replace(out, file)
@@ -72,11 +72,11 @@ def convert_command(
     **given: Any,
 ) -> int:
     """Write a floor as a layered DXF in metres, which plans to the same stops and may be drawn on before."""
-    from mission.files.atomic import must_not_replace, write_atomic
-    from mission.files.layered_dxf import layered_dxf
-    from mission.files.plan_toml import read_settings
-    from planner.floors import options_of, read_floor
-    from planner.options import values_of
+    from stopgo.mission.files.atomic import must_not_replace, write_atomic
+    from stopgo.mission.files.layered_dxf import layered_dxf
+    from stopgo.mission.files.plan_toml import read_settings
+    from stopgo.planner.floors import options_of, read_floor
+    from stopgo.planner.options import values_of
 
     if out.suffix.lower() != ".dxf":
         raise InputError(f"{out}: must end in .dxf")
@@ -109,10 +109,10 @@ def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:
     """Draw the floor that the options choose; else every floor of the file that a plan may be made of."""
     from dataclasses import replace
 
-    from mission.files.atomic import write_atomic
-    from mission.files.floor_svg import floor_svg
-    from planner.floors import read_floor
-    from planner.floors.survey_picture import survey_svg
+    from stopgo.mission.files.atomic import write_atomic
+    from stopgo.mission.files.floor_svg import floor_svg
+    from stopgo.planner.floors import read_floor
+    from stopgo.planner.floors.survey_picture import survey_svg
 
     if found.lines:
         write_atomic(out, survey_svg(found.lines, found.floor, title=found.file))
@@ -127,7 +127,7 @@ def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:
 
 def survey_lines(found: Survey) -> list[str]:
     """What a person reads: the floors, the layers, what was worked out, left out, and is odd."""
-    from planner.report import finding_lines
+    from stopgo.planner.report import finding_lines
 
     units = f"; unit: {found.units}" if found.units else ""
     return [

@@ -16,29 +16,29 @@ import shapely
 from msgspec import UNSET
 from msgspec.structs import replace as changed
 
-from mission.as_driven import AsDriven
-from mission.document import Mission, sealed
-from mission.errors import AnswerIsNo, InputError
-from mission.files.plan_toml import read_settings
-from mission.floor import Element, FloorPlan
-from mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
-from mission.ledger import Ledger, ledger_of
-from mission.planning import KEPT, Candidates, NavigableSpace, Visibility
-from mission.settings import Settings
-from mission.specs import limits_spec_of
-from planner.assemble import assemble
-from planner.candidates import candidates
-from planner.covering_tour import in_least_time
-from planner.floors import options_of, read_floor
-from planner.routing import route
-from planner.selection import select_further
-from planner.shapes import local_origin
-from planner.sight.sightlines import SightLines
-from planner.space.navigable import navigable
-from planner.space.reach import reach_of
-from planner.visibility import visibility
-from planner.visibility.headings import in_view
-from planner.visibility.runs import visibility_of
+from stopgo.mission.as_driven import AsDriven
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.floor import Element, FloorPlan
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
+from stopgo.mission.ledger import Ledger, ledger_of
+from stopgo.mission.planning import KEPT, Candidates, NavigableSpace, Visibility
+from stopgo.mission.settings import Settings
+from stopgo.mission.specs import limits_spec_of
+from stopgo.planner.assemble import assemble
+from stopgo.planner.candidates import candidates
+from stopgo.planner.covering_tour import in_least_time
+from stopgo.planner.floors import options_of, read_floor
+from stopgo.planner.routing import route
+from stopgo.planner.selection import select_further
+from stopgo.planner.shapes import local_origin
+from stopgo.planner.sight.sightlines import SightLines
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.space.reach import reach_of
+from stopgo.planner.visibility import visibility
+from stopgo.planner.visibility.headings import in_view
+from stopgo.planner.visibility.runs import visibility_of
 
 Places = FloatArray
 """x, y and heading of each place where a scanner stood (n, 3)."""

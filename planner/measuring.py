@@ -9,12 +9,12 @@ import shapely
 from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
-from mission.geometry import BoolArray, FloatArray, IntArray, bounds, frozen
-from mission.ledger import ledger_of
-from mission.measured import Measured, Unplanned
-from mission.planning import NavigableSpace
-from planner.further import PlannedFloor, hull_of
-from planner.shapes import local_origin, to_shape
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, bounds, frozen
+from stopgo.mission.ledger import ledger_of
+from stopgo.mission.measured import Measured, Unplanned
+from stopgo.mission.planning import NavigableSpace
+from stopgo.planner.further import PlannedFloor, hull_of
+from stopgo.planner.shapes import local_origin, to_shape
 
 TOLERANCE_M = 0.05
 """A unit is measured if a point lies as near to its face."""

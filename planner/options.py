@@ -9,8 +9,8 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from mission.parameter import Parameter
-from mission.settings import PARAMETERS
+from stopgo.mission.parameter import Parameter
+from stopgo.mission.settings import PARAMETERS
 
 
 def with_options(command: Callable[..., int], names: Iterable[str] = PARAMETERS) -> Callable[..., int]:

@@ -7,12 +7,12 @@ import re
 from itertools import count
 from pathlib import Path
 
-from mission import __version__
-from mission.document import mission_id
-from mission.errors import InputError
-from mission.files.mission_json import read
-from mission.floor_source import FloorSource
-from mission.settings import Settings
+from stopgo.mission import __version__
+from stopgo.mission.document import mission_id
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.mission_json import read
+from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.settings import Settings
 
 NAMES = {
     "mission": "mission.json",

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mission.geometry import FloatArray, IntArray, frozen
-from mission.planning import Candidates, Selection, Visibility
-from planner.candidates import judged
-from planner.candidates.grid import main_axes
-from planner.selection import select
-from planner.shapes import local_origin, to_shape
-from planner.visibility import visibility
-from planner.visibility.runs import ranges
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.planning import Candidates, Selection, Visibility
+from stopgo.planner.candidates import judged
+from stopgo.planner.candidates.grid import main_axes
+from stopgo.planner.selection import select
+from stopgo.planner.shapes import local_origin, to_shape
+from stopgo.planner.visibility import visibility
+from stopgo.planner.visibility.runs import ranges
 
 STEPS = (-0.5, -0.25, 0.0, 0.25, 0.5)
 """Where places are offered beside a stop, along both axes of its room, in spacings of the grid."""

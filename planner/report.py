@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mission.document import Mission
-from mission.figures import Figures, Share, percent
-from mission.floor import Finding, Rank
-from mission.network import Network, network_lines, network_of, network_table
-from mission.plan import PartPlan
-from mission.planning import Route
-from mission.schedule import schedule
-from mission.table import duration, printable
+from stopgo.mission.document import Mission
+from stopgo.mission.figures import Figures, Share, percent
+from stopgo.mission.floor import Finding, Rank
+from stopgo.mission.network import Network, network_lines, network_of, network_table
+from stopgo.mission.plan import PartPlan
+from stopgo.mission.planning import Route
+from stopgo.mission.schedule import schedule
+from stopgo.mission.table import duration, printable
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,11 +14,11 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from mission.errors import InputError, StopgoError
-from mission.floor import FloorPlan
-from mission.geometry import FloatArray, Polygon, bounds, frozen
-from mission.problems import FAR
-from planner.kept import kept
+from stopgo.mission.errors import InputError, StopgoError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import FloatArray, Polygon, bounds, frozen
+from stopgo.mission.problems import FAR
+from stopgo.planner.kept import kept
 
 GRID = 1e-5
 """Metres per grid step."""

@@ -13,11 +13,11 @@ from typing import Any
 
 import typer
 
-from mission.errors import InputError
-from mission.settings import Settings
-from mission.table import printable_lines, table
-from planner.floors import options_of, survey_floor
-from planner.floors.survey import FloorChoice
+from stopgo.mission.errors import InputError
+from stopgo.mission.settings import Settings
+from stopgo.mission.table import printable_lines, table
+from stopgo.planner.floors import options_of, survey_floor
+from stopgo.planner.floors.survey import FloorChoice
 
 Planned = tuple[int, str, list[dict[str, Any]]]
 """Exit code, what a person reads, and what `--json` tells of each part."""

@@ -15,10 +15,10 @@ import rerun as rr
 from numpy.typing import NDArray
 from rerun.chunk import Chunk
 
-from mission.document import Mission
-from mission.geometry import FloatArray
-from recordings import entities, palette
-from recordings.layout import Bounds, blueprint
+from stopgo.mission.document import Mission
+from stopgo.mission.geometry import FloatArray
+from stopgo.recordings import entities, palette
+from stopgo.recordings.layout import Bounds, blueprint
 
 FAR = 1000.0
 """Rerun stores float32; beyond this distance a millimetre is lost, and a local origin is used."""

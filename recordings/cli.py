@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mission.errors import InputError
-from mission.files.atomic import must_be_writable, must_not_replace
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import must_be_writable, must_not_replace
 
 if TYPE_CHECKING:
-    from mission.document import Mission
-    from mission.measured import Measured
-    from planner.further import PlannedFloor
-    from recordings.logs import FieldLog, Reading
-    from recordings.replay.log_placing import Align, Placing
-    from recordings.replay.replayed import Replay
-    from recordings.review import RecordingReview, Review
+    from stopgo.mission.document import Mission
+    from stopgo.mission.measured import Measured
+    from stopgo.planner.further import PlannedFloor
+    from stopgo.recordings.logs import FieldLog, Reading
+    from stopgo.recordings.replay.log_placing import Align, Placing
+    from stopgo.recordings.replay.replayed import Replay
+    from stopgo.recordings.review import RecordingReview, Review
 
 
 IMPORTER = "rerun-importer"
@@ -68,24 +68,24 @@ def review(
     Given together, a run is set beside its plan: what its scans really saw is recomputed. Exit code 1: less
     was seen than the plan was asked for; 3: it is not known; 2: a file cannot be read.
     """
-    from mission.files.atomic import must_not_replace
-    from mission.table import printable, printable_lines
-    from recordings.review import review as read
+    from stopgo.mission.files.atomic import must_not_replace
+    from stopgo.mission.table import printable, printable_lines
+    from stopgo.recordings.review import review as read
 
     must_not_replace(html, *recordings)
     found = read(recordings)
     if html is not None and found.recordings:
-        from mission.files.atomic import write_atomic
-        from recordings.page import report_html
-        from recordings.page.from_recordings import subject_of
+        from stopgo.mission.files.atomic import write_atomic
+        from stopgo.recordings.page import report_html
+        from stopgo.recordings.page.from_recordings import subject_of
 
         write_atomic(html, report_html(subject_of(found)))
     if out is not None and found.recordings:
-        from recordings.merging import merge
+        from stopgo.recordings.merging import merge
 
         merge([item.recording for item in found.recordings], out)
     if png is not None and found.recordings:
-        from recordings.headless import write_pictures
+        from stopgo.recordings.headless import write_pictures
 
         write_pictures([item.recording.path for item in _of_one_mission(found, png)], png)
     if json_:
@@ -98,7 +98,7 @@ def review(
     for fault in found.faults:
         typer.echo(f"stopgo: {printable(fault)}", err=True)
     if view:
-        from recordings.viewer import open_viewer
+        from stopgo.recordings.viewer import open_viewer
 
         open_viewer([item.recording.path for item in found.recordings])
     return found.check_code if check else found.exit_code
@@ -131,8 +131,8 @@ def runs(
         return
     if port is not None:
         raise InputError("--port is where --web listens; add --web, or leave it out")
-    from mission.table import printable, printable_lines
-    from recordings.run_index import index_json, index_of, index_text
+    from stopgo.mission.table import printable, printable_lines
+    from stopgo.recordings.run_index import index_json, index_of, index_text
 
     index = index_of(folder, say=lambda line: typer.echo(printable(line), err=True))
     told = json.dumps(index_json(index), ensure_ascii=False) if json_ else printable_lines(index_text(index))
@@ -144,8 +144,8 @@ def runs(
 def _serve_runs(folder: Path, port: int | None) -> None:
     import threading
 
-    from mission.table import printable
-    from recordings.run_site import serving
+    from stopgo.mission.table import printable
+    from stopgo.recordings.run_site import serving
 
     with serving(folder, port=port) as address:
         typer.echo(
@@ -163,12 +163,12 @@ def rerun_importer(
     Exit code 66: the file is neither. Rerun's further options mean nothing here: how stopgo's recordings are
     named and timed is the same whoever opens them.
     """
-    from recordings.importer import NOT_OURS, is_ours, recording_of
+    from stopgo.recordings.importer import NOT_OURS, is_ours, recording_of
 
     if not is_ours(path):
         return NOT_OURS
     with contextlib.redirect_stdout(sys.stderr):
-        from planner.floors import read_floor
+        from stopgo.planner.floors import read_floor
 
         recording = recording_of(path, recording_id, read_floor)
     sys.stdout.buffer.write(recording)
@@ -231,8 +231,8 @@ def replay(
     if list_:
         _tell_logs(read, as_json=json_)
         return 0
-    from recordings.replay.judged import judged
-    from recordings.replay.replaying import replay as laid
+    from stopgo.recordings.replay.judged import judged
+    from stopgo.recordings.replay.replaying import replay as laid
 
     if top_up is not None and floor is None:
         raise InputError(f"--top-up {top_up}: is planned on the floor; give its file with --floor")
@@ -255,9 +255,9 @@ def replay(
         replays = _seen(replays, floor, clouds, top_up)
     _write_replays(replays, out, csv)
     if html is not None:
-        from mission.files.atomic import write_atomic
-        from recordings.page import report_html
-        from recordings.replay.replay_page import page_of
+        from stopgo.mission.files.atomic import write_atomic
+        from stopgo.recordings.page import report_html
+        from stopgo.recordings.replay.replay_page import page_of
 
         write_atomic(html, report_html(page_of(replays, plans)))
     _tell_replays(replays, as_json=json_)
@@ -266,7 +266,7 @@ def replay(
 
 def _plans(path: Path, mission: Mission) -> Review:
     """A plan's recording, if it is of the mission."""
-    from recordings.review import review as read
+    from stopgo.recordings.review import review as read
 
     found = read([path])
     for fault in found.faults:
@@ -281,8 +281,8 @@ def _seen(replays: list[Replay], floor: Path, clouds: Path | None, top_up: Path 
     """With what was in sight from where the robot stood, in all runs together; and the further mission."""
     import numpy as np
 
-    from planner.further import as_driven, planned_floor
-    from planner.further import top_up as further
+    from stopgo.planner.further import as_driven, planned_floor
+    from stopgo.planner.further import top_up as further
 
     planned = planned_floor(floor, replays[0].mission)
     told = [item.with_sight(as_driven(planned, item.scanned_from)) for item in replays]
@@ -299,9 +299,9 @@ def _seen(replays: list[Replay], floor: Path, clouds: Path | None, top_up: Path 
 
 def _measured(planned: PlannedFloor, replay: Replay, clouds: Path | None) -> Measured | None:
     """What the scanner's own clouds show, else the scans in the log; None where there is neither."""
-    from planner.measuring import measured
-    from recordings.clouds import clouds_in, levels
-    from recordings.replay.placed_sweeps import placed_sweeps
+    from stopgo.planner.measuring import measured
+    from stopgo.recordings.clouds import clouds_in, levels
+    from stopgo.recordings.replay.placed_sweeps import placed_sweeps
 
     if clouds is not None:
         return measured(planned, levels(clouds_in(clouds)), least_sweeps=1)
@@ -310,7 +310,7 @@ def _measured(planned: PlannedFloor, replay: Replay, clouds: Path | None) -> Mea
 
 
 def _write_further(mission: Mission | None, path: Path) -> None:
-    from mission.files.mission_json import write
+    from stopgo.mission.files.mission_json import write
 
     if mission is None:
         typer.echo(f"{path}: not written: all that was asked for was in sight", err=True)
@@ -320,14 +320,14 @@ def _write_further(mission: Mission | None, path: Path) -> None:
 
 
 def _read(path: Path, stamps: str, frame: str | None) -> FieldLog:
-    from recordings.logs import read_log
+    from stopgo.recordings.logs import read_log
 
     return read_log(path, _reading(stamps, frame, path))
 
 
 def _tell_logs(logs: list[FieldLog], *, as_json: bool) -> None:
-    from mission.table import printable_lines
-    from recordings.logs import listing
+    from stopgo.mission.table import printable_lines
+    from stopgo.recordings.logs import listing
 
     if as_json:
         _echo_json([listing.as_json(log) for log in logs], "logs")
@@ -342,9 +342,9 @@ def _echo_json(told: list[dict[str, Any]], name: str) -> None:
 
 def _mission(path: Path | None, logs: list[FieldLog]) -> Mission:
     """What is named, else what the first log holds."""
-    from mission.files.mission_json import read
-    from mission.problems import problems_of
-    from recordings.replay.uploaded import mission_in
+    from stopgo.mission.files.mission_json import read
+    from stopgo.mission.problems import problems_of
+    from stopgo.recordings.replay.uploaded import mission_in
 
     if path is None:
         return mission_in(logs[0])
@@ -357,8 +357,8 @@ def _mission(path: Path | None, logs: list[FieldLog]) -> Mission:
 def _placing(
     map_: str | None, align: str | None, time_offset: float, poses: str | None, robot: str | None
 ) -> Placing:
-    from mission.files.exports.placing import map_transform
-    from recordings.replay.log_placing import Placing
+    from stopgo.mission.files.exports.placing import map_transform
+    from stopgo.recordings.replay.log_placing import Placing
 
     if align is not None and map_ is not None:
         raise InputError("--map and --align both say how the log lies; give one of them")
@@ -372,11 +372,11 @@ def _placing(
 
 
 def _write_replays(replays: list[Replay], out: Path | None, csv: Path | None) -> None:
-    from mission.files.atomic import write_atomic
-    from recordings.replay.replay_text import as_csv
+    from stopgo.mission.files.atomic import write_atomic
+    from stopgo.recordings.replay.replay_text import as_csv
 
     if out is not None:
-        from recordings.replay.drawing import write_recording
+        from stopgo.recordings.replay.drawing import write_recording
 
         write_recording(replays, out)
     if csv is not None:
@@ -384,8 +384,8 @@ def _write_replays(replays: list[Replay], out: Path | None, csv: Path | None) ->
 
 
 def _tell_replays(replays: list[Replay], *, as_json: bool) -> None:
-    from recordings.replay.replay_text import as_json as told_json
-    from recordings.replay.replay_text import as_text
+    from stopgo.recordings.replay.replay_text import as_json as told_json
+    from stopgo.recordings.replay.replay_text import as_text
 
     if as_json:
         _echo_json([told_json(item) for item in replays], "replays")
@@ -395,7 +395,7 @@ def _tell_replays(replays: list[Replay], *, as_json: bool) -> None:
 
 def _reading(stamps: str, frame: str | None, path: Path) -> Reading:
     """How to read a log, with progress on a terminal."""
-    from recordings.logs import Reading
+    from stopgo.recordings.logs import Reading
 
     if stamps not in ("header", "log"):
         raise InputError(f"--stamps {stamps}: must be header or log")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import rerun
 
-from mission.errors import InputError
-from recordings.read import Contents, check
+from stopgo.mission.errors import InputError
+from stopgo.recordings.read import Contents, check
 
 VIEWER = Path(rerun.__file__).parents[1] / "rerun_cli" / "rerun"
 """The native program: ending the `rerun` script would leave it running."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mission.geometry import BoolArray, FloatArray
+from stopgo.mission.geometry import BoolArray, FloatArray
 
 BRIDGED_M = 0.15
 """Lines whose ends are nearer than this are joined: a unit is seen whole or not, so corners have gaps."""

@@ -8,9 +8,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from mission.document import Mission
-from mission.errors import InputError
-from mission.events import (
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import (
     Aborted,
     AnyEvent,
     Finished,
@@ -20,17 +20,17 @@ from mission.events import (
     Report,
     StateReport,
 )
-from mission.files.atomic import must_be_writable
-from mission.heard_run import track_of
-from recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
-from recordings.carried.checking import carry_end
-from recordings.carried.missions import carry_mission
-from recordings.carried.plan import carry_plan, planned_extent
-from recordings.carried.reading import Recording
-from recordings.compact import compact
-from recordings.pieces import Pieces
-from recordings.runs.drawing import RunDrawing
-from recordings.stages.mission import draw_mission, mission_extent
+from stopgo.mission.files.atomic import must_be_writable
+from stopgo.mission.heard_run import track_of
+from stopgo.recordings.canvas import Canvas, Sheet, mission_origin, open_canvas
+from stopgo.recordings.carried.checking import carry_end
+from stopgo.recordings.carried.missions import carry_mission
+from stopgo.recordings.carried.plan import carry_plan, planned_extent
+from stopgo.recordings.carried.reading import Recording
+from stopgo.recordings.compact import compact
+from stopgo.recordings.pieces import Pieces
+from stopgo.recordings.runs.drawing import RunDrawing
+from stopgo.recordings.stages.mission import draw_mission, mission_extent
 
 Taken = Report | Health | PosesMissing
 """What is drawn of a run."""

@@ -15,12 +15,12 @@ from typing import Any
 
 from rerun.experimental import ViewerClient
 
-from mission.errors import InputError
-from mission.files.atomic import write_atomic
-from mission.files.file_name import file_name
-from mission.ports import free_port
-from recordings import entities
-from recordings.compact import VIEWER
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.files.file_name import file_name
+from stopgo.mission.ports import free_port
+from stopgo.recordings import entities
+from stopgo.recordings.compact import VIEWER
 
 PATIENCE_S = 120.0
 """Of real time: the last net."""

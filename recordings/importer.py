@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from mission.document import SCHEMA, Mission
-from mission.floor import FloorPlan
+from stopgo.mission.document import SCHEMA, Mission
+from stopgo.mission.floor import FloorPlan
 
 NOT_OURS = 66
 """Rerun's EXTERNAL_IMPORTER_INCOMPATIBLE_EXIT_CODE; told without loading Rerun."""
@@ -41,7 +41,7 @@ def recording_of(path: Path, recording_id: str | None, read_floor: Callable[[Pat
     InputError
         When the file cannot be read as what it is.
     """
-    from recordings.plan import PlanRecording
+    from stopgo.recordings.plan import PlanRecording
 
     noun = _noun(path, read_floor)
     own = noun.id if isinstance(noun, Mission) else recording_id or noun.digest
@@ -51,7 +51,7 @@ def recording_of(path: Path, recording_id: str | None, read_floor: Callable[[Pat
 
 
 def _noun(path: Path, read_floor: Callable[[Path], FloorPlan]) -> Mission | FloorPlan:
-    from mission.files.mission_json import read
+    from stopgo.mission.files.mission_json import read
 
     return read(path) if path.suffix.lower() == ".json" else read_floor(path)
 

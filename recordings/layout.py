@@ -8,10 +8,10 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from recordings import entities as at
-from recordings import palette
-from recordings.entities import under
-from recordings.palette import Colour
+from stopgo.recordings import entities as at
+from stopgo.recordings import palette
+from stopgo.recordings.entities import under
+from stopgo.recordings.palette import Colour
 
 BACKGROUND = (18, 20, 26, 255)
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from mission.errors import InputError
-from mission.files.atomic import replacing
-from recordings import entities
-from recordings.canvas import Canvas, Sheet, layout_alone, mission_origin, open_canvas
-from recordings.carried.checking import carry_end
-from recordings.carried.plan import origin_in, planned_extent
-from recordings.carried.reading import Recording
-from recordings.read import chunks
-from recordings.review import missions_of
-from recordings.stages.mission import mission_extent
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import replacing
+from stopgo.recordings import entities
+from stopgo.recordings.canvas import Canvas, Sheet, layout_alone, mission_origin, open_canvas
+from stopgo.recordings.carried.checking import carry_end
+from stopgo.recordings.carried.plan import origin_in, planned_extent
+from stopgo.recordings.carried.reading import Recording
+from stopgo.recordings.read import chunks
+from stopgo.recordings.review import missions_of
+from stopgo.recordings.stages.mission import mission_extent
 
 
 def merge(recordings: Sequence[Recording], out: Path) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from mission import planning
-from mission.planning import DROP_REASONS
+from stopgo.mission import planning
+from stopgo.mission.planning import DROP_REASONS
 
 Colour = tuple[int, int, int, int]
 
@@ -75,7 +75,7 @@ KIND_COLOURS: dict[str, Colour] = {
     "railings": (110, 135, 225, 255),
     "other": (150, 130, 105, 255),
 }
-"""Every element kind of `mission.kinds.KINDS`."""
+"""Every element kind of `stopgo.mission.kinds.KINDS`."""
 
 OUTLINE: Colour = (110, 118, 135, 255)
 HOLE: Colour = (175, 95, 120, 255)

@@ -8,9 +8,9 @@ from typing import Any
 
 import rerun as rr
 
-from mission.geometry import FloatArray
-from recordings.canvas import Canvas, on_screen
-from recordings.palette import Colour
+from stopgo.mission.geometry import FloatArray
+from stopgo.recordings.canvas import Canvas, on_screen
+from stopgo.recordings.palette import Colour
 
 ORDER = {
     name: float(place)

@@ -8,16 +8,16 @@ from typing import Any
 
 import rerun as rr
 
-from mission import __version__
-from mission.document import Mission
-from mission.figures import Figures
-from mission.floor import FloorPlan
-from mission.geometry import bounds
-from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
-from mission.sight import Sight
-from mission.stop_reasons import driven_coverage, stop_reasons
-from recordings import entities
-from recordings.canvas import (
+from stopgo.mission import __version__
+from stopgo.mission.document import Mission
+from stopgo.mission.figures import Figures
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import bounds
+from stopgo.mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
+from stopgo.mission.sight import Sight
+from stopgo.mission.stop_reasons import driven_coverage, stop_reasons
+from stopgo.recordings import entities
+from stopgo.recordings.canvas import (
     Canvas,
     LocalOrigin,
     Sheet,
@@ -26,28 +26,28 @@ from recordings.canvas import (
     mission_origin,
     open_canvas,
 )
-from recordings.carried.checking import carry_end
-from recordings.carried.findings import carry_findings
-from recordings.carried.missions import carry_mission
-from recordings.carried.reasons import carry_reasons
-from recordings.carried.sight import carry_sight
-from recordings.layout import Bounds
-from recordings.read import check
-from recordings.report import Nouns, parameter_values, parameters, plan_report, plan_results
-from recordings.stages.candidates import draw_candidates
-from recordings.stages.drive import planned_drive
-from recordings.stages.floor import draw_floor, raise_floor
-from recordings.stages.mission import (
+from stopgo.recordings.carried.checking import carry_end
+from stopgo.recordings.carried.findings import carry_findings
+from stopgo.recordings.carried.missions import carry_mission
+from stopgo.recordings.carried.reasons import carry_reasons
+from stopgo.recordings.carried.sight import carry_sight
+from stopgo.recordings.layout import Bounds
+from stopgo.recordings.read import check
+from stopgo.recordings.report import Nouns, parameter_values, parameters, plan_report, plan_results
+from stopgo.recordings.stages.candidates import draw_candidates
+from stopgo.recordings.stages.drive import planned_drive
+from stopgo.recordings.stages.floor import draw_floor, raise_floor
+from stopgo.recordings.stages.mission import (
     draw_drive,
     draw_mission,
     mission_extent,
     plan_states,
     plot_planned_coverage,
 )
-from recordings.stages.selection import draw_selection, paint_coverage
-from recordings.stages.space import draw_space
-from recordings.stages.stop_browser import tell_stops
-from recordings.stages.visibility import draw_visibility
+from stopgo.recordings.stages.selection import draw_selection, paint_coverage
+from stopgo.recordings.stages.space import draw_space
+from stopgo.recordings.stages.stop_browser import tell_stops
+from stopgo.recordings.stages.visibility import draw_visibility
 
 Drawing = Callable[[Canvas, Any], None]
 

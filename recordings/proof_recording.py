@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from mission import __version__
-from mission.floor import FloorPlan
-from mission.geometry import FloatArray, bounds
-from mission.plan_proof import PlanProof
-from mission.proof_text import proof_text, verdict
-from recordings import entities, palette, strokes
-from recordings.canvas import Canvas, Sheet, mission_origin, on_screen, open_canvas
-from recordings.carried.checking import carry_end
-from recordings.carried.missions import carry_mission
-from recordings.pens import ORDER
-from recordings.stages.floor import draw_floor, raise_floor
-from recordings.stages.mission import HEAD, draw_mission
+from stopgo.mission import __version__
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import FloatArray, bounds
+from stopgo.mission.plan_proof import PlanProof
+from stopgo.mission.proof_text import proof_text, verdict
+from stopgo.recordings import entities, palette, strokes
+from stopgo.recordings.canvas import Canvas, Sheet, mission_origin, on_screen, open_canvas
+from stopgo.recordings.carried.checking import carry_end
+from stopgo.recordings.carried.missions import carry_mission
+from stopgo.recordings.pens import ORDER
+from stopgo.recordings.stages.floor import draw_floor, raise_floor
+from stopgo.recordings.stages.mission import HEAD, draw_mission
 
 POINT_M = 0.012
 """Radius of a point of a cloud."""

@@ -11,8 +11,8 @@ from typing import Any
 
 from rerun.chunk import Chunk, RrdReader, StoreEntry
 
-from mission.errors import InputError
-from recordings import entities
+from stopgo.mission.errors import InputError
+from stopgo.recordings import entities
 
 MARK = b"RRF2"
 """How a recording begins that this Rerun can read."""

@@ -8,14 +8,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from recordings.read import looks_like_one
+from stopgo.recordings.read import looks_like_one
 
 CHILD = """
 import json, sys
 sys.path[:], paths = json.load(sys.stdin)
 from pathlib import Path
-from mission.errors import InputError
-from recordings.read import check
+from stopgo.mission.errors import InputError
+from stopgo.recordings.read import check
 for number, path in enumerate(paths):
     print(number, flush=True)
     try:

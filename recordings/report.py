@@ -6,12 +6,12 @@ from typing import Any
 
 import msgspec
 
-from mission.document import Mission
-from mission.figures import Figures, percent
-from mission.floor import FloorPlan
-from mission.planning import Candidates, NavigableSpace, Route, Schedule, Selection, Visibility
-from mission.table import printable
-from recordings.canvas import LocalOrigin
+from stopgo.mission.document import Mission
+from stopgo.mission.figures import Figures, percent
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.planning import Candidates, NavigableSpace, Route, Schedule, Selection, Visibility
+from stopgo.mission.table import printable
+from stopgo.recordings.canvas import LocalOrigin
 
 Nouns = dict[type, Any]
 

@@ -8,16 +8,16 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
-from mission.comparing.compare import compare
-from mission.comparing.judging import judge
-from mission.comparing.telling import comparison_json, comparison_text
-from mission.comparison import Comparison
-from mission.document import Mission
-from mission.errors import InputError
-from mission.sight import Sight
-from recordings import entities
-from recordings.carried.checking import problems_of
-from recordings.carried.reading import Recording, read_each
+from stopgo.mission.comparing.compare import compare
+from stopgo.mission.comparing.judging import judge
+from stopgo.mission.comparing.telling import comparison_json, comparison_text
+from stopgo.mission.comparison import Comparison
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.sight import Sight
+from stopgo.recordings import entities
+from stopgo.recordings.carried.checking import problems_of
+from stopgo.recordings.carried.reading import Recording, read_each
 
 SUFFIX = ".rrd"
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from mission.geometry import FloatArray
-from recordings import entities, strokes
-from recordings.canvas import on_screen
-from recordings.palette import Colour
-from recordings.pens import ORDER
+from stopgo.mission.geometry import FloatArray
+from stopgo.recordings import entities, strokes
+from stopgo.recordings.canvas import on_screen
+from stopgo.recordings.palette import Colour
+from stopgo.recordings.pens import ORDER
 
 Draw = Callable[[str, Any], None]
 """Draws an archetype at an entity."""

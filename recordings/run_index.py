@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from mission.decoding import one_decode_error
-from mission.errors import InputError
-from mission.figures import percent
-from mission.files.atomic import write_atomic
-from mission.table import duration, table
+from stopgo.mission.decoding import one_decode_error
+from stopgo.mission.errors import InputError
+from stopgo.mission.figures import percent
+from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.table import duration, table
 
 if TYPE_CHECKING:
-    from mission.comparison import Comparison
-    from mission.document import Mission
-    from recordings.carried.reading import Recording
-    from recordings.review import RecordingReview
+    from stopgo.mission.comparison import Comparison
+    from stopgo.mission.document import Mission
+    from stopgo.recordings.carried.reading import Recording
+    from stopgo.recordings.review import RecordingReview
 
 INDEX = ".stopgo-runs.json"
 VERSION = 1
@@ -147,7 +147,7 @@ def _is(file: IndexedFile | None, stamp: Stamp) -> bool:
 
 def _read(folder: Path, stale: dict[str, Stamp], kept: dict[str, IndexedFile]) -> dict[str, IndexedFile]:
     """Read files, together with the plans of the same folder that are known already."""
-    from recordings.review import reviewed
+    from stopgo.recordings.review import reviewed
 
     known = [name for name, file in kept.items() if file.plans]
     read, faults = _opened(folder, sorted({*stale, *known}))
@@ -161,8 +161,8 @@ def _read(folder: Path, stale: dict[str, Stamp], kept: dict[str, IndexedFile]) -
 
 def _opened(folder: Path, names: Iterable[str]) -> tuple[dict[str, Recording], dict[str, str]]:
     """Recordings by name without their pictures, and why others cannot be read."""
-    from recordings.carried.reading import read_each
-    from recordings.carried.values import Values
+    from stopgo.recordings.carried.reading import read_each
+    from stopgo.recordings.carried.values import Values
 
     read: dict[str, Recording] = {}
     faults: dict[str, str] = {}
@@ -198,7 +198,7 @@ def _plan(item: RecordingReview, mission: Mission) -> IndexedPlan:
 
 
 def _run(comparison: Comparison) -> IndexedRun:
-    from mission.comparing.judging import judge
+    from stopgo.mission.comparing.judging import judge
 
     log, acquired = comparison.log, comparison.acquired
     return IndexedRun(

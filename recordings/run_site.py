@@ -20,16 +20,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import quote
 
-from mission.errors import InputError
-from mission.files.atomic import write_atomic
-from mission.ports import free_port
-from recordings.compact import VIEWER
-from recordings.merging import layout_of, merge
-from recordings.page import report_html, whole_page
-from recordings.page.from_recordings import subject_of
-from recordings.page.words import grid, row, shown, tag
-from recordings.review import Review, review
-from recordings.run_index import IndexedRun, RunIndex, index_of, run_cells, stamp_of
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.ports import free_port
+from stopgo.recordings.compact import VIEWER
+from stopgo.recordings.merging import layout_of, merge
+from stopgo.recordings.page import report_html, whole_page
+from stopgo.recordings.page.from_recordings import subject_of
+from stopgo.recordings.page.words import grid, row, shown, tag
+from stopgo.recordings.review import Review, review
+from stopgo.recordings.run_index import IndexedRun, RunIndex, index_of, run_cells, stamp_of
 
 HERE = "127.0.0.1"
 END_S = 5.0

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mission.geometry import FloatArray, IntArray, Polygon
-from mission.planning import Targets
+from stopgo.mission.geometry import FloatArray, IntArray, Polygon
+from stopgo.mission.planning import Targets
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,12 +12,12 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from mission.document import Mission
-from mission.errors import InputError
-from mission.events import AnyEvent, Health, PoseReport, PosesMissing, StateReport
-from mission.ports import free_port
-from recordings.compact import VIEWER
-from recordings.field import FieldRecording
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import AnyEvent, Health, PoseReport, PosesMissing, StateReport
+from stopgo.mission.ports import free_port
+from stopgo.recordings.compact import VIEWER
+from stopgo.recordings.field import FieldRecording
 
 
 def open_viewer(recordings: Sequence[Path]) -> None:

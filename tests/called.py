@@ -6,7 +6,7 @@ import io
 from contextlib import redirect_stderr, redirect_stdout
 from subprocess import CompletedProcess
 
-from mission.__main__ import main
+from stopgo.command_line import main
 
 
 def stopgo(*arguments: str) -> CompletedProcess[str]:

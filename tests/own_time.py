@@ -30,14 +30,14 @@ from typing import Any
 
 import pytest
 
-import bridge
-from bridge.mavlink.line import transport
-from bridge.mavlink.line.url import Url
-from mission.errors import InputError
+import stopgo.bridge
+from stopgo.bridge.mavlink.line import transport
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.mission.errors import InputError
 
 NET_S = 120.0
 """Of real time, in which some thread of a world must go on: else they wait for one another."""
-INSIDE = ("bridge.", "tests.bridge.", "tests.faults.")
+INSIDE = ("stopgo.bridge.", "tests.bridge.", "tests.faults.")
 """Modules that live in the world."""
 
 
@@ -388,7 +388,7 @@ class _Thread(threading.Thread):
 @cache
 def _import_all() -> None:
     """Every module of the bridge: one that is imported later would live in real time."""
-    for module in pkgutil.walk_packages(bridge.__path__, f"{bridge.__name__}."):
+    for module in pkgutil.walk_packages(stopgo.bridge.__path__, f"{stopgo.bridge.__name__}."):
         import_module(module.name)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from typer.exceptions import TyperException
 
-from mission.__main__ import front_door
+from stopgo.command_line import front_door
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("README.md"), *ROOT.glob("docs/**/*.md")])

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import stopgo
-from mission.__main__ import main
-from mission.errors import InputError
-from mission.plan import Plan
+from stopgo.command_line import main
+from stopgo.mission.errors import InputError
+from stopgo.mission.plan import Plan
 
 ROOT = Path(__file__).parents[1]
 OFFICE = ROOT / "recordings" / "samples" / "office.dxf"

@@ -11,20 +11,21 @@ from pathlib import Path
 
 import pytest
 
-from mission.__main__ import front_door, main
+from stopgo.command_line import front_door, main
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("mission", "planner", "bridge", "recordings")
-FRONT_DOOR = "mission.__main__"
+FRONT_DOOR = "stopgo.command_line"
 
 
 def modules() -> dict[str, Path]:
-    """Every module of the four folders by its dotted name."""
+    """Every module of the front door and of the four folders, by its dotted name."""
     found = {}
-    for folder in FOLDERS:
+    for folder in ("stopgo", *FOLDERS):
         for path in sorted((ROOT / folder).rglob("*.py")):
             parts = path.relative_to(ROOT).with_suffix("").parts
-            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+            whole = parts if folder == "stopgo" else ("stopgo", *parts)
+            found[".".join(whole[:-1] if whole[-1] == "__init__" else whole)] = path
     return found
 
 
@@ -45,10 +46,10 @@ def imported(name: str) -> tuple[str, ...]:
 def _imported(name: str) -> Iterator[str]:
     for node in ast.walk(tree_of(name)):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name.split(".")[0] in FOLDERS)
+            yield from (alias.name for alias in node.names if alias.name in MODULES)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{name}: a relative import; write the whole name"
-            if (node.module or "").split(".")[0] in FOLDERS:
+            if str(node.module) in MODULES:
                 yield from _from(node)
 
 
@@ -60,19 +61,25 @@ def _from(node: ast.ImportFrom) -> Iterator[str]:
 
 def composes(name: str) -> bool:
     """Whether a module may bring folders together."""
-    return name == FRONT_DOOR or name in {f"{folder}.cli" for folder in FOLDERS}
+    return folder_of(name) == "" or name in {f"stopgo.{folder}.cli" for folder in FOLDERS}
+
+
+def folder_of(name: str) -> str:
+    """The one of the four folders that a module is in; none for those of the front door."""
+    parts = name.split(".")
+    return parts[1] if len(parts) > 1 and parts[1] in FOLDERS else ""
 
 
 @pytest.mark.parametrize("name", [name for name in MODULES if not composes(name)])
 def test_a_folder_imports_itself_and_mission_only(name: str) -> None:
-    own = name.partition(".")[0]
-    strangers = {item for item in imported(name) if item.split(".")[0] not in (own, "mission")}
+    own = folder_of(name)
+    strangers = {item for item in imported(name) if folder_of(item) not in (own, "mission")}
     assert not strangers, f"{name} imports {strangers}; only cli.py modules compose"
 
 
 def test_nobody_imports_what_composes() -> None:
     for name in MODULES:
-        if name != FRONT_DOOR:
+        if folder_of(name):
             assert not [item for item in imported(name) if composes(item) and item != name], name
 
 
@@ -124,7 +131,7 @@ def _cut(name: str, depth: int) -> str:
     return ".".join(name.split(".")[:depth])
 
 
-PACKAGES = [name for name, path in MODULES.items() if path.name == "__init__.py"]
+PACKAGES = [name for name, path in MODULES.items() if path.name == "__init__.py" and name != "stopgo"]
 
 
 def test_a_circle_is_named() -> None:
@@ -192,10 +199,10 @@ def test_a_modules_name_stands_once() -> None:
 def test_the_dialect_of_mavlink_is_known_to_its_edges_alone() -> None:
     users = {name for name, path in MODULES.items() if "dialect" in path.read_text(encoding="utf-8")}
     edges = {"frames", "messages", "wire", "tunnel", "vehicle_telemetry", "replies"}
-    assert {name.rpartition(".")[2] for name in users if name.startswith("bridge.")} <= edges
+    assert {name.rpartition(".")[2] for name in users if folder_of(name) == "bridge"} <= edges
 
 
-PURE = ("mission.run", "mission.mavlink")
+PURE = ("stopgo.mission.run", "stopgo.mission.mavlink")
 
 
 @pytest.mark.parametrize("name", [name for name in MODULES if name.startswith(PURE)])
@@ -219,7 +226,13 @@ def test_what_a_run_is_knows_no_clock_no_disk_and_no_line(name: str) -> None:
     assert not {one.partition(".")[0] for one in named} & outer
 
 
-@pytest.mark.parametrize("statement", ["import mission, bridge", "import planner, recordings"])
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "import stopgo.mission, stopgo.bridge",
+        "import stopgo.planner, stopgo.recordings",
+    ],
+)
 def test_importing_a_folder_loads_nothing_slow(statement: str) -> None:
     slow = {"shapely", "scipy", "rerun", "numba", "ezdxf", "networkx", "highspy", "pyarrow", "pyproj"}
     code = f"{statement}; import sys; print(*sorted({slow} & set(sys.modules)))"
@@ -227,7 +240,7 @@ def test_importing_a_folder_loads_nothing_slow(statement: str) -> None:
 
 
 def test_the_front_door_opens_without_slow_libraries() -> None:
-    code = "from mission.__main__ import main; import sys; main(['-h']); print(*sys.modules, file=sys.stderr)"
+    code = "from stopgo.command_line import main; import sys; main([]); print(*sys.modules, file=sys.stderr)"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
     )
@@ -238,8 +251,8 @@ def test_the_front_door_opens_without_slow_libraries() -> None:
 
 def test_a_simulated_robot_loads_nothing_of_autopilots() -> None:
     robot = "['robot', '--name', 'r1', '--state', 'r1.state', '--listen', 'nowhere']"
-    code = f"from mission.__main__ import main; import sys; main({robot}); print(*sys.modules)"
-    assert not {"pymavlink", "mission.plugins"} & set(run(sys.executable, "-c", code).split())
+    code = f"from stopgo.command_line import main; import sys; main({robot}); print(*sys.modules)"
+    assert not {"pymavlink", "stopgo.mission.plugins"} & set(run(sys.executable, "-c", code).split())
 
 
 def test_every_module_says_what_it_is_for() -> None:

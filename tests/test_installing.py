@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -11,40 +12,112 @@ from pathlib import Path
 import pytest
 
 import stopgo
-from mission.errors import InputError
+from stopgo.mission.errors import InputError
 from tests.test_house import MODULES
 
 ROOT = Path(__file__).parents[1]
+SAMPLE = ROOT / "recordings" / "samples" / "office.dxf"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
-def other_mission(folder: Path) -> Path:
-    """A package of another's that is called as one of our folders."""
-    (folder / "mission").mkdir()
-    (folder / "mission" / "__init__.py").write_text("")
-    return folder
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A site-packages that holds what the wheel brings, and a user's packages of our folders' names."""
+    folder = tmp_path_factory.mktemp("installed")
+    tree, site = folder / "tree", folder / "site"
+    shutil.copytree(
+        ROOT, tree, ignore=shutil.ignore_patterns(".*", "tests", "docs", "build", "demo"), symlinks=True
+    )
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-compile"]
+    subprocess.run(
+        [*pip, "--no-deps", "--no-build-isolation", "--target", str(site), str(tree)],
+        check=True,
+        capture_output=True,
+    )
+    for name in stopgo.FOLDERS:
+        (site / name).mkdir()
+        (site / name / "__init__.py").write_text("OF_THE_USER = True\n")
+    return site
 
 
-def run(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Code in a fresh Python whose PYTHONPATH has `folder` before the project."""
-    path = os.pathsep.join([str(folder), str(ROOT)])
+def run(code: str, site: Path) -> subprocess.CompletedProcess[str]:
+    """Code in a fresh Python that finds `site` before all else that is installed."""
     return subprocess.run(
-        [sys.executable, "-c", code, "--version"],
-        cwd=folder, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        [sys.executable, "-P", "-c", code],
+        cwd=site.parent,
+        env={**os.environ, "PYTHONPATH": str(site), "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
-def test_a_package_of_the_same_name_on_the_path_changes_nothing(tmp_path: Path) -> None:
-    done = run("import sys, stopgo; sys.exit(stopgo.main())", other_mission(tmp_path))
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.strip()
+def test_the_wheel_holds_one_name(installed: Path) -> None:
+    found = {path.name for path in installed.iterdir() if path.suffix != ".dist-info"}
+    assert found - set(stopgo.FOLDERS) - {"bin", "__pycache__"} == {"stopgo"}
+    for needed in (
+        "mission/mission.schema.json",
+        "bridge/link/seal.vectors.json",
+        "recordings/samples/office.dxf",
+    ):
+        assert (installed / "stopgo" / needed).is_file()
+    assert all((installed / "stopgo" / name / "py.typed").is_file() for name in stopgo.FOLDERS)
 
 
-def test_a_package_of_the_same_name_that_was_loaded_first_is_told_in_one_line(tmp_path: Path) -> None:
-    done = run("import sys, mission, stopgo; sys.exit(stopgo.main())", other_mission(tmp_path))
+THEIRS = f"import {', '.join(stopgo.FOLDERS)}"
+OURS = """
+import stopgo, sys
+before = list(sys.path)
+plan = stopgo.plan(stopgo.__path__[0] + "/recordings/samples/office.dxf")
+"""
+CHECKS = """
+assert sys.path == before, sys.path
+assert mission.OF_THE_USER and planner.OF_THE_USER and bridge.OF_THE_USER and recordings.OF_THE_USER
+print(len(plan.mission.stops), stopgo.__file__)
+"""
+
+
+@pytest.mark.parametrize(
+    "code", [f"{THEIRS}\n{OURS}", f"{OURS}\n{THEIRS}"], ids=["theirs first", "ours first"]
+)
+def test_packages_of_the_same_names_stay_the_users(installed: Path, code: str) -> None:
+    done = run(code + CHECKS, installed)
+    assert done.returncode == 0, done.stderr
+    stops, place = done.stdout.split()
+    assert int(stops) > 0
+    assert Path(place).parent == installed / "stopgo"
+
+
+def test_the_command_beside_packages_of_the_same_names(installed: Path, tmp_path: Path) -> None:
+    code = f"import sys, stopgo; sys.argv = ['stopgo', 'plan', {str(SAMPLE)!r}, '-o', {str(tmp_path)!r}]\n"
+    done = run(f"{THEIRS}\n{code}sys.exit(stopgo.main())", installed)
+    assert (done.returncode, (tmp_path / "mission.json").exists()) == (0, True), done.stderr
+
+
+def test_an_older_installation_beside_it_changes_nothing(installed: Path, tmp_path: Path) -> None:
+    """Of the time when a module `stopgo` stood in site-packages, and the folders below `_stopgo`."""
+    site = shutil.copytree(installed, tmp_path / "site")
+    (site / "stopgo.py").write_text("raise ImportError('the older stopgo')\n")
+    (site / "_stopgo" / "mission").mkdir(parents=True)
+    (site / "_stopgo" / "mission" / "__init__.py").write_text("raise ImportError('the older mission')\n")
+    assert run(f"{OURS}\n{THEIRS}{CHECKS}", site).returncode == 0
+
+
+def test_an_installation_that_was_cut_off_is_told_in_one_line(installed: Path, tmp_path: Path) -> None:
+    site = shutil.copytree(installed, tmp_path / "site")
+    shutil.rmtree(site / "stopgo" / "bridge")
+    done = run("import sys, stopgo; sys.exit(stopgo.main())", site)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
-    assert f"'mission' is taken from {tmp_path / 'mission'}" in done.stderr
+    assert "is incomplete: no bridge; install it again" in done.stderr
+
+
+def test_it_runs_from_a_zip_file(installed: Path, tmp_path: Path) -> None:
+    whole = Path(shutil.make_archive(str(tmp_path / "site"), "zip", installed))
+    code = f"import sys, stopgo; sys.argv = ['stopgo', 'plan', {str(SAMPLE)!r}, '-o', {str(tmp_path)!r}]\n"
+    done = run(f"{code}print(stopgo.__file__)\nsys.exit(stopgo.main())", whole)
+    assert (done.returncode, (tmp_path / "mission.json").exists()) == (0, True), done.stderr
+    assert done.stdout.startswith(str(whole))
 
 
 def test_an_old_python_gets_one_line(
@@ -61,7 +134,7 @@ def test_without_file_locks_everything_is_importable_and_a_journal_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As on Windows, where planning and stations run and robots do not."""
-    from bridge.robot import journal
+    from stopgo.bridge.robot import journal
 
     monkeypatch.setitem(sys.modules, "fcntl", None)
     with pytest.raises(InputError, match="on Linux and macOS only"), journal.open_journal(tmp_path, "r1"):
@@ -70,7 +143,7 @@ def test_without_file_locks_everything_is_importable_and_a_journal_is_refused(
 
 def test_no_module_but_the_journal_knows_of_file_locks() -> None:
     knows = [name for name, path in MODULES.items() if "import fcntl" in path.read_text(encoding="utf-8")]
-    assert knows == ["bridge.robot.journal"]
+    assert knows == ["stopgo.bridge.robot.journal"]
 
 
 def test_every_folder_is_typed_and_every_extra_of_a_user_is_in_all() -> None:

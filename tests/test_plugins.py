@@ -17,15 +17,15 @@ import numpy as np
 import pytest
 
 import stopgo
-from bridge.link.clock import SimulatedClock
-from bridge.robot.plugin_body import GuardedBase, plugin_body
-from mission.__main__ import main
-from mission.errors import InputError, StopgoError
-from mission.floor import FloorPlan
-from mission.plugins import Variant
-from mission.settings import Settings
-from planner import plan
-from planner.floors import read_floor
+from stopgo.bridge.link.clock import SimulatedClock
+from stopgo.bridge.robot.plugin_body import GuardedBase, plugin_body
+from stopgo.command_line import main
+from stopgo.mission.errors import InputError, StopgoError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.plugins import Variant
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.floors import read_floor
 from tests.bridge.world import WALKING, corridor
 from tests.planner.worlds import two_rooms
 
@@ -91,7 +91,7 @@ WRONG: dict[str, tuple[str, str, str]] = {
     "sees nothing": ("visibility", "def f(found): return None", "gave nothing, not a Visibility"),
     "sees what is not": (
         "visibility",
-        NUMPY + "from mission.planning import Visibility\ndef f(found):\n"
+        NUMPY + "from stopgo.mission.planning import Visibility\ndef f(found):\n"
         "    n = len(found.kept)\n"
         "    one = np.zeros(n, dtype=int)\n"
         "    return Visibility(found, np.arange(n + 1), one, one, one + 10**9, 'x')",
@@ -99,7 +99,8 @@ WRONG: dict[str, tuple[str, str, str]] = {
     ),
     "ways of words": (
         "graph",
-        "from planner.routing.ways import Ways\ndef f(space, points): return Ways(points, [['a']], None)",
+        "from stopgo.planner.routing.ways import Ways\n"
+        "def f(space, points): return Ways(points, [['a']], None)",
         "ValueError: could not convert string to float",
     ),
     "covers too little": ("selector", "def f(cover, settings): return [], 0", "its 0 rows leave . of the"),
@@ -114,7 +115,7 @@ WRONG: dict[str, tuple[str, str, str]] = {
     "no ways": ("graph", "def f(space, points): return 3", "gave a int, not a Ways"),
     "through the wall": (
         "graph",
-        NUMPY + "from itertools import combinations\nfrom planner.routing.ways import shortest_ways\n"
+        NUMPY + "from itertools import combinations\nfrom stopgo.planner.routing.ways import shortest_ways\n"
         "def f(space, points):\n"
         "    n = len(points)\n"
         "    return shortest_ways(points, np.array(list(combinations(range(n), 2))), n)",
@@ -142,8 +143,8 @@ def test_a_variant_that_is_not_there_is_named(stage: str, name: str) -> None:
 
 
 def test_a_method_added_to_the_dictionary_is_called_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    from planner.routing import ROUTERS
-    from planner.selection import METHODS
+    from stopgo.planner.routing import ROUTERS
+    from stopgo.planner.selection import METHODS
 
     monkeypatch.setitem(METHODS, "mine", METHODS["greedy"])
     monkeypatch.setitem(ROUTERS, "mine", ROUTERS["default"])
@@ -155,7 +156,7 @@ def test_a_method_added_to_the_dictionary_is_called_by_its_name(monkeypatch: pyt
 def test_what_a_plug_in_sees_may_be_lists(module: Write) -> None:
     module(
         "lists",
-        "from dataclasses import replace\nfrom planner.visibility.exact_sight import exact\n"
+        "from dataclasses import replace\nfrom stopgo.planner.visibility.exact_sight import exact\n"
         "def f(found):\n"
         "    seen = exact(found)\n"
         "    runs = {k: getattr(seen, k).tolist() for k in ('pointer', 'segment', 'first', 'last')}\n"
@@ -180,7 +181,7 @@ def entry(monkeypatch: pytest.MonkeyPatch, group: str, name: str, value: str) ->
         mine = [metadata.EntryPoint(name, value, group)] if asked.get("group") == group else []
         return [*there(**asked), *mine]
 
-    monkeypatch.setattr("mission.plugins.entry_points", with_ours)
+    monkeypatch.setattr("stopgo.mission.plugins.entry_points", with_ours)
 
 
 def test_an_installed_package_brings_variants_by_name(module: Write, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,10 +193,10 @@ def test_an_installed_package_brings_variants_by_name(module: Write, monkeypatch
 
 
 READER = """
-from mission.floor import FloorPlan
-from mission.floor_source import FloorSource
-from mission.geometry import Polygon
-from planner.floors.reader import Reader
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.geometry import Polygon
+from stopgo.planner.floors.reader import Reader
 
 def read(file, options):
     given = file.data.decode()
@@ -254,7 +255,7 @@ def test_a_format_is_read_back(
 ) -> None:
     module(
         "notes",
-        "from mission.files.exports.format import Format\n"
+        "from stopgo.mission.files.exports.format import Format\n"
         f"FORM = Format('.n', 'notes', lambda m, s: {write}, lambda d, m, s: {read}, tolerance=1e9)",
     )
     stopgo.write_mission(corridor(), "mission.json")
@@ -310,8 +311,8 @@ def test_a_base_that_fails_is_stopped_and_drives_no_more() -> None:
 
 LOG = """
 import numpy as np
-from recordings.logs import FieldLog, LogFormat
-from recordings.logs.field_log import Poses
+from stopgo.recordings.logs import FieldLog, LogFormat
+from stopgo.recordings.logs.field_log import Poses
 
 def read(path, how):
     given = path.read_text()
@@ -328,7 +329,7 @@ FORMAT = LogFormat("tape", (".tape",), (), lambda: read)
 
 
 def test_a_kind_of_log_is_brought_and_checked(module: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    from recordings.logs import read_log
+    from stopgo.recordings.logs import read_log
 
     module("tapes", LOG)
     entry(monkeypatch, "stopgo.log", "tape", "tapes:FORMAT")

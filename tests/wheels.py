@@ -74,9 +74,9 @@ def built(folder: Path) -> Path:
     (wheel,) = folder.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     top = {name.partition("/")[0] for name in names if ".dist-info/" not in name}
-    assert top == {"stopgo.py", "_stopgo"}, top
+    assert top == {"stopgo"}, top
     for needed in (*REFERENCE, "recordings/samples/office.dxf", *TYPED):
-        assert f"_stopgo/{needed}" in names, needed
+        assert f"stopgo/{needed}" in names, needed
     print(f"{archive.name}: {len(held)} files; {wheel.name}: {len(names)} files", flush=True)
     return wheel
 
@@ -117,7 +117,7 @@ def problems(wheel: Path, python: str, extra: str, folder: Path) -> list[str]:
 
 def sample_mission() -> bytes:
     """A mission to be read where nothing can be planned."""
-    from mission.files.mission_json import encode
+    from stopgo.mission.files.mission_json import encode
     from tests.bridge.world import corridor
 
     return encode(corridor())

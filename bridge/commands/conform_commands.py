@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bridge.commands.connection import (
+from stopgo.bridge.commands.connection import (
     DEFAULT_ENDPOINT,
     As,
     Connect,
@@ -20,14 +20,14 @@ from bridge.commands.connection import (
     SiteName,
     Timeout,
 )
-from bridge.commands.order_commands import Json, TakeOver
-from bridge.console import Bar, print_json, say, tell, tell_lines
-from mission.errors import InputError
+from stopgo.bridge.commands.order_commands import Json, TakeOver
+from stopgo.bridge.console import Bar, print_json, say, tell, tell_lines
+from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
-    from bridge.conform.requirements import ConformVerdict
-    from bridge.conform.robot_bench import RobotBench
-    from mission.events import Pose
+    from stopgo.bridge.conform.requirements import ConformVerdict
+    from stopgo.bridge.conform.robot_bench import RobotBench
+    from stopgo.mission.events import Pose
 
 TRIED = ("requirements", 1)
 
@@ -77,7 +77,7 @@ def conform_robot(
 
     Example: stopgo conform robot --robot r1 --keys ~/keys/alice --other-keys ~/keys/bob --drive
     """
-    from bridge.conform.conform_robot import REQUIREMENTS, ConformOptions, robot_bench, robot_verdicts
+    from stopgo.bridge.conform.conform_robot import REQUIREMENTS, ConformOptions, robot_bench, robot_verdicts
 
     options = ConformOptions(
         connect, robot, site, who, timeout, insecure, keys, other_keys, take_over, restart
@@ -104,7 +104,7 @@ def _say_what_it_will_do(bench: RobotBench, *, drive: bool) -> None:
 
 
 def _where_it_stands(bench: RobotBench) -> Pose:
-    from bridge.conform.requirements import NotTried
+    from stopgo.bridge.conform.requirements import NotTried
 
     try:
         return bench.pose()
@@ -143,8 +143,8 @@ def conform_station(
 
     Example: stopgo conform station --listen tcp/127.0.0.1:7447 --command "my-station {what} --robot r1"
     """
-    from bridge.conform.conform_station import StationOptions, station_bench, station_verdicts
-    from bridge.conform.station_requirements import STATION_REQUIREMENTS
+    from stopgo.bridge.conform.conform_station import StationOptions, station_bench, station_verdicts
+    from stopgo.bridge.conform.station_requirements import STATION_REQUIREMENTS
 
     options = StationOptions(listen, name, site, keys, insecure, command, patience, say)
     found: list[ConformVerdict] = []
@@ -158,8 +158,8 @@ def conform_station(
 
 def report(peer: str, kind: str, found: Iterable[ConformVerdict], *, as_json: bool) -> None:
     """Tell every verdict, and end with the exit code that they come to."""
-    from bridge.conform.requirements import counted
-    from mission.table import table
+    from stopgo.bridge.conform.requirements import counted
+    from stopgo.mission.table import table
 
     found = list(found)
     counts = counted(found)

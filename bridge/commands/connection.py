@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bridge.profile import counting, read_profile
-from mission.errors import InputError
+from stopgo.bridge.profile import counting, read_profile
+from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
-    from bridge.station.station import Station
+    from stopgo.bridge.station.station import Station
 
 RobotName = Annotated[str, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
 AnyRobot = Annotated[str | None, typer.Option("--robot", metavar="NAME", help="Name of the robot.")]
@@ -213,7 +213,7 @@ def reached(connection: Connection) -> AbstractContextManager[Station]:
     """The robot or vehicle at the other end; raises as both `connect` do."""
     if connection.mavlink is not None:
         return _vehicle(connection, connection.mavlink)
-    from bridge.station.station import connect
+    from stopgo.bridge.station.station import connect
 
     return connect(
         connection.endpoint, robot=connection.robot, site=connection.site, commander=connection.who,
@@ -223,9 +223,9 @@ def reached(connection: Connection) -> AbstractContextManager[Station]:
 
 
 def _vehicle(connection: Connection, mavlink: Mavlink) -> AbstractContextManager[Station]:
-    from bridge.mavlink.auto.vehicle_orders import Consent
-    from bridge.mavlink.auto.vehicle_station import Options, connect
-    from bridge.mavlink.line.wire import read_line
+    from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
+    from stopgo.bridge.mavlink.auto.vehicle_station import Options, connect
+    from stopgo.bridge.mavlink.line.wire import read_line
 
     url, key = read_line(mavlink.url, mavlink.signing_key, insecure=connection.insecure)
     options = Options(

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bridge.commands.checks import Check
-from bridge.commands.connection import (
+from stopgo.bridge.commands.checks import Check
+from stopgo.bridge.commands.connection import (
     DEFAULT_ENDPOINT,
     AnyRobot,
     Connect,
@@ -35,15 +35,15 @@ from bridge.commands.connection import (
     reached,
     with_presets,
 )
-from bridge.commands.order_commands import Json, state_line
-from bridge.console import print_json, tell
-from bridge.link.capabilities import told_of_capabilities
-from bridge.profile import counting, files, read_profile
-from mission.errors import InputError, StopgoError
+from stopgo.bridge.commands.order_commands import Json, state_line
+from stopgo.bridge.console import print_json, tell
+from stopgo.bridge.link.capabilities import told_of_capabilities
+from stopgo.bridge.profile import counting, files, read_profile
+from stopgo.mission.errors import InputError, StopgoError
 
 if TYPE_CHECKING:
-    from bridge.link.protocol import Info
-    from bridge.mavlink.line.url import Url
+    from stopgo.bridge.link.protocol import Info
+    from stopgo.bridge.mavlink.line.url import Url
 
 Satellites = Annotated[
     bool, typer.Option("--any-origin", help="With --mavlink: it finds its place by satellites, not indoors.")
@@ -91,7 +91,7 @@ def doctor(
     if told["keys"] is not None:
         checks += _checked("keys", lambda: _keys(told["keys"]))
     if mavlink is not None:
-        from bridge.mavlink.line.wire import read_line
+        from stopgo.bridge.mavlink.line.wire import read_line
 
         alone(given, "--mavlink", "--robot", "--site", "--keys", "--connect")
         url, key = read_line(mavlink, signing_key, insecure=insecure)
@@ -115,8 +115,8 @@ def _asked(connection: Connection) -> Iterator[Check]:
 def _vehicle(
     url: Url, vehicle: int | None, key: bytes | None, *, timeout_s: float, any_origin: bool
 ) -> Iterator[Check]:
-    from bridge.commands.vehicle_checks import vehicle_checks
-    from bridge.mavlink.line.peer import reached as vehicle_at
+    from stopgo.bridge.commands.vehicle_checks import vehicle_checks
+    from stopgo.bridge.mavlink.line.peer import reached as vehicle_at
 
     with vehicle_at(url, vehicle=vehicle, signing_key=key, timeout_s=timeout_s) as peer:
         yield from vehicle_checks(peer, any_origin=any_origin)
@@ -125,13 +125,13 @@ def _vehicle(
 def _unasked(told: dict[str, Any], *, insecure: bool) -> Iterator[Check]:
     """What can be told of where to connect while nobody says to which robot."""
     if told["mavlink"] is not None:
-        from bridge.mavlink.line.url import read_url
+        from stopgo.bridge.mavlink.line.url import read_url
 
         yield Check("port", True, f"{read_url(told['mavlink'])} is a MAVLink URL; nobody was asked there")
     elif told["connect"] != DEFAULT_ENDPOINT:
-        from bridge.link.keys import now_utc, read_keys
-        from bridge.link.link import endpoints_in
-        from bridge.link.zenoh_link import Guard, check_endpoint
+        from stopgo.bridge.link.keys import now_utc, read_keys
+        from stopgo.bridge.link.link import endpoints_in
+        from stopgo.bridge.link.zenoh_link import Guard, check_endpoint
 
         held = None if told["keys"] is None else read_keys(told["keys"], now=now_utc())
         for endpoint in endpoints_in(told["connect"]):
@@ -160,7 +160,7 @@ def _checked(name: str, look: Callable[[], Iterator[Check]]) -> list[Check]:
 
 
 def _system() -> Check:
-    from mission import __version__
+    from stopgo.mission import __version__
 
     where = f"{platform.system()} {platform.machine()}, {sys.prefix}"
     return Check("stopgo", True, f"{__version__}, Python {platform.python_version()}, {where}")
@@ -205,7 +205,7 @@ def _profile(given: frozenset[str]) -> Iterator[Check]:
 
 
 def _keys(folder: Path) -> Iterator[Check]:
-    from bridge.link.keys import now_utc, read_keys
+    from stopgo.bridge.link.keys import now_utc, read_keys
 
     now = now_utc()
     holder = read_keys(folder, now=now).holder
@@ -215,7 +215,7 @@ def _keys(folder: Path) -> Iterator[Check]:
 
 
 def _ports(endpoints: str) -> Iterator[Check]:
-    from bridge.link.link import endpoints_in
+    from stopgo.bridge.link.link import endpoints_in
 
     for endpoint in endpoints_in(endpoints):
         yield from _port(endpoint)

@@ -8,10 +8,10 @@ from typing import Annotated
 
 import typer
 
-from bridge.commands.connection import SiteName
-from bridge.console import print_json, tell, tell_lines
-from mission.errors import InputError
-from mission.table import table
+from stopgo.bridge.commands.connection import SiteName
+from stopgo.bridge.console import print_json, tell, tell_lines
+from stopgo.mission.errors import InputError
+from stopgo.mission.table import table
 
 SiteFolder = Annotated[Path, typer.Option("--in", metavar="DIR", help="The site's folder of keys.")]
 Days = Annotated[int, typer.Option(min=1, max=825, help="How long they are valid.")]
@@ -45,8 +45,8 @@ def keys_init(folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new 
 
     Example: stopgo keys init site-keys
     """
-    from bridge.link.authority import AUTHORITY, init_site
-    from bridge.link.keys import now_utc
+    from stopgo.bridge.link.authority import AUTHORITY, init_site
+    from stopgo.bridge.link.keys import now_utc
 
     init_site(folder, now=now_utc())
     tell(f"{folder / AUTHORITY}: the site's authority; keep it away from robots and stations")
@@ -64,8 +64,8 @@ def keys_issue(
 
     Example: stopgo keys issue robot r1 --address 10.1.2.3 --in site-keys
     """
-    from bridge.link.authority import issue
-    from bridge.link.keys import ROLES, now_utc
+    from stopgo.bridge.link.authority import issue
+    from stopgo.bridge.link.keys import ROLES, now_utc
 
     known = next((one for one in ROLES if one == role), None)
     if known is None:
@@ -85,8 +85,8 @@ def keys_rotate(
 
     Example: stopgo keys rotate r1 --in site-keys
     """
-    from bridge.link.authority import rotate
-    from bridge.link.keys import now_utc
+    from stopgo.bridge.link.authority import rotate
+    from stopgo.bridge.link.keys import now_utc
 
     files = rotate(folder, name, now=now_utc(), days=days, addresses=tuple(address or ()))
     tell(
@@ -105,7 +105,7 @@ def keys_revoke(
 
     Example: stopgo keys revoke alice --in site-keys
     """
-    from bridge.link.authority import revoke
+    from stopgo.bridge.link.authority import revoke
 
     serials = revoke(folder, name, old=old)
     if serials:
@@ -126,8 +126,8 @@ def keys_list(
 
     Example: stopgo keys list site-keys
     """
-    from bridge.link.authority import listed
-    from bridge.link.keys import now_utc
+    from stopgo.bridge.link.authority import listed
+    from stopgo.bridge.link.keys import now_utc
 
     given = [path for path in (site, folder) if path is not None]
     if len(given) != 1:
@@ -159,9 +159,9 @@ def router_rules(
 
     Example: stopgo keys router-rules --in site-keys --site north > access_control.json
     """
-    from bridge.link.access import router_access_control
-    from bridge.link.authority import listed
-    from bridge.link.keys import now_utc
+    from stopgo.bridge.link.access import router_access_control
+    from stopgo.bridge.link.authority import listed
+    from stopgo.bridge.link.keys import now_utc
 
     valid = [one.holder for one in listed(folder, now=now_utc()) if one.state == "valid"]
     tell_lines(json.dumps({"access_control": router_access_control(valid, site)}, indent=2))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bridge.commands.connection import (
+from stopgo.bridge.commands.connection import (
     Connection,
     Insecure,
     SigningKey,
@@ -20,12 +20,12 @@ from bridge.commands.connection import (
     reached,
     with_connection,
 )
-from bridge.commands.order_commands import Json, TakeOver
-from bridge.console import Bar, carried_out, print_json, refusals_in, say, tell
+from stopgo.bridge.commands.order_commands import Json, TakeOver
+from stopgo.bridge.console import Bar, carried_out, print_json, refusals_in, say, tell
 
 if TYPE_CHECKING:
-    from bridge.link.protocol import Accepted
-    from mission.document import Mission, Transform
+    from stopgo.bridge.link.protocol import Accepted
+    from stopgo.mission.document import Mission, Transform
 
 PushTimeout = Annotated[
     float | None,
@@ -83,7 +83,7 @@ def push(
 
     Example: stopgo push out/mission.json --mavlink udpout:127.0.0.1:14550 --set-origin
     """
-    from mission.files.mission_json import read
+    from stopgo.mission.files.mission_json import read
 
     if connection.mavlink is None:
         alone(
@@ -91,7 +91,7 @@ def push(
             "--set-origin", "--any-origin", "--while-running",
         )  # fmt: skip
         return push_over_zenoh(read(mission), pushing(connection, patience), take_over=take_over, json_=json_)
-    from bridge.commands.vehicle_missions import Leave, Line, Writing, push_mission
+    from stopgo.bridge.commands.vehicle_missions import Leave, Line, Writing, push_mission
 
     alone(connection.given, "--mavlink", "--take-over", "--as")
     vehicle = connection.mavlink
@@ -166,7 +166,7 @@ def fetch_mission(
 
     Example: stopgo fetch-mission --mavlink udpout:127.0.0.1:14550 -o held.plan
     """
-    from bridge.commands.vehicle_missions import Line, fetch_mission
+    from stopgo.bridge.commands.vehicle_missions import Line, fetch_mission
 
     line = Line(mavlink, vehicle, signing_key, insecure, autopilot, timeout)
     with refusals_in(json_):
@@ -189,7 +189,7 @@ def clear(
 
     Example: stopgo clear --mavlink udpout:127.0.0.1:14550
     """
-    from bridge.commands.vehicle_missions import Line, clear_mission
+    from stopgo.bridge.commands.vehicle_missions import Line, clear_mission
 
     line = Line(mavlink, vehicle, signing_key, insecure, autopilot, timeout)
     with refusals_in(json_):

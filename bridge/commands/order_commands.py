@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bridge.commands.connection import (
+from stopgo.bridge.commands.connection import (
     DEFAULT_ENDPOINT,
     VEHICLES,
     Connect,
@@ -28,13 +28,13 @@ from bridge.commands.connection import (
     with_connection,
     with_presets,
 )
-from bridge.console import carried_out, print_json, refusals_in, tell
+from stopgo.bridge.console import carried_out, print_json, refusals_in, tell
 
 if TYPE_CHECKING:
-    from bridge.station.fleet import FleetMember
-    from bridge.station.roster import LastSeen
-    from mission.events import StateReport
-    from mission.run.orders import Answer, Verb
+    from stopgo.bridge.station.fleet import FleetMember
+    from stopgo.bridge.station.roster import LastSeen
+    from stopgo.mission.events import StateReport
+    from stopgo.mission.run.orders import Answer, Verb
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
 TakeOver = Annotated[bool, typer.Option("--take-over", help="Command it though somebody else does.")]
@@ -184,9 +184,9 @@ def fleet_status(
     **reaching: Any,
 ) -> None:
     """Tell of all robots of a site, those too that ought to be there; a silent one is an answer of no."""
-    from bridge.link.keys import now_utc
-    from bridge.station.fleet import fleet
-    from bridge.station.roster import LastSeen, forget, read_roster, remember, remembered, usual_roster
+    from stopgo.bridge.link.keys import now_utc
+    from stopgo.bridge.station.fleet import fleet
+    from stopgo.bridge.station.roster import LastSeen, forget, read_roster, remember, remembered, usual_roster
 
     path = usual_roster(endpoint, site)
     if leave_out:
@@ -248,7 +248,7 @@ def report_answer(answer: Answer, robot: str, json_: bool) -> None:
 
 def state_line(report: StateReport) -> str:
     """The state as one line a person reads."""
-    from mission.tolerance import told_outside
+    from stopgo.mission.tolerance import told_outside
 
     mission = (
         f"mission {report.mission_id[:12]} revision {report.revision}" if report.mission_id else "no mission"

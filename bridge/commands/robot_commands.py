@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bridge.commands.connection import (
+from stopgo.bridge.commands.connection import (
     DEFAULT_ENDPOINT,
     Insecure,
     KeyFolder,
@@ -16,14 +16,14 @@ from bridge.commands.connection import (
     alone,
     given_in,
 )
-from bridge.console import say
-from mission.errors import InputError
+from stopgo.bridge.console import say
+from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
-    from bridge.mavlink.driving.mavlink_scanner import ScanTrigger
-    from mission.document import Transform
-    from mission.events import Pose
-    from mission.run.revision import RevisionPolicy
+    from stopgo.bridge.mavlink.driving.mavlink_scanner import ScanTrigger
+    from stopgo.mission.document import Transform
+    from stopgo.mission.events import Pose
+    from stopgo.mission.run.revision import RevisionPolicy
 
 MAVLINK = "mavlink:"
 """Before the URL of an autopilot that is the controller."""
@@ -93,9 +93,9 @@ def robot(
 
     Example: stopgo robot --name r1 --state r1.state --controller mavlink:serial:/dev/ttyAMA0:921600
     """
-    from bridge.robot.bodies import OpenBody, SimulatedBody
-    from bridge.robot.program import RobotOptions, run_robot
-    from bridge.robot.simulator import Faults, read_fault
+    from stopgo.bridge.robot.bodies import OpenBody, SimulatedBody
+    from stopgo.bridge.robot.program import RobotOptions, run_robot
+    from stopgo.bridge.robot.simulator import Faults, read_fault
 
     given = given_in(context)
     if connect is not None:
@@ -107,13 +107,13 @@ def robot(
             state, None if at is None else read_pose("--at", at), to_map, 3600 * endurance, faults
         )
     elif controller.startswith(MAVLINK):
-        from bridge.mavlink.driving.autopilot_body import AutopilotBody
+        from stopgo.bridge.mavlink.driving.autopilot_body import AutopilotBody
 
         alone(given, "an autopilot", *ONLY_SIMULATED)
         url = controller.removeprefix(MAVLINK)
         body = AutopilotBody(url, arm, read_trigger(trigger), signing_key, vehicle, insecure)
     else:
-        from bridge.robot.plugin_body import plugin_body
+        from stopgo.bridge.robot.plugin_body import plugin_body
 
         others = tuple(option for option in ONLY_SIMULATED if option != "--map")
         alone(given, "a controller of your own", *others, *ONLY_DRIVEN)
@@ -129,7 +129,7 @@ def robot(
 
 def read_revisions(text: str) -> RevisionPolicy:
     """What a robot does with a revision that is pushed during a run."""
-    from mission.run.revision import POLICIES
+    from stopgo.mission.run.revision import POLICIES
 
     if text not in POLICIES:
         raise InputError(f"--revision {text}: one of {', '.join(POLICIES)}")
@@ -138,7 +138,7 @@ def read_revisions(text: str) -> RevisionPolicy:
 
 def read_trigger(text: str) -> ScanTrigger:
     """What makes an autopilot's scanner scan."""
-    from bridge.mavlink.driving.mavlink_scanner import TRIGGERS
+    from stopgo.bridge.mavlink.driving.mavlink_scanner import TRIGGERS
 
     known = next((trigger for trigger in TRIGGERS if trigger == text), None)
     if known is None:
@@ -153,7 +153,7 @@ def read_map(text: str | None) -> Transform | None:
 
 def read_transform(option: str, text: str) -> Transform:
     """A transform from X,Y,HEADING in metres and degrees."""
-    from mission.document import Transform
+    from stopgo.mission.document import Transform
 
     pose = read_pose(option, text)
     return Transform(x=pose.x, y=pose.y, heading=pose.heading)
@@ -163,7 +163,7 @@ def read_pose(option: str, text: str) -> Pose:
     """A pose from X,Y,HEADING in metres and degrees."""
     import math
 
-    from mission.events import Pose
+    from stopgo.mission.events import Pose
 
     try:
         x, y, heading = (float(part) for part in text.split(","))

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from bridge.commands.connection import Insecure, SigningKey
-from bridge.commands.robot_commands import read_pose
-from bridge.console import say
+from stopgo.bridge.commands.connection import Insecure, SigningKey
+from stopgo.bridge.commands.robot_commands import read_pose
+from stopgo.bridge.console import say
 
 
 def simulate_commands() -> typer.Typer:
@@ -63,7 +63,7 @@ def simulate_vehicle(
 
     Example: stopgo simulate vehicle --mavlink udpin:127.0.0.1:14550 --profile ardupilot --origin 47.4,8.5,400
     """
-    from bridge.mavlink.simulated.vehicle_process import VehicleOptions, run_vehicle
+    from stopgo.bridge.mavlink.simulated.vehicle_process import VehicleOptions, run_vehicle
 
     options = VehicleOptions(
         mavlink, profile=profile, state=state, speed_up=speed_up, signing_key=signing_key, insecure=insecure,

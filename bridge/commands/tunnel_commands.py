@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bridge.commands.connection import (
+from stopgo.bridge.commands.connection import (
     DEFAULT_ENDPOINT,
     Connect,
     Insecure,
@@ -18,12 +18,12 @@ from bridge.commands.connection import (
     alone,
     given_in,
 )
-from bridge.console import say
+from stopgo.bridge.console import say
 
 if TYPE_CHECKING:
-    from bridge.mavlink.line.transport import Transport
-    from bridge.mavlink.tunnel.tunnel import Tunnel
-    from mission.mavlink.telemetry import Message
+    from stopgo.bridge.mavlink.line.transport import Transport
+    from stopgo.bridge.mavlink.tunnel.tunnel import Tunnel
+    from stopgo.mission.mavlink.telemetry import Message
 
 MOST_KINDS = 100
 """More are the sign of nonsense, which is not worth a line each."""
@@ -69,14 +69,14 @@ def tunnel_robot(
 
     Example: stopgo tunnel robot --name r1 --mavlink serial:/dev/ttyAMA1:57600 --connect tcp/127.0.0.1:7447
     """
-    from bridge.link.access import access_control
-    from bridge.link.protocol import KeyExpressions
-    from bridge.link.zenoh_link import Guard, joining, listening
-    from bridge.mavlink.line.url import read_url
-    from bridge.mavlink.tunnel.message_filter import MessageFilter
-    from bridge.mavlink.tunnel.tunnel import answer_greetings, open_tunnel
-    from bridge.robot.controller import new_boot_id
-    from bridge.robot.program import robots_keys
+    from stopgo.bridge.link.access import access_control
+    from stopgo.bridge.link.protocol import KeyExpressions
+    from stopgo.bridge.link.zenoh_link import Guard, joining, listening
+    from stopgo.bridge.mavlink.line.url import read_url
+    from stopgo.bridge.mavlink.tunnel.message_filter import MessageFilter
+    from stopgo.bridge.mavlink.tunnel.tunnel import answer_greetings, open_tunnel
+    from stopgo.bridge.robot.controller import new_boot_id
+    from stopgo.bridge.robot.program import robots_keys
 
     if connect is not None:
         alone(given_in(context), "--connect", "--listen")
@@ -114,10 +114,10 @@ def tunnel_station(
 
     Example: stopgo tunnel station --robot r1 --connect tcp/10.0.0.5:7447 --mavlink udpout:127.0.0.1:14550
     """
-    from bridge.link.keys import now_utc, read_keys
-    from bridge.link.protocol import KeyExpressions
-    from bridge.link.zenoh_link import Guard, connecting
-    from bridge.mavlink.tunnel.tunnel import greeting, open_tunnel
+    from stopgo.bridge.link.keys import now_utc, read_keys
+    from stopgo.bridge.link.protocol import KeyExpressions
+    from stopgo.bridge.link.zenoh_link import Guard, connecting
+    from stopgo.bridge.mavlink.tunnel.tunnel import greeting, open_tunnel
 
     _leave_on_sigterm()
     own, held = KeyExpressions(robot, site), None if keys is None else read_keys(keys, now=now_utc())
@@ -143,8 +143,8 @@ class Refusals:
 
     def told(self, message: Message) -> bytes:
         """A STATUSTEXT that tells of it, or nothing if that was told a moment ago."""
-        from bridge.mavlink.line.messages import warning
-        from bridge.mavlink.tunnel.message_filter import described
+        from stopgo.bridge.mavlink.line.messages import warning
+        from stopgo.bridge.mavlink.tunnel.message_filter import described
 
         what, now = described(message), time.monotonic()
         if now - self._said.get(what, -SAY_EVERY_S) < SAY_EVERY_S:
@@ -177,8 +177,8 @@ class RefusalsHeard:
 
 def _transport(mavlink: str, insecure: bool) -> Transport:
     """The MAVLink side: on this machine, or elsewhere if that is wanted, for nothing is signed here."""
-    from bridge.mavlink.line.transport import open_transport
-    from bridge.mavlink.line.url import check_guarded, read_url
+    from stopgo.bridge.mavlink.line.transport import open_transport
+    from stopgo.bridge.mavlink.line.url import check_guarded, read_url
 
     url = read_url(mavlink)
     check_guarded(url, signed=False, insecure=insecure)
@@ -187,7 +187,7 @@ def _transport(mavlink: str, insecure: bool) -> Transport:
 
 def _work(tunnel: Tunnel) -> None:
     """Until it is told to end; then say what was done."""
-    from bridge.mavlink.tunnel.tunnel import told
+    from stopgo.bridge.mavlink.tunnel.tunnel import told
 
     try:
         tunnel.wait()

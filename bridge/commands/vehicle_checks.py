@@ -5,14 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 
-from bridge.commands.checks import Check
-from bridge.mavlink.line.parameter_reading import read_parameters
-from bridge.mavlink.line.peer import Peer
-from mission.mavlink.accuracy import LEAVES_LEGS
-from mission.mavlink.autopilots.kind import Autopilot, ParameterRule, why_no_rover
-from mission.mavlink.enums import MessageId
-from mission.mavlink.items import Command
-from mission.mavlink.telemetry import charge_of, complains
+from stopgo.bridge.commands.checks import Check
+from stopgo.bridge.mavlink.line.parameter_reading import read_parameters
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.mission.mavlink.accuracy import LEAVES_LEGS
+from stopgo.mission.mavlink.autopilots.kind import Autopilot, ParameterRule, why_no_rover
+from stopgo.mission.mavlink.enums import MessageId
+from stopgo.mission.mavlink.items import Command
+from stopgo.mission.mavlink.telemetry import charge_of, complains
 
 PREARM_BIT = 0x10000000
 """MAV_SYS_STATUS_PREARM_CHECK."""

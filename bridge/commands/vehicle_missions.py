@@ -10,31 +10,38 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
-from bridge.console import Bar, print_json, say, tell, tell_lines
-from bridge.mavlink.auto.logbook import forget, logbook, remember
-from bridge.mavlink.auto.unfinished_run import check_run_over
-from bridge.mavlink.line.origin import check_origin
-from bridge.mavlink.line.parameter_reading import read_parameters
-from bridge.mavlink.line.peer import Peer, reached
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import read_line
-from bridge.mavlink.transfer.after_failure import own_items
-from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.upload import NOTHING_SENT, Uploaded, check_standing, clear, if_stopped, upload
-from mission.document import Mission, SiteOrigin
-from mission.errors import InputError
-from mission.files.atomic import write_atomic
-from mission.files.exports import qgc_plan, qgc_waypoints
-from mission.geodesy import STEPS_PER_DEGREE
-from mission.mavlink.accuracy import why_beside
-from mission.mavlink.autopilots import AUTOPILOTS, autopilot_named
-from mission.mavlink.fields import PLACED
-from mission.mavlink.items import Command, Item, ItemList, MavFrame
-from mission.mavlink.local_frame import VehicleOrigin
-from mission.mavlink.read_back import home_item
-from mission.mavlink.translate import translate
-from mission.mavlink.translation_options import ScanWait, Settle, Trigger
-from mission.table import table
+from stopgo.bridge.console import Bar, print_json, say, tell, tell_lines
+from stopgo.bridge.mavlink.auto.logbook import forget, logbook, remember
+from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
+from stopgo.bridge.mavlink.line.origin import check_origin
+from stopgo.bridge.mavlink.line.parameter_reading import read_parameters
+from stopgo.bridge.mavlink.line.peer import Peer, reached
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.line.wire import read_line
+from stopgo.bridge.mavlink.transfer.after_failure import own_items
+from stopgo.bridge.mavlink.transfer.download import download
+from stopgo.bridge.mavlink.transfer.upload import (
+    NOTHING_SENT,
+    Uploaded,
+    check_standing,
+    clear,
+    if_stopped,
+    upload,
+)
+from stopgo.mission.document import Mission, SiteOrigin
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.files.exports import qgc_plan, qgc_waypoints
+from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.mavlink.accuracy import why_beside
+from stopgo.mission.mavlink.autopilots import AUTOPILOTS, autopilot_named
+from stopgo.mission.mavlink.fields import PLACED
+from stopgo.mission.mavlink.items import Command, Item, ItemList, MavFrame
+from stopgo.mission.mavlink.local_frame import VehicleOrigin
+from stopgo.mission.mavlink.read_back import home_item
+from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.mavlink.translation_options import ScanWait, Settle, Trigger
+from stopgo.mission.table import table
 
 ITEMS = ("items", 1)
 T = TypeVar("T", bound=str)

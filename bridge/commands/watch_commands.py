@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Protocol
 
 import typer
 
-from bridge.commands.connection import Connection, reached, with_connection
-from bridge.commands.order_commands import Json, status_json
-from bridge.console import print_json, say, tell, tell_lines
+from stopgo.bridge.commands.connection import Connection, reached, with_connection
+from stopgo.bridge.commands.order_commands import Json, status_json
+from stopgo.bridge.console import print_json, say, tell, tell_lines
 
 if TYPE_CHECKING:
-    from bridge.station.watch import Showing
-    from mission.events import StateReport
-    from mission.heard_run import HeardRun
+    from stopgo.bridge.station.watch import Showing
+    from stopgo.mission.events import StateReport
+    from stopgo.mission.heard_run import HeardRun
 
 
 class Recorder(Protocol):
@@ -70,7 +70,7 @@ def watch_by(recording: Recorder) -> Callable[..., None]:
 
         Example: stopgo watch --mavlink udpout:127.0.0.1:14550 --rrd field.rrd
         """
-        from bridge.station.watch import EventObjects, Lines, Table, watch_showing
+        from stopgo.bridge.station.watch import EventObjects, Lines, Table, watch_showing
 
         showing: Showing = Lines(lambda line: tell(line, at_once=True))
         if json_:
@@ -91,8 +91,8 @@ def watch_by(recording: Recorder) -> Callable[..., None]:
 
 def tell_compared(heard: HeardRun, state: StateReport, *, json_: bool) -> int:
     """Tell the run beside its mission; the exit code that it comes to."""
-    from mission.comparing.judging import judge
-    from mission.comparing.telling import comparison_json, comparison_text
+    from stopgo.mission.comparing.judging import judge
+    from stopgo.mission.comparing.telling import comparison_json, comparison_text
 
     compared = heard.compared()
     if json_:

@@ -11,22 +11,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bridge.conform.falsified_seals import FalsifiedSeals
-from bridge.conform.requirements import ConformVerdict, Nonconforming, PeerGone, Requirement, tried
-from bridge.conform.robot_bench import OVER, Forger, OtherStation, RobotBench
-from bridge.conform.robot_orders import IDLE, ORDERS
-from bridge.conform.robot_pushes import PUSHES
-from bridge.conform.robot_questions import QUESTIONS
-from bridge.conform.robot_restarts import RESTARTS
-from bridge.conform.robot_runs import RUNS
-from bridge.conform.robot_seals import SEALS
-from bridge.link.link import Link
-from bridge.link.protocol import Info, KeyExpressions
-from bridge.link.seals import Seals
-from bridge.link.zenoh_link import Guard, connecting
-from bridge.station.station import Station, connect
-from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
-from mission.run.lease import remaining_s
+from stopgo.bridge.conform.falsified_seals import FalsifiedSeals
+from stopgo.bridge.conform.requirements import ConformVerdict, Nonconforming, PeerGone, Requirement, tried
+from stopgo.bridge.conform.robot_bench import OVER, Forger, OtherStation, RobotBench
+from stopgo.bridge.conform.robot_orders import IDLE, ORDERS
+from stopgo.bridge.conform.robot_pushes import PUSHES
+from stopgo.bridge.conform.robot_questions import QUESTIONS
+from stopgo.bridge.conform.robot_restarts import RESTARTS
+from stopgo.bridge.conform.robot_runs import RUNS
+from stopgo.bridge.conform.robot_seals import SEALS
+from stopgo.bridge.link.link import Link
+from stopgo.bridge.link.protocol import Info, KeyExpressions
+from stopgo.bridge.link.seals import Seals
+from stopgo.bridge.link.zenoh_link import Guard, connecting
+from stopgo.bridge.station.station import Station, connect
+from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown
+from stopgo.mission.run.lease import remaining_s
 
 REQUIREMENTS: tuple[Requirement[RobotBench], ...] = (
     *QUESTIONS, *SEALS, *IDLE, *PUSHES, *ORDERS, *RUNS, *RESTARTS,

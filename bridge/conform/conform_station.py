@@ -12,19 +12,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bridge.conform.fake_robot import FakeRobot, ForgedAnswers, MeddledLink, at_work
-from bridge.conform.requirements import ConformVerdict, NotTried, tried
-from bridge.conform.station_bench import Doing, StationBench
-from bridge.conform.station_requirements import STATION_REQUIREMENTS
-from bridge.link.access import access_control
-from bridge.link.protocol import KeyExpressions
-from bridge.link.seals import Seals
-from bridge.link.zenoh_link import Guard, listening
-from bridge.robot.controller import new_boot_id
-from bridge.robot.program import robots_keys
-from mission.document import Mission
-from mission.errors import InputError
-from mission.files.mission_json import write
+from stopgo.bridge.conform.fake_robot import FakeRobot, ForgedAnswers, MeddledLink, at_work
+from stopgo.bridge.conform.requirements import ConformVerdict, NotTried, tried
+from stopgo.bridge.conform.station_bench import Doing, StationBench
+from stopgo.bridge.conform.station_requirements import STATION_REQUIREMENTS
+from stopgo.bridge.link.access import access_control
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.link.seals import Seals
+from stopgo.bridge.link.zenoh_link import Guard, listening
+from stopgo.bridge.robot.controller import new_boot_id
+from stopgo.bridge.robot.program import robots_keys
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.mission_json import write
 
 COMMAND_S = 180.0
 """How long a station's command may take."""

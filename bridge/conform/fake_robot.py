@@ -9,17 +9,17 @@ from dataclasses import dataclass
 
 import msgspec
 
-from bridge.link.clock import WallClock
-from bridge.link.link import Answering, Hearing, Link, Presence, Publish, Request, Unanswered
-from bridge.link.protocol import KeyExpressions
-from bridge.link.seals import Question, Seal, SealedAnswering, SealedHearing, Seals
-from bridge.robot.agent import Agent, on_link
-from bridge.robot.bodies import pose_of
-from bridge.robot.controller import Controller
-from bridge.robot.inbox import Inbox
-from bridge.robot.journal import memory_journal
-from bridge.robot.simulator import SimulatedBase, SimulatedScanner
-from mission.document import Mission
+from stopgo.bridge.link.clock import WallClock
+from stopgo.bridge.link.link import Answering, Hearing, Link, Presence, Publish, Request, Unanswered
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.link.seals import Question, Seal, SealedAnswering, SealedHearing, Seals
+from stopgo.bridge.robot.agent import Agent, on_link
+from stopgo.bridge.robot.bodies import pose_of
+from stopgo.bridge.robot.controller import Controller
+from stopgo.bridge.robot.inbox import Inbox
+from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
+from stopgo.mission.document import Mission
 
 Meddling = Callable[[Request, Answering], bytes]
 """Gives the answer to a question in the robot's place; may raise `Unanswered`."""

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import msgspec
 
-from bridge.link.link import Answering, Hearing
-from bridge.link.seals import Question, Seal, SealedAnswering, SealedHearing, Seals
+from stopgo.bridge.link.link import Answering, Hearing
+from stopgo.bridge.link.seals import Question, Seal, SealedAnswering, SealedHearing, Seals
 
 Spoiling = Callable[[Question, Seals], Question]
 """Makes a question whose seal does not hold of one whose seal does."""

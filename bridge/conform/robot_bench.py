@@ -12,11 +12,11 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
-from bridge.conform.falsified_seals import FalsifiedSeals
-from bridge.conform.requirements import Nonconforming, NotTried, PeerGone, must, short
-from bridge.conform.trial_mission import REACH_M, trial_mission
-from bridge.link.link import Link
-from bridge.link.protocol import (
+from stopgo.bridge.conform.falsified_seals import FalsifiedSeals
+from stopgo.bridge.conform.requirements import Nonconforming, NotTried, PeerGone, must, short
+from stopgo.bridge.conform.trial_mission import REACH_M, trial_mission
+from stopgo.bridge.link.link import Link
+from stopgo.bridge.link.protocol import (
     Accepted,
     ChunkHeld,
     Commit,
@@ -32,9 +32,9 @@ from bridge.link.protocol import (
     decode,
     encode,
 )
-from mission.document import Mission
-from mission.events import AnyEvent, Pose, PoseReport, StateReport, event_of
-from mission.run.orders import Answer, Order, Verb
+from stopgo.mission.document import Mission
+from stopgo.mission.events import AnyEvent, Pose, PoseReport, StateReport, event_of
+from stopgo.mission.run.orders import Answer, Order, Verb
 
 TRY_S: Final = 1.0
 LOOK_S: Final = 0.02

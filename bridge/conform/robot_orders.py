@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import get_args
 
-from bridge.conform.requirements import NotTried, Requirement, must
-from bridge.conform.robot_bench import RobotBench, rejects, told_of
-from bridge.link.protocol import Accepted, encode
-from mission.document import Mission
-from mission.events import TakenOver
-from mission.run.decision import STATES
-from mission.run.orders import LONGEST_VALID_S, Verb
-from mission.run.states import DetailedState
+from stopgo.bridge.conform.requirements import NotTried, Requirement, must
+from stopgo.bridge.conform.robot_bench import RobotBench, rejects, told_of
+from stopgo.bridge.link.protocol import Accepted, encode
+from stopgo.mission.document import Mission
+from stopgo.mission.events import TakenOver
+from stopgo.mission.run.decision import STATES
+from stopgo.mission.run.orders import LONGEST_VALID_S, Verb
+from stopgo.mission.run.states import DetailedState
 
 VERBS: tuple[Verb, ...] = get_args(Verb)
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import msgspec
 
-from bridge.conform.requirements import NotTried, Requirement, must
-from bridge.conform.robot_bench import RobotBench, manifest_of, read, rejects, told_of
-from bridge.link.protocol import (
+from stopgo.bridge.conform.requirements import NotTried, Requirement, must
+from stopgo.bridge.conform.robot_bench import RobotBench, manifest_of, read, rejects, told_of
+from stopgo.bridge.link.protocol import (
     MAX_CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
     Accepted,
@@ -18,7 +18,7 @@ from bridge.link.protocol import (
     Ready,
     encode,
 )
-from mission.document import Mission, sealed
+from stopgo.mission.document import Mission, sealed
 
 STOPS_IN_PIECES = 10
 """Whose mission has several of the smallest pieces."""

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
-from bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
-from bridge.conform.robot_bench import RobotBench, manifest_of, read, read_event
-from bridge.conform.trial_mission import trial_mission
-from bridge.link.capabilities import RECORD
-from bridge.link.protocol import (
+from stopgo.bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
+from stopgo.bridge.conform.robot_bench import RobotBench, manifest_of, read, read_event
+from stopgo.bridge.conform.trial_mission import trial_mission
+from stopgo.bridge.link.capabilities import RECORD
+from stopgo.bridge.link.protocol import (
     LOG_PAGE,
     POSE_PAGE,
     VERSION,
@@ -28,9 +28,9 @@ from bridge.link.protocol import (
     Watching,
     encode,
 )
-from mission.document import Mission
-from mission.events import STOPS_LISTED, Pose, StateReport
-from mission.run.orders import Order
+from stopgo.mission.document import Mission
+from stopgo.mission.events import STOPS_LISTED, Pose, StateReport
+from stopgo.mission.run.orders import Order
 
 STATE_BYTES = 16 * 1024
 """No state is larger, with fifty stops of any sensible name done and fifty skipped."""

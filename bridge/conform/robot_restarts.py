@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
-from bridge.conform.robot_bench import RobotBench
-from bridge.conform.robot_orders import ready
-from bridge.link.protocol import Info, encode
+from stopgo.bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
+from stopgo.bridge.conform.robot_bench import RobotBench
+from stopgo.bridge.conform.robot_orders import ready
+from stopgo.bridge.link.protocol import Info, encode
 
 BOOT_S = 60.0
 """How long a robot may take to answer again."""

@@ -4,24 +4,15 @@ from __future__ import annotations
 
 import msgspec
 
-from bridge.conform.requirements import NotTried, Requirement, must
-from bridge.conform.robot_bench import OVER, RobotBench, read, read_event, rejects, told_of
-from bridge.conform.robot_orders import as_another, ready, refuses_what_means_nothing
-from bridge.conform.robot_questions import keeps_a_record, states_are_bounded
-from bridge.link.capabilities import RECORD
-from bridge.link.protocol import POSE_PAGE, RECORD_PAGE, Accepted, PosePage, RecordEntry, RecordPage
-from mission.document import Mission, sealed
-from mission.events import (
-    AnyEvent,
-    Arrived,
-    Finished,
-    Scanned,
-    Settled,
-    Skipped,
-    Started,
-    StateReport,
-)
-from mission.run.orders import LONGEST_VALID_S, Answer
+from stopgo.bridge.conform.requirements import NotTried, Requirement, must
+from stopgo.bridge.conform.robot_bench import OVER, RobotBench, read, read_event, rejects, told_of
+from stopgo.bridge.conform.robot_orders import as_another, ready, refuses_what_means_nothing
+from stopgo.bridge.conform.robot_questions import keeps_a_record, states_are_bounded
+from stopgo.bridge.link.capabilities import RECORD
+from stopgo.bridge.link.protocol import POSE_PAGE, RECORD_PAGE, Accepted, PosePage, RecordEntry, RecordPage
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.events import AnyEvent, Arrived, Finished, Scanned, Settled, Skipped, Started, StateReport
+from stopgo.mission.run.orders import LONGEST_VALID_S, Answer
 
 RUN_S = 180.0
 """How long a run of the trial mission may take."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from bridge.conform import falsified_seals as falsified
-from bridge.conform.falsified_seals import Spoiling
-from bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
-from bridge.conform.robot_bench import RobotBench, read_reply, rejects, told_of
-from bridge.link.protocol import Info, LogPage, encode
+from stopgo.bridge.conform import falsified_seals as falsified
+from stopgo.bridge.conform.falsified_seals import Spoiling
+from stopgo.bridge.conform.requirements import Nonconforming, NotTried, Requirement, must
+from stopgo.bridge.conform.robot_bench import RobotBench, read_reply, rejects, told_of
+from stopgo.bridge.link.protocol import Info, LogPage, encode
 
 NO_KEYS = "the link has no keys: --keys DIR"
 

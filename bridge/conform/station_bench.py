@@ -10,13 +10,20 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from bridge.conform.fake_robot import FakeRobot, ForgedAnswers, Meddling, Withholding, everything, plainly
-from bridge.conform.requirements import Nonconforming, NotTried, must
-from bridge.conform.trial_mission import trial_mission
-from bridge.link.link import Answering, Request
-from bridge.link.protocol import CHUNK_BYTES, Commit, Manifest, count_of, decode, encode
-from mission.document import Mission, Stop
-from mission.run.orders import Answer, Order, Verb
+from stopgo.bridge.conform.fake_robot import (
+    FakeRobot,
+    ForgedAnswers,
+    Meddling,
+    Withholding,
+    everything,
+    plainly,
+)
+from stopgo.bridge.conform.requirements import Nonconforming, NotTried, must
+from stopgo.bridge.conform.trial_mission import trial_mission
+from stopgo.bridge.link.link import Answering, Request
+from stopgo.bridge.link.protocol import CHUNK_BYTES, Commit, Manifest, count_of, decode, encode
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.run.orders import Answer, Order, Verb
 
 Doing = Callable[[str, Mission | None], int | None]
 """Lets the station do something (`push` with a mission, `start`, `watch`); its exit code, if it has one."""

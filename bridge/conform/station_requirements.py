@@ -9,19 +9,12 @@ from typing import Any
 
 import msgspec
 
-from bridge.conform.fake_robot import lost, no_answer, plainly
-from bridge.conform.requirements import Requirement, must
-from bridge.conform.station_bench import (
-    DONE,
-    NO,
-    UNKNOWN,
-    StationBench,
-    changed_answer,
-    tells,
-)
-from bridge.link.link import Answering, Request, Unanswered
-from bridge.link.protocol import Booted, ChunkHeld, Rejected, encode
-from mission.run.orders import LONGEST_VALID_S
+from stopgo.bridge.conform.fake_robot import lost, no_answer, plainly
+from stopgo.bridge.conform.requirements import Requirement, must
+from stopgo.bridge.conform.station_bench import DONE, NO, UNKNOWN, StationBench, changed_answer, tells
+from stopgo.bridge.link.link import Answering, Request, Unanswered
+from stopgo.bridge.link.protocol import Booted, ChunkHeld, Rejected, encode
+from stopgo.mission.run.orders import LONGEST_VALID_S
 
 LATE_S = 2.0
 """Longer than anybody waits for one try, shorter than for the whole."""

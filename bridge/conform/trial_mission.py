@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mission.document import (
+from stopgo.mission.document import (
     Frame,
     Mission,
     Origin,
@@ -17,7 +17,7 @@ from mission.document import (
     Stop,
     sealed,
 )
-from mission.events import Pose
+from stopgo.mission.events import Pose
 
 REACH_M = 0.5
 """How far ahead the last stop of a mission lies that is driven."""

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bridge.link.keys import Holder
-from bridge.link.protocol import KeyExpressions
+from stopgo.bridge.link.keys import Holder
+from stopgo.bridge.link.protocol import KeyExpressions
 
 LOOKING = ("declare_liveliness_subscriber", "liveliness_query")
 

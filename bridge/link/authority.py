@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
 
-from bridge.link.keys import (
+from stopgo.bridge.link.keys import (
     REVOKED,
     ROLES,
     Holder,
@@ -30,8 +30,8 @@ from bridge.link.keys import (
     read_key,
     read_revoked,
 )
-from mission.errors import InputError
-from mission.files.atomic import replacing, write_atomic
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import replacing, write_atomic
 
 if TYPE_CHECKING:
     from cryptography import x509

@@ -2,7 +2,7 @@
 
 A certificate names who holds it in its common name (`robot:r1`, `station:alice`), so that a router can tell
 one from another, and carries the role apart, as its organisational unit. Keys are Ed25519 and serve both the
-links (mTLS) and the seals. `bridge.link.authority` issues them and calls them back.
+links (mTLS) and the seals. `stopgo.bridge.link.authority` issues them and calls them back.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
 
-from mission.decoding import one_decode_error
-from mission.errors import InputError
-from mission.files.atomic import write_atomic
+from stopgo.mission.decoding import one_decode_error
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import write_atomic
 
 if TYPE_CHECKING:
     from cryptography import x509

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
-    from bridge.link.keys import Holder
+    from stopgo.bridge.link.keys import Holder
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from bridge.link.link import Answering, Hearing, Presence, Publish, Request, Unanswered, matches
-from bridge.link.seals import NO_SEALS, SealedAnswering, SealedHearing, Seals
+from stopgo.bridge.link.link import Answering, Hearing, Presence, Publish, Request, Unanswered, matches
+from stopgo.bridge.link.seals import NO_SEALS, SealedAnswering, SealedHearing, Seals
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,20 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
-from mission.decoding import one_decode_error
-from mission.document import Transform
-from mission.errors import InputError
-from mission.events import AnyEvent, Health, Nanoseconds, PoseReport, PosesMissing, StateReport, event_of
-from mission.run.lease import Lease
-from mission.run.orders import Answer, Count, ShortText
+from stopgo.mission.decoding import one_decode_error
+from stopgo.mission.document import Transform
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import (
+    AnyEvent,
+    Health,
+    Nanoseconds,
+    PoseReport,
+    PosesMissing,
+    StateReport,
+    event_of,
+)
+from stopgo.mission.run.lease import Lease
+from stopgo.mission.run.orders import Answer, Count, ShortText
 
 VERSION: Final = 1
 CHUNK_BYTES: Final = 32 * 1024

@@ -1,6 +1,7 @@
 """The JSON Schema of every message on the link, made from the code and shipped as protocol.schema.json.
 
-Regenerate the shipped file with `python -m bridge.link.protocol_schema > bridge/link/protocol.schema.json`.
+Regenerate the shipped file with
+`python -m stopgo.bridge.link.protocol_schema > bridge/link/protocol.schema.json`.
 """
 
 from __future__ import annotations
@@ -10,10 +11,10 @@ from typing import Any
 
 import msgspec
 
-from bridge.link.protocol import VERSION, Tagged
-from bridge.link.seals import Seal
-from mission.events import KINDS, AnyEvent, Health, PoseReport, StateReport, UnknownKind
-from mission.run.orders import Answer, Order
+from stopgo.bridge.link.protocol import VERSION, Tagged
+from stopgo.bridge.link.seals import Seal
+from stopgo.mission.events import KINDS, AnyEvent, Health, PoseReport, StateReport, UnknownKind
+from stopgo.mission.run.orders import Answer, Order
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

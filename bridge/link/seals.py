@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 import msgspec
 
-from bridge.link.keys import Certificates, HeldKeys, Holder, Untrusted, now_utc
-from bridge.link.link import Answering, Hearing, Request
-from bridge.link.protocol import VERSION, decode, encode, place_of, untrusted
+from stopgo.bridge.link.keys import Certificates, HeldKeys, Holder, Untrusted, now_utc
+from stopgo.bridge.link.link import Answering, Hearing, Request
+from stopgo.bridge.link.protocol import VERSION, decode, encode, place_of, untrusted
 
 if TYPE_CHECKING:
     from datetime import datetime

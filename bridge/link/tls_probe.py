@@ -5,8 +5,8 @@ from __future__ import annotations
 import socket
 import ssl
 
-from bridge.link.keys import HeldKeys
-from bridge.link.link import endpoints_in
+from stopgo.bridge.link.keys import HeldKeys
+from stopgo.bridge.link.link import endpoints_in
 
 PROBE_S = 2.0
 ALERT_S = 0.5

@@ -21,10 +21,10 @@ from typing import Any
 
 import zenoh
 
-from bridge.link.keys import HeldKeys, now_utc
-from bridge.link.link import Answering, Hearing, Presence, Publish, Request, Unanswered, endpoints_in
-from bridge.link.seals import NO_SEALS, KeySeals, Seals
-from mission.errors import InputError
+from stopgo.bridge.link.keys import HeldKeys, now_utc
+from stopgo.bridge.link.link import Answering, Hearing, Presence, Publish, Request, Unanswered, endpoints_in
+from stopgo.bridge.link.seals import NO_SEALS, KeySeals, Seals
+from stopgo.mission.errors import InputError
 
 LEASE_MS = 2000
 OPEN_S = 5.0

@@ -15,11 +15,11 @@ from typing import TypeVar
 
 import msgspec
 
-from bridge.link.capabilities import RECORD
-from bridge.link.clock import Clock
-from bridge.link.keys import Untrusted, now_utc
-from bridge.link.link import Link, Request
-from bridge.link.protocol import (
+from stopgo.bridge.link.capabilities import RECORD
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.link.keys import Untrusted, now_utc
+from stopgo.bridge.link.link import Link, Request
+from stopgo.bridge.link.protocol import (
     CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
     VERSION,
@@ -35,18 +35,18 @@ from bridge.link.protocol import (
     encode,
     untrusted,
 )
-from bridge.robot.inbox import Inbox
-from bridge.robot.journal import Journal
-from bridge.robot.pages import POSES_KEPT, address_of, events_page, part_page, poses_page
-from bridge.robot.recorder import ENTRY_S, RunRecorder
-from bridge.robot.refusal_log import RefusalLog
-from bridge.robot.runner import Position, Runner, state_report
-from mission import __version__
-from mission.document import Transform
-from mission.events import PoseReport, StateReport
-from mission.run.lease import Lease, kept
-from mission.run.orders import Order
-from mission.run.states import Run
+from stopgo.bridge.robot.inbox import Inbox
+from stopgo.bridge.robot.journal import Journal
+from stopgo.bridge.robot.pages import POSES_KEPT, address_of, events_page, part_page, poses_page
+from stopgo.bridge.robot.recorder import ENTRY_S, RunRecorder
+from stopgo.bridge.robot.refusal_log import RefusalLog
+from stopgo.bridge.robot.runner import Position, Runner, state_report
+from stopgo.mission import __version__
+from stopgo.mission.document import Transform
+from stopgo.mission.events import PoseReport, StateReport
+from stopgo.mission.run.lease import Lease, kept
+from stopgo.mission.run.orders import Order
+from stopgo.mission.run.states import Run
 
 STATE_EVERY_S = 1.0
 POSE_EVERY_S = 0.05

@@ -6,13 +6,13 @@ import hashlib
 import uuid
 from typing import Any
 
-from bridge.link.protocol import encode
-from bridge.robot.journal import ANSWERS_KEPT, Journal
-from mission.document import Mission
-from mission.run.decision import Situation
-from mission.run.lease import Lease
-from mission.run.orders import Answer, Order, Refused
-from mission.run.states import Run
+from stopgo.bridge.link.protocol import encode
+from stopgo.bridge.robot.journal import ANSWERS_KEPT, Journal
+from stopgo.mission.document import Mission
+from stopgo.mission.run.decision import Situation
+from stopgo.mission.run.lease import Lease
+from stopgo.mission.run.orders import Answer, Order, Refused
+from stopgo.mission.run.states import Run
 
 
 def answered(journal: Journal, order: Order, run: Run) -> Answer | None:

@@ -8,9 +8,9 @@ from typing import Literal, Protocol
 
 import msgspec
 
-from mission.document import Mission, Point, RobotSpec, Scan
-from mission.events import Pose
-from mission.run.scans import ScanFailed, ScanResult
+from stopgo.mission.document import Mission, Point, RobotSpec, Scan
+from stopgo.mission.events import Pose
+from stopgo.mission.run.scans import ScanFailed, ScanResult
 
 Outcome = Literal["arrived", "interrupted", "blocked"]
 

@@ -7,12 +7,19 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridge.link.clock import Clock
-from bridge.robot.base import Base, Scanner
-from bridge.robot.map_frame import OnMap, turned
-from bridge.robot.simulator import ENDURANCE_S, NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
-from mission.document import Mission, Start, Transform
-from mission.events import Pose
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.robot.base import Base, Scanner
+from stopgo.bridge.robot.map_frame import OnMap, turned
+from stopgo.bridge.robot.simulator import (
+    ENDURANCE_S,
+    NO_FAULTS,
+    Faults,
+    SimulatedBase,
+    SimulatedScanner,
+    Wear,
+)
+from stopgo.mission.document import Mission, Start, Transform
+from stopgo.mission.events import Pose
 
 
 @dataclass(frozen=True)

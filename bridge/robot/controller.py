@@ -15,27 +15,27 @@ from dataclasses import dataclass
 
 import msgspec
 
-from bridge.link.clock import Clock
-from bridge.link.protocol import Commit, Rejected
-from bridge.robot.answers import answer_to, answered, remember_answer, situation_of
-from bridge.robot.base import Base, Scanner
-from bridge.robot.journal import Journal
-from bridge.robot.mission_fitness import follows, weighed_by, why_unfit
-from bridge.robot.mission_reading import read_mission
-from bridge.robot.present_work import faces, has_work, label, moved, same_work
-from bridge.robot.runner import Position
-from bridge.robot.unstored import Unstored
-from mission.document import Mission
-from mission.events import AnyEvent, Pose
-from mission.run import revision, way
-from mission.run import states as runs
-from mission.run.decision import Decision, Situation, decide, handed_over
-from mission.run.lease import Lease, claimed, lasting_ns
-from mission.run.orders import FREE_VERBS, Answer, Order, Refused
-from mission.run.revision import RevisionPolicy
-from mission.run.scans import ScanFailed, ScanResult
-from mission.run.states import Change, Run
-from mission.tolerance import deviation, is_outside
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.link.protocol import Commit, Rejected
+from stopgo.bridge.robot.answers import answer_to, answered, remember_answer, situation_of
+from stopgo.bridge.robot.base import Base, Scanner
+from stopgo.bridge.robot.journal import Journal
+from stopgo.bridge.robot.mission_fitness import follows, weighed_by, why_unfit
+from stopgo.bridge.robot.mission_reading import read_mission
+from stopgo.bridge.robot.present_work import faces, has_work, label, moved, same_work
+from stopgo.bridge.robot.runner import Position
+from stopgo.bridge.robot.unstored import Unstored
+from stopgo.mission.document import Mission
+from stopgo.mission.events import AnyEvent, Pose
+from stopgo.mission.run import revision, way
+from stopgo.mission.run import states as runs
+from stopgo.mission.run.decision import Decision, Situation, decide, handed_over
+from stopgo.mission.run.lease import Lease, claimed, lasting_ns
+from stopgo.mission.run.orders import FREE_VERBS, Answer, Order, Refused
+from stopgo.mission.run.revision import RevisionPolicy
+from stopgo.mission.run.scans import ScanFailed, ScanResult
+from stopgo.mission.run.states import Change, Run
+from stopgo.mission.tolerance import deviation, is_outside
 
 SETTLE_SAMPLE_S = 0.1
 SETTLE_LIMIT_S = 30.0

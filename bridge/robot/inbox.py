@@ -10,8 +10,8 @@ from itertools import islice
 
 import msgspec
 
-from bridge.link.link import Request
-from bridge.link.protocol import (
+from stopgo.bridge.link.link import Request
+from stopgo.bridge.link.protocol import (
     MAX_CHUNK_BYTES,
     MAX_DOCUMENT_BYTES,
     Accepted,
@@ -25,13 +25,13 @@ from bridge.link.protocol import (
     count_of,
     decode,
 )
-from bridge.robot.controller import Controller
-from bridge.robot.journal import Journal
-from bridge.robot.mission_reading import read_mission
-from bridge.robot.pages import address_of, part_page
-from mission.document import Mission, digest_of
-from mission.problems import problems_of
-from mission.run.orders import Reason
+from stopgo.bridge.robot.controller import Controller
+from stopgo.bridge.robot.journal import Journal
+from stopgo.bridge.robot.mission_reading import read_mission
+from stopgo.bridge.robot.pages import address_of, part_page
+from stopgo.mission.document import Mission, digest_of
+from stopgo.mission.problems import problems_of
+from stopgo.mission.run.orders import Reason
 
 MOST_REASONS = 20
 """Reasons told of one mission that cannot be run."""

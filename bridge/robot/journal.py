@@ -18,14 +18,14 @@ from typing import IO, TypeVar
 
 import msgspec
 
-from bridge.link.protocol import Manifest
-from bridge.robot.journal_format import bring_up_to_date, make_tables, put_pieces
-from bridge.robot.reserve import Reserve
-from bridge.robot.sealed_rows import DamagedRow, NewestTransaction, put, sealed, verify
-from mission.errors import InputError
-from mission.events import AnyEvent, event_of
-from mission.run.orders import Answer
-from mission.run.states import Change, told_of
+from stopgo.bridge.link.protocol import Manifest
+from stopgo.bridge.robot.journal_format import bring_up_to_date, make_tables, put_pieces
+from stopgo.bridge.robot.reserve import Reserve
+from stopgo.bridge.robot.sealed_rows import DamagedRow, NewestTransaction, put, sealed, verify
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import AnyEvent, event_of
+from stopgo.mission.run.orders import Answer
+from stopgo.mission.run.states import Change, told_of
 
 ANSWERS_KEPT = 10_000
 NONCES_KEPT = 10_000

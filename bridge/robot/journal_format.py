@@ -6,8 +6,8 @@ import sqlite3
 
 import msgspec
 
-from bridge.link.protocol import CHUNK_BYTES
-from bridge.robot.sealed_rows import SEALED, DamagedRow, put, seal_of, sealed
+from stopgo.bridge.link.protocol import CHUNK_BYTES
+from stopgo.bridge.robot.sealed_rows import SEALED, DamagedRow, put, seal_of, sealed
 
 FORMAT = 3
 """Of the journal: 1 had no hashes, 2 held each mission in one row; a newer one is refused."""

@@ -10,11 +10,11 @@ import math
 from collections.abc import Sequence
 from threading import Event
 
-from bridge.robot.base import Base, BaseHealth, Outcome, Rest
-from mission import turning
-from mission.document import Mission, Point, RobotSpec, Transform
-from mission.events import Pose
-from mission.turning import SAME
+from stopgo.bridge.robot.base import Base, BaseHealth, Outcome, Rest
+from stopgo.mission import turning
+from stopgo.mission.document import Mission, Point, RobotSpec, Transform
+from stopgo.mission.events import Pose
+from stopgo.mission.turning import SAME
 
 
 class OnMap:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from bridge.robot.base import Base
-from mission.document import Mission
-from mission.run import revision
-from mission.run.battery import what_is_missing
-from mission.run.orders import Refused
-from mission.run.revision import RevisionPolicy
-from mission.run.states import Run
+from stopgo.bridge.robot.base import Base
+from stopgo.mission.document import Mission
+from stopgo.mission.run import revision
+from stopgo.mission.run.battery import what_is_missing
+from stopgo.mission.run.orders import Refused
+from stopgo.mission.run.revision import RevisionPolicy
+from stopgo.mission.run.states import Run
 
 
 def why_unfit(

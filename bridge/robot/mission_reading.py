@@ -13,7 +13,7 @@ from contextlib import contextmanager
 
 import msgspec
 
-from mission.document import Mission, Stop
+from stopgo.mission.document import Mission, Stop
 
 
 class MissionOfRawStops(Mission, frozen=True, kw_only=True):

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from mission.document import Point
-from mission.events import Pose
+from stopgo.mission.document import Point
+from stopgo.mission.events import Pose
 
 
 class Phase(Protocol):

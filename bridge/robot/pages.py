@@ -7,8 +7,8 @@ from itertools import islice
 
 import msgspec
 
-from bridge.link.link import Request
-from bridge.link.protocol import (
+from stopgo.bridge.link.link import Request
+from stopgo.bridge.link.protocol import (
     CHUNK_BYTES,
     LOG_PAGE,
     POSE_PAGE,
@@ -21,8 +21,8 @@ from bridge.link.protocol import (
     count_of,
     parts_of,
 )
-from bridge.robot.journal import Journal
-from mission.events import PoseReport
+from stopgo.bridge.robot.journal import Journal
+from stopgo.mission.events import PoseReport
 
 POSES_KEPT = 3000
 """For stations that come late or were cut off."""

@@ -10,15 +10,15 @@ from pathlib import Path
 from threading import Event
 from typing import Any, TypeVar, get_args
 
-from bridge.link.clock import Clock
-from bridge.robot.base import Base, BaseHealth, Outcome, Rest, Scanner
-from bridge.robot.bodies import Body
-from bridge.robot.map_frame import OnMap
-from mission.document import Mission, Point, RobotSpec, Scan, Transform
-from mission.errors import InputError
-from mission.events import Pose
-from mission.plugins import Variant, variant
-from mission.run.scans import ScanFailed, ScanResult
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.robot.base import Base, BaseHealth, Outcome, Rest, Scanner
+from stopgo.bridge.robot.bodies import Body
+from stopgo.bridge.robot.map_frame import OnMap
+from stopgo.mission.document import Mission, Point, RobotSpec, Scan, Transform
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import Pose
+from stopgo.mission.plugins import Variant, variant
+from stopgo.mission.run.scans import ScanFailed, ScanResult
 
 T = TypeVar("T")
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from bridge.robot.base import Rest
-from mission.document import Stop
-from mission.events import Pose
-from mission.files.file_name import file_name
-from mission.run import states as runs
-from mission.run.states import Run
+from stopgo.bridge.robot.base import Rest
+from stopgo.mission.document import Stop
+from stopgo.mission.events import Pose
+from stopgo.mission.files.file_name import file_name
+from stopgo.mission.run import states as runs
+from stopgo.mission.run.states import Run
 
 FACING_RAD = math.radians(2)
 """A robot that is turned by more goes on turning; every base stands truer than this."""

@@ -13,22 +13,22 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridge.link import keys as key_files
-from bridge.link.access import access_control
-from bridge.link.clock import Clock, WallClock
-from bridge.link.link import Link
-from bridge.link.protocol import KeyExpressions, place_of
-from bridge.robot.agent import Agent, on_link, others_of
-from bridge.robot.bodies import OpenBody
-from bridge.robot.controller import Controller, new_boot_id
-from bridge.robot.inbox import Inbox
-from bridge.robot.journal import Journal, open_journal
-from bridge.robot.recorder import LIMIT_BYTES, RunRecorder
-from bridge.robot.refusal_log import RefusalLog
-from bridge.robot.simulator import NO_FAULTS, Faults
-from mission.document import Transform
-from mission.errors import AnswerIsNo, InputError
-from mission.run.revision import RevisionPolicy
+from stopgo.bridge.link import keys as key_files
+from stopgo.bridge.link.access import access_control
+from stopgo.bridge.link.clock import Clock, WallClock
+from stopgo.bridge.link.link import Link
+from stopgo.bridge.link.protocol import KeyExpressions, place_of
+from stopgo.bridge.robot.agent import Agent, on_link, others_of
+from stopgo.bridge.robot.bodies import OpenBody
+from stopgo.bridge.robot.controller import Controller, new_boot_id
+from stopgo.bridge.robot.inbox import Inbox
+from stopgo.bridge.robot.journal import Journal, open_journal
+from stopgo.bridge.robot.recorder import LIMIT_BYTES, RunRecorder
+from stopgo.bridge.robot.refusal_log import RefusalLog
+from stopgo.bridge.robot.simulator import NO_FAULTS, Faults
+from stopgo.mission.document import Transform
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.run.revision import RevisionPolicy
 
 LOOK_S = 1.5
 """How long a robot that joins a router waits for what that one knows."""
@@ -69,7 +69,7 @@ class RobotOptions:
 
 def run_robot(options: RobotOptions, ready: Callable[[], None]) -> None:
     """Be a robot until SIGTERM or Ctrl-C; `ready` is called once it can be reached."""
-    from bridge.link.zenoh_link import Guard, joining, listening
+    from stopgo.bridge.link.zenoh_link import Guard, joining, listening
 
     signal.signal(signal.SIGTERM, _leave)
     sys.setswitchinterval(SWITCH_S)

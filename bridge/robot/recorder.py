@@ -12,14 +12,14 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-from bridge.link.link import Request
-from bridge.link.protocol import Malformed, RecordIndex, RecordPage, Rejected, Reply, RunKept, count_of
-from bridge.record_file import open_record_file, read_record_file
-from bridge.robot.base import BaseHealth
-from bridge.robot.run_record import RunRecord
-from mission.errors import InputError
-from mission.events import Health, PoseReport, PosesMissing, StateReport
-from mission.files.file_name import file_name
+from stopgo.bridge.link.link import Request
+from stopgo.bridge.link.protocol import Malformed, RecordIndex, RecordPage, Rejected, Reply, RunKept, count_of
+from stopgo.bridge.record_file import open_record_file, read_record_file
+from stopgo.bridge.robot.base import BaseHealth
+from stopgo.bridge.robot.run_record import RunRecord
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import Health, PoseReport, PosesMissing, StateReport
+from stopgo.mission.files.file_name import file_name
 
 ENTRY_S = 0.5
 """How often an entry is written: what a robot that is killed can lose, with the time that takes."""

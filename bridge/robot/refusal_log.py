@@ -6,8 +6,8 @@ import threading
 from collections.abc import Callable
 from datetime import datetime
 
-from bridge.link.protocol import Rejected, Reply
-from mission.run.orders import Answer
+from stopgo.bridge.link.protocol import Rejected, Reply
+from stopgo.mission.run.orders import Answer
 
 AGAIN_S = 60.0
 """The same refusal is told so often at most, with how often it was given: a log must not fill a disk."""

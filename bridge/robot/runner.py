@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from mission.document import Mission
-from mission.events import STOPS_LISTED, Pose, StateReport
-from mission.run.orders import Answer, Order
-from mission.run.states import Run, stop_of
+from stopgo.mission.document import Mission
+from stopgo.mission.events import STOPS_LISTED, Pose, StateReport
+from stopgo.mission.run.orders import Answer, Order
+from stopgo.mission.run.states import Run, stop_of
 
 
 @dataclass(frozen=True)

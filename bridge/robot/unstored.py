@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from bridge.robot.answers import remember_answer
-from bridge.robot.journal import Journal
-from mission.events import AnyEvent
-from mission.run.orders import Answer, Order
+from stopgo.bridge.robot.answers import remember_answer
+from stopgo.bridge.robot.journal import Journal
+from stopgo.mission.events import AnyEvent
+from stopgo.mission.run.orders import Answer, Order
 
 
 class Unstored:

@@ -8,13 +8,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridge.link.keys import HeldKeys, now_utc, read_keys
-from bridge.link.link import Link
-from bridge.link.protocol import KeyExpressions
-from bridge.link.tls_probe import why_no_link
-from bridge.station.station import Station, whoami
-from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
-from mission.events import StateReport
+from stopgo.bridge.link.keys import HeldKeys, now_utc, read_keys
+from stopgo.bridge.link.link import Link
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.link.tls_probe import why_no_link
+from stopgo.bridge.station.station import Station, whoami
+from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.events import StateReport
 
 GATHER_S = 0.3
 """Once one robot of a fleet has shown itself, the others get this long."""
@@ -49,7 +49,7 @@ def fleet(
     RobotUnreachable
         If not a single robot showed itself within `timeout_s`, and none is known.
     """
-    from bridge.link.zenoh_link import Guard, connecting
+    from stopgo.bridge.link.zenoh_link import Guard, connecting
 
     held = None if keys is None else read_keys(keys, now=now_utc())
     every, names = KeyExpressions.of_every_robot(site), set(known)

@@ -11,11 +11,11 @@ from functools import partial
 
 import msgspec
 
-from bridge.link.link import Link
-from bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, decode
-from bridge.station.record import AGAIN_S, Past, RecordHistory
-from bridge.station.robot_replies import PastEvents, read_events, read_reply
-from mission.events import (
+from stopgo.bridge.link.link import Link
+from stopgo.bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, decode
+from stopgo.bridge.station.record import AGAIN_S, Past, RecordHistory
+from stopgo.bridge.station.robot_replies import PastEvents, read_events, read_reply
+from stopgo.mission.events import (
     Aborted,
     AnyEvent,
     Finished,

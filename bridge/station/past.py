@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from bridge.link.capabilities import RECORD
-from bridge.station.follow import Followed
-from bridge.station.record import Past, past_run, read_index
-from bridge.station.station import Station
-from mission.document import Mission
-from mission.errors import AnswerIsNo
-from mission.events import Aborted, AnyEvent, Finished, Scanned, Skipped, StateReport, Unconfirmed
-from mission.tolerance import stops_outside
+from stopgo.bridge.link.capabilities import RECORD
+from stopgo.bridge.station.follow import Followed
+from stopgo.bridge.station.record import Past, past_run, read_index
+from stopgo.bridge.station.station import Station
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.events import Aborted, AnyEvent, Finished, Scanned, Skipped, StateReport, Unconfirmed
+from stopgo.mission.tolerance import stops_outside
 
 
 def past_reports(

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 
 import msgspec
 
-from bridge.link.link import Link
-from bridge.link.protocol import RECORD_PAGE, KeyExpressions, RecordEntry, RecordIndex, RecordPage
-from bridge.station.robot_replies import read_reply
-from bridge.station.window import Window, windowed
-from mission.errors import OutcomeUnknown
-from mission.events import Health, Pose, PoseReport, PosesMissing, StateReport
+from stopgo.bridge.link.link import Link
+from stopgo.bridge.link.protocol import RECORD_PAGE, KeyExpressions, RecordEntry, RecordIndex, RecordPage
+from stopgo.bridge.station.robot_replies import read_reply
+from stopgo.bridge.station.window import Window, windowed
+from stopgo.mission.errors import OutcomeUnknown
+from stopgo.mission.events import Health, Pose, PoseReport, PosesMissing, StateReport
 
 PAGE_S = 10.0
 """How long a page is waited for: on a slow line it takes a second, and others lie before it."""

@@ -6,9 +6,9 @@ from typing import NamedTuple, TypeVar
 
 import msgspec
 
-from bridge.link.protocol import LogPage, Malformed, Rejected, Reply, decode
-from mission.errors import AnswerIsNo, OutcomeUnknown
-from mission.events import AnyEvent
+from stopgo.bridge.link.protocol import LogPage, Malformed, Rejected, Reply, decode
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.events import AnyEvent
 
 M = TypeVar("M")
 

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import msgspec
 
-from bridge.link.protocol import KeyExpressions
-from mission.decoding import one_decode_error
-from mission.errors import InputError
-from mission.files.atomic import write_atomic
-from mission.files.file_name import file_name
-from mission.toml_file import read_toml
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.mission.decoding import one_decode_error
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.files.file_name import file_name
+from stopgo.mission.toml_file import read_toml
 
 
 class LastSeen(msgspec.Struct, frozen=True, kw_only=True):

@@ -19,11 +19,11 @@ from typing import Any, NoReturn
 
 import msgspec
 
-from bridge.console import Progress
-from bridge.link.capabilities import RECORD
-from bridge.link.keys import HeldKeys, now_utc, read_keys
-from bridge.link.link import Link
-from bridge.link.protocol import (
+from stopgo.bridge.console import Progress
+from stopgo.bridge.link.capabilities import RECORD
+from stopgo.bridge.link.keys import HeldKeys, now_utc, read_keys
+from stopgo.bridge.link.link import Link
+from stopgo.bridge.link.protocol import (
     CHUNK_BYTES,
     VERSION,
     Accepted,
@@ -37,16 +37,16 @@ from bridge.link.protocol import (
     Watching,
     encode,
 )
-from bridge.link.tls_probe import why_no_link
-from bridge.station import follow
-from bridge.station.robot_replies import read_reply
-from bridge.station.window import Window, windowed
-from mission.document import Mission, sealed
-from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
-from mission.events import AnyEvent, Scanned, Skipped, StateReport, Unconfirmed
-from mission.files.mission_json import parse
-from mission.run.orders import FREE_VERBS, LONGEST_VALID_S, Answer, Order, Verb
-from mission.tolerance import stops_outside
+from stopgo.bridge.link.tls_probe import why_no_link
+from stopgo.bridge.station import follow
+from stopgo.bridge.station.robot_replies import read_reply
+from stopgo.bridge.station.window import Window, windowed
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.events import AnyEvent, Scanned, Skipped, StateReport, Unconfirmed
+from stopgo.mission.files.mission_json import parse
+from stopgo.mission.run.orders import FREE_VERBS, LONGEST_VALID_S, Answer, Order, Verb
+from stopgo.mission.tolerance import stops_outside
 
 TRY_S = 1.0
 """How long one try waits for its answer."""
@@ -85,7 +85,7 @@ def connect(
     RobotUnreachable
         If the robot did not show itself within `timeout_s`; nothing was sent.
     """
-    from bridge.link.zenoh_link import Guard, connecting
+    from stopgo.bridge.link.zenoh_link import Guard, connecting
 
     held = None if keys is None else read_keys(keys, now=now_utc())
     who = commander or (held.holder.name if held else whoami())

@@ -10,14 +10,14 @@ from typing import Any, Protocol
 
 import msgspec
 
-from bridge.station.follow import Followed, Silence
-from bridge.station.past import past_reports
-from bridge.station.record import Past
-from bridge.station.station import Station
-from mission.comparing.spans import stood_s
-from mission.document import Mission, Stop
-from mission.errors import OutcomeUnknown
-from mission.events import (
+from stopgo.bridge.station.follow import Followed, Silence
+from stopgo.bridge.station.past import past_reports
+from stopgo.bridge.station.record import Past
+from stopgo.bridge.station.station import Station
+from stopgo.mission.comparing.spans import stood_s
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.errors import OutcomeUnknown
+from stopgo.mission.events import (
     AnyEvent,
     Arrived,
     Health,
@@ -31,11 +31,11 @@ from mission.events import (
     StateReport,
     UnknownKind,
 )
-from mission.heard_run import RunTaker
-from mission.run.decision import STATES
-from mission.schedule import schedule
-from mission.table import printable
-from mission.tolerance import scanned_beside, told_outside
+from stopgo.mission.heard_run import RunTaker
+from stopgo.mission.run.decision import STATES
+from stopgo.mission.schedule import schedule
+from stopgo.mission.table import printable
+from stopgo.mission.tolerance import scanned_beside, told_outside
 
 REDRAW_S = 0.2
 LOST_S = 3.0

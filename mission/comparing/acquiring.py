@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from mission.acquired import Acquired
-from mission.comparison import StopComparison
-from mission.document import Mission, Stop
-from mission.geometry import IntArray, frozen
-from mission.sight import Sight
+from stopgo.mission.acquired import Acquired
+from stopgo.mission.comparison import StopComparison
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.geometry import IntArray, frozen
+from stopgo.mission.sight import Sight
 
 SCANNED, UNSURE = "scanned", "unconfirmed"
 

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from mission.comparison import Beside
-from mission.document import Mission, Point
-from mission.events import (
+from stopgo.mission.comparison import Beside
+from stopgo.mission.document import Mission, Point
+from stopgo.mission.events import (
     AnyEvent,
     Arrived,
     Finished,
@@ -28,8 +28,8 @@ from mission.events import (
     Started,
     Unconfirmed,
 )
-from mission.geometry import FloatArray, frozen
-from mission.run_log import RunLog
+from stopgo.mission.geometry import FloatArray, frozen
+from stopgo.mission.run_log import RunLog
 
 SKIPPING = 1e-3
 """What it costs to leave out a metre of the way, in m² of squared distance: enough to decide between pieces

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from mission.acquired import Acquired
-from mission.comparing.acquiring import acquired_by
-from mission.comparing.beside import beside
-from mission.comparing.spans import spans_of
-from mission.comparison import Comparison, StopComparison
-from mission.document import Mission, Stop
-from mission.events import (
+from stopgo.mission.acquired import Acquired
+from stopgo.mission.comparing.acquiring import acquired_by
+from stopgo.mission.comparing.beside import beside
+from stopgo.mission.comparing.spans import spans_of
+from stopgo.mission.comparison import Comparison, StopComparison
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.events import (
     Aborted,
     AnyEvent,
     Arrived,
@@ -26,10 +26,10 @@ from mission.events import (
     Skipped,
     Unconfirmed,
 )
-from mission.run_log import RunLog
-from mission.schedule import schedule
-from mission.sight import Sight
-from mission.tolerance import deviation
+from stopgo.mission.run_log import RunLog
+from stopgo.mission.schedule import schedule
+from stopgo.mission.sight import Sight
+from stopgo.mission.tolerance import deviation
 
 VISITS = (Arrived, Settled, Scanned, Unconfirmed, Skipped, Failed)
 """Events at a stop."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from mission.acquired import Acquired, Certainty
-from mission.comparison import Comparison
-from mission.events import Aborted
-from mission.figures import percent
+from stopgo.mission.acquired import Acquired, Certainty
+from stopgo.mission.comparison import Comparison
+from stopgo.mission.events import Aborted
+from stopgo.mission.figures import percent
 
 EXIT_CODES: dict[Certainty, int] = {"yes": 0, "no": 1, "unknown": 3}
 HEADLINES: dict[Certainty, str] = {"yes": "Acquired", "no": "Not acquired", "unknown": "Not known"}

@@ -6,11 +6,11 @@ from collections import deque
 
 import numpy as np
 
-from mission.comparing.beside import WayFollower
-from mission.document import Mission
-from mission.events import AnyEvent
-from mission.geometry import FloatArray, IntArray, frozen
-from mission.run_log import Track
+from stopgo.mission.comparing.beside import WayFollower
+from stopgo.mission.document import Mission
+from stopgo.mission.events import AnyEvent
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.run_log import Track
 
 
 class LateBeside:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from mission.acquired import Acquired
-from mission.comparing.judging import judge
-from mission.comparison import Comparison, StopComparison
-from mission.events import Aborted, Finished
-from mission.figures import Share, percent
-from mission.network import apart_in_words, network_of
-from mission.table import duration, printable, table
+from stopgo.mission.acquired import Acquired
+from stopgo.mission.comparing.judging import judge
+from stopgo.mission.comparison import Comparison, StopComparison
+from stopgo.mission.events import Aborted, Finished
+from stopgo.mission.figures import Share, percent
+from stopgo.mission.network import apart_in_words, network_of
+from stopgo.mission.table import duration, printable, table
 
 HEADER = (
     *("stop", "outcome", "planned s", "arrived s", "late s", "along mm", "across mm", "heading °"),

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
-from mission.errors import InputError
+from stopgo.mission.errors import InputError
 
 
 def write_atomic(path: Path | str, data: bytes) -> None:

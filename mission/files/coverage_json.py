@@ -10,16 +10,16 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from mission.decoding import one_decode_error
-from mission.document import Mission
-from mission.errors import InputError
-from mission.figures import Figures, Share
-from mission.files.atomic import write_atomic
-from mission.floor import Element
-from mission.geometry import FloatArray, IntArray
-from mission.network import network_of, network_table
-from mission.planning import Route, Targets
-from mission.seen import runs_of, seen_units
+from stopgo.mission.decoding import one_decode_error
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.figures import Figures, Share
+from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.floor import Element
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.network import network_of, network_table
+from stopgo.mission.planning import Route, Targets
+from stopgo.mission.seen import runs_of, seen_units
 
 DIGITS = 6
 """A micrometre, and a millionth of a segment."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.files.floor_drawing import LOOKS, kinds_of
-from mission.files.svg import FONT, clean, group, line_data, number, path, ring_data, text
-from mission.floor import Element, FloorPlan, Room
-from mission.geometry import FloatArray, Polygon, bounds
+from stopgo.mission.files.floor_drawing import LOOKS, kinds_of
+from stopgo.mission.files.svg import FONT, clean, group, line_data, number, path, ring_data, text
+from stopgo.mission.floor import Element, FloorPlan, Room
+from stopgo.mission.geometry import FloatArray, Polygon, bounds
 
 WIDTH = 400.0
 """Millimetres of paper that the largest floor takes …"""

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mission.files.dxf_bytes import encoded, reproducible
-from mission.floor import FloorPlan, Room
-from mission.geometry import FloatArray, Polygon
-from mission.kinds import KINDS
-from mission.table import printable
+from stopgo.mission.files.dxf_bytes import encoded, reproducible
+from stopgo.mission.floor import FloorPlan, Room
+from stopgo.mission.geometry import FloatArray, Polygon
+from stopgo.mission.kinds import KINDS
+from stopgo.mission.table import printable
 
 if TYPE_CHECKING:
     from ezdxf.entities import DXFEntity

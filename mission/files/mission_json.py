@@ -12,9 +12,9 @@ from typing import Any
 
 import msgspec
 
-from mission.document import SCHEMA, VERSION, Mission, canonical, digest_of, sealed
-from mission.errors import InputError
-from mission.files.atomic import write_atomic
+from stopgo.mission.document import SCHEMA, VERSION, Mission, canonical, digest_of, sealed
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import write_atomic
 
 _WIDEST = 2**53
 """Integers beyond this do not survive readers that keep numbers as doubles."""

@@ -1,6 +1,7 @@
 """The JSON Schema of mission.json, made from the document's types and shipped as mission.schema.json.
 
-Regenerate the shipped file with `python -m mission.files.mission_schema > mission/mission.schema.json`.
+Regenerate the shipped file with
+`python -m stopgo.mission.files.mission_schema > mission/mission.schema.json`.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from mission.document import VERSION, Mission
+from stopgo.mission.document import VERSION, Mission
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -1,4 +1,4 @@
-"""Sheets drawn in the words of `mission.files.svg` -> one PDF, in lines and true to scale.
+"""Sheets drawn in the words of `stopgo.mission.files.svg` -> one PDF, in lines and true to scale.
 
 Only those words are understood, not SVG at large. What several sheets show is put into the file once.
 """
@@ -14,7 +14,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from mission.files.sheet import PaperBox
+from stopgo.mission.files.sheet import PaperBox
 
 MM = 72 / 25.4
 """Points in a millimetre."""

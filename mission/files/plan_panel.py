@@ -9,19 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from msgspec import UNSET
 
-from mission.document import Mission
-from mission.figures import Figures, Share, percent
-from mission.files import floor_drawing as floor_look
-from mission.files import route_drawing as route_look
-from mission.files.shared_drawing import back, letter, line_of
-from mission.files.sheet import COLUMN, HEADER, ROW, Chunk, PaperBox, PaperSheet
-from mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
-from mission.geometry import polyline_length
-from mission.limits import limits_in_words
-from mission.network import network_of
-from mission.planning import Route, Selection
-from mission.schedule import schedule
-from mission.table import duration
+from stopgo.mission.document import Mission
+from stopgo.mission.figures import Figures, Share, percent
+from stopgo.mission.files import floor_drawing as floor_look
+from stopgo.mission.files import route_drawing as route_look
+from stopgo.mission.files.shared_drawing import back, letter, line_of
+from stopgo.mission.files.sheet import COLUMN, HEADER, ROW, Chunk, PaperBox, PaperSheet
+from stopgo.mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
+from stopgo.mission.geometry import polyline_length
+from stopgo.mission.limits import limits_in_words
+from stopgo.mission.network import network_of
+from stopgo.mission.planning import Route, Selection
+from stopgo.mission.schedule import schedule
+from stopgo.mission.table import duration
 
 BODY = 2.5
 LINE = 4.2

@@ -13,20 +13,20 @@ from itertools import product
 
 import numpy as np
 
-from mission.document import Mission
-from mission.figures import Figures, percent
-from mission.files import plan_panel as panel
-from mission.files.floor_drawing import outline
-from mission.files.pdf import PdfPage, pdf_of
-from mission.files.plan_svg import drawing_of, extent_of, overview, whole_sheet
-from mission.files.room_labels import inside
-from mission.files.sheet import COLUMN, GAP, MARGIN, PAPERS, PaperBox, PaperSheet
-from mission.files.svg import group, line, rect, shortened, text
-from mission.floor import FloorPlan
-from mission.geometry import FloatArray
-from mission.planning import Route
-from mission.schedule import schedule
-from mission.table import duration
+from stopgo.mission.document import Mission
+from stopgo.mission.figures import Figures, percent
+from stopgo.mission.files import plan_panel as panel
+from stopgo.mission.files.floor_drawing import outline
+from stopgo.mission.files.pdf import PdfPage, pdf_of
+from stopgo.mission.files.plan_svg import drawing_of, extent_of, overview, whole_sheet
+from stopgo.mission.files.room_labels import inside
+from stopgo.mission.files.sheet import COLUMN, GAP, MARGIN, PAPERS, PaperBox, PaperSheet
+from stopgo.mission.files.svg import group, line, rect, shortened, text
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.planning import Route
+from stopgo.mission.schedule import schedule
+from stopgo.mission.table import duration
 
 READABLE = 100
 """1:N at which stops and walls are told apart; a floor that one sheet shows so needs no further ones."""

@@ -7,18 +7,18 @@ from itertools import chain
 
 import numpy as np
 
-from mission.document import Mission
-from mission.figures import Figures
-from mission.files import plan_panel as panel
-from mission.files.floor_drawing import building, targets
-from mission.files.room_labels import STOPS, WALLS, WAY, Busy, points_along, room_labels
-from mission.files.route_drawing import STOP, network, rings, route, stops
-from mission.files.shared_drawing import shared_routes, shared_stops
-from mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit
-from mission.files.svg import FONT, attributes, clean, group, number, rect
-from mission.floor import FloorPlan
-from mission.geometry import FloatArray, bounds
-from mission.planning import Route
+from stopgo.mission.document import Mission
+from stopgo.mission.figures import Figures
+from stopgo.mission.files import plan_panel as panel
+from stopgo.mission.files.floor_drawing import building, targets
+from stopgo.mission.files.room_labels import STOPS, WALLS, WAY, Busy, points_along, room_labels
+from stopgo.mission.files.route_drawing import STOP, network, rings, route, stops
+from stopgo.mission.files.shared_drawing import shared_routes, shared_stops
+from stopgo.mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit
+from stopgo.mission.files.svg import FONT, attributes, clean, group, number, rect
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import FloatArray, bounds
+from stopgo.mission.planning import Route
 
 PADDING = 8.0
 """Millimetres kept free round the floor, for coordinates and what stands on its edge."""

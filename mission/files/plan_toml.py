@@ -6,11 +6,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-from mission.errors import InputError
-from mission.parameter import Parameter
-from mission.scanners import SCANNERS
-from mission.settings import PARAMETERS, Settings, check_settings
-from mission.toml_file import read_toml
+from stopgo.mission.errors import InputError
+from stopgo.mission.parameter import Parameter
+from stopgo.mission.scanners import SCANNERS
+from stopgo.mission.settings import PARAMETERS, Settings, check_settings
+from stopgo.mission.toml_file import read_toml
 
 
 def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:

@@ -9,10 +9,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from mission.files.sheet import PaperSheet
-from mission.files.svg import group, shortened, text, text_width
-from mission.floor import Room
-from mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.files.sheet import PaperSheet
+from stopgo.mission.files.svg import group, shortened, text, text_width
+from stopgo.mission.floor import Room
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 
 NAME, AREA = 2.6, 2.5
 """Text sizes in millimetres."""

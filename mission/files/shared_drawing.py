@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from mission.document import Mission
-from mission.files import route_drawing
-from mission.files.route_drawing import stops
-from mission.files.sheet import PaperSheet
+from stopgo.mission.document import Mission
+from stopgo.mission.files import route_drawing
+from stopgo.mission.files.route_drawing import stops
+from stopgo.mission.files.sheet import PaperSheet
 
 COLOURS = ("#5a2ca0", "#b34700", "#00695c", "#a3005c", "#1f5fa8", "#5d5000")
 DASHES = ("", "4 1.2", "0.9 0.9", "5 1 0.9 1", "2.2 0.8", "5 1 0.9 1 0.9 1")

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.errors import InputError
-from mission.geometry import FloatArray
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import FloatArray
 
 PAPERS = {"A4": (297, 210), "A3": (420, 297), "A2": (594, 420), "A1": (841, 594), "A0": (1189, 841)}
 """Long and short side in millimetres."""

@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray
 
 FONT = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 SMALLEST_TEXT = 2.5

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from mission.document import Mission
-from mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.document import Mission
+from stopgo.mission.mavlink.autopilots.kind import Autopilot
 
 STOPS_AFTER_S = 0.3
 """How long a rover with the usual loops rolls on at its speed beyond a waypoint, seconds.

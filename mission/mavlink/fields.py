@@ -7,7 +7,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import replace
 
-from mission.mavlink.items import Item
+from stopgo.mission.mavlink.items import Item
 
 Field = Callable[[float], float]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mission.document import Mission
-from mission.mavlink.translation_options import TranslationOptions
-from mission.run.scans import needs_heading
+from stopgo.mission.document import Mission
+from stopgo.mission.mavlink.translation_options import TranslationOptions
+from stopgo.mission.run.scans import needs_heading
 
 
 def notes_of(mission: Mission, options: TranslationOptions) -> tuple[str, ...]:

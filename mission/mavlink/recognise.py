@@ -11,10 +11,10 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from mission.document import Mission
-from mission.errors import InputError
-from mission.mavlink.items import Command, Item, ItemRole, MavFrame, Placed
-from mission.mavlink.stop_numbers import stop_numbered
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.mavlink.items import Command, Item, ItemRole, MavFrame, Placed
+from stopgo.mission.mavlink.stop_numbers import stop_numbered
 
 PLACES = frozenset({Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME})
 """Commands that say where to drive, param1 being seconds to stay."""

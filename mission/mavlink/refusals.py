@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from mission.document import Mission, SiteOrigin, Stop
-from mission.errors import AnswerIsNo, InputError
-from mission.mavlink.autopilots.kind import Autopilot
-from mission.mavlink.fields import as_sent
-from mission.mavlink.items import Command, Placed
-from mission.mavlink.translation_options import TranslationOptions
-from mission.problems import problems_of
-from mission.run.scans import needs_heading
+from stopgo.mission.document import Mission, SiteOrigin, Stop
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.fields import as_sent
+from stopgo.mission.mavlink.items import Command, Placed
+from stopgo.mission.mavlink.translation_options import TranslationOptions
+from stopgo.mission.problems import problems_of
+from stopgo.mission.run.scans import needs_heading
 
 LONGEST_SCRIPT_S = 255
 """NAV_SCRIPT_TIME keeps its timeout in a uint8."""

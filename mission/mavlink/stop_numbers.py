@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from mission.document import Mission
+from stopgo.mission.document import Mission
 
 LARGEST = 65_535
 """What every field that carries a stop's number holds exactly: uint16, and far below float32's 2^24."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from mission.geodesy import Geodetic, from_steps
-from mission.mavlink.local_frame import VehicleOrigin
+from stopgo.mission.geodesy import Geodetic, from_steps
+from stopgo.mission.mavlink.local_frame import VehicleOrigin
 
 Message = Any
 """A MAVLink message as pymavlink gives it, from a line or a log."""

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from mission.document import Mission, Stop
-from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.autopilots.kind import Autopilot
-from mission.mavlink.corners import corners
-from mission.mavlink.items import Command, Item, ItemList, Placed
-from mission.mavlink.notes import notes_of
-from mission.mavlink.refusals import check, check_count, check_fields, origin_of
-from mission.mavlink.stop_numbers import numbers_of
-from mission.mavlink.translation_options import ScanWait, Settle, TranslationOptions, Trigger
-from mission.mavlink.writing import (
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.corners import corners
+from stopgo.mission.mavlink.items import Command, Item, ItemList, Placed
+from stopgo.mission.mavlink.notes import notes_of
+from stopgo.mission.mavlink.refusals import check, check_count, check_fields, origin_of
+from stopgo.mission.mavlink.stop_numbers import numbers_of
+from stopgo.mission.mavlink.translation_options import ScanWait, Settle, TranslationOptions, Trigger
+from stopgo.mission.mavlink.writing import (
     capture,
     corner_waypoint,
     delay,

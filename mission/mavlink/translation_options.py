@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from mission.document import SiteOrigin
-from mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.mavlink.autopilots.kind import Autopilot
 
 Trigger = Literal["auto", "script", "camera", "none"]
 ScanWait = Literal["delay", "script_time"]
@@ -15,7 +15,7 @@ Settle = Literal["delay", "hold"]
 
 @dataclass(frozen=True)
 class TranslationOptions:
-    """The choices of `mission.mavlink.translate.translate`; `trigger` is no longer `auto`."""
+    """The choices of `stopgo.mission.mavlink.translate.translate`; `trigger` is no longer `auto`."""
 
     origin: SiteOrigin
     vehicle: Autopilot

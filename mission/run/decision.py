@@ -7,13 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from mission.document import Mission
-from mission.events import Pose, TakenOver
-from mission.run import way
-from mission.run.battery import what_is_missing
-from mission.run.lease import Lease, claimed
-from mission.run.orders import DRIVING, FREE_VERBS, LONGEST_VALID_S, Order, Refused
-from mission.run.states import (
+from stopgo.mission.document import Mission
+from stopgo.mission.events import Pose, TakenOver
+from stopgo.mission.run import way
+from stopgo.mission.run.battery import what_is_missing
+from stopgo.mission.run.lease import Lease, claimed
+from stopgo.mission.run.orders import DRIVING, FREE_VERBS, LONGEST_VALID_S, Order, Refused
+from stopgo.mission.run.states import (
     Change,
     DetailedState,
     Run,

@@ -10,7 +10,7 @@ from typing import Final
 
 import msgspec
 
-from mission.run.orders import Refused
+from stopgo.mission.run.orders import Refused
 
 LEASE_S: Final = 60.0
 """How long a commander keeps the robot after the last order."""

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 
 import msgspec
 
-from mission.events import State
+from stopgo.mission.events import State
 
 LONGEST_VALID_S: Final = 60.0
 """No order may claim to be valid for longer."""

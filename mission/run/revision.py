@@ -10,9 +10,9 @@ from __future__ import annotations
 from functools import partial
 from typing import Literal
 
-from mission.document import Mission, Stop
-from mission.events import RevisionDropped, RevisionTaken, RevisionWaits
-from mission.run.states import Change, Run, changed, next_leg
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.events import RevisionDropped, RevisionTaken, RevisionWaits
+from stopgo.mission.run.states import Change, Run, changed, next_leg
 
 RevisionPolicy = Literal["next-stop", "refuse"]
 POLICIES: dict[str, RevisionPolicy] = {"next-stop": "next-stop", "refuse": "refuse"}

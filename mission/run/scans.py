@@ -7,8 +7,8 @@ import re
 
 import msgspec
 
-from mission.document import ScannerSpec
-from mission.events import Pose
+from stopgo.mission.document import ScannerSpec
+from stopgo.mission.events import Pose
 
 HEADING_RAD = math.radians(5.0)
 """How far a stop's heading may be missed by a scanner that does not see all round."""

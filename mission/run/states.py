@@ -13,8 +13,8 @@ from typing import Literal
 
 import msgspec
 
-from mission.document import Mission, Stop
-from mission.events import (
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.events import (
     Aborted,
     AnyEvent,
     Arrived,
@@ -33,8 +33,8 @@ from mission.events import (
     State,
     StopState,
 )
-from mission.run.scans import ScanFailed, ScanResult, missing_in
-from mission.tolerance import deviation, is_outside
+from stopgo.mission.run.scans import ScanFailed, ScanResult, missing_in
+from stopgo.mission.tolerance import deviation, is_outside
 
 After = Literal["FINISHED", "ABORTED", "PAUSED"]
 DetailedState = State | Literal["PAUSED homing", "HELD homing"]

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from mission.document import Mission, Point
-from mission.events import Pose
+from stopgo.mission.document import Mission, Point
+from stopgo.mission.events import Pose
 
 
 @dataclass(frozen=True)

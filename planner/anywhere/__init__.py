@@ -14,20 +14,20 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from mission.errors import AnswerIsNo, InputError
-from mission.geometry import FloatArray, IntArray, frozen
-from mission.planning import Selection, Visibility
-from mission.settings import Settings
-from planner.anywhere.cells import Overlook, PlaceCells
-from planner.anywhere.prices import Prices, WantedUnits, prices_of
-from planner.candidates import judged
-from planner.candidates.place import Place
-from planner.refine import joined, taken, with_rows
-from planner.selection import posed, select
-from planner.selection.demands import demands_of
-from planner.shapes import local_origin
-from planner.visibility import visibility
-from planner.visibility.runs import ranges
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.planning import Selection, Visibility
+from stopgo.mission.settings import Settings
+from stopgo.planner.anywhere.cells import Overlook, PlaceCells
+from stopgo.planner.anywhere.prices import Prices, WantedUnits, prices_of
+from stopgo.planner.candidates import judged
+from stopgo.planner.candidates.place import Place
+from stopgo.planner.refine import joined, taken, with_rows
+from stopgo.planner.selection import posed, select
+from stopgo.planner.selection.demands import demands_of
+from stopgo.planner.shapes import local_origin
+from stopgo.planner.visibility import visibility
+from stopgo.planner.visibility.runs import ranges
 
 ROUNDS = 8
 """Times that prices are asked for."""

@@ -1,7 +1,7 @@
 """Everything that is in sight of any place in a cell: triangular expansion from a rectangle.
 
-As `planner.sight.kernel`, which has the numbers' bounds, but from all places of a cell at once. A line of
-sight from a place c that passes a corner R on its right meets points p with turn(c, R, p) >= 0, so p is in
+As `stopgo.planner.sight.kernel`, which has the numbers' bounds, but from all places of a cell at once. A line
+of sight from a place c that passes a corner R on its right meets points p with turn(c, R, p) >= 0, so p is in
 sight of the cell only if the largest of these turns over the cell, which is at a corner, is not below 0.
 Each limit is held against the cell by itself: what is found may be in sight of no place, but nothing that is
 in sight is left out. As a cell becomes small, what is too much vanishes.
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from planner.sight import kernel
+from stopgo.planner.sight import kernel
 
 turn, clip_side, clip_reach = kernel.turn, kernel.clip_side, kernel.clip_reach
 
@@ -80,7 +80,7 @@ def overlook(
 
     Returns -1 when the room left in the output may not be enough, and TOO_MUCH where it comes to no end.
     `cells` are the rectangles' x0, y0, x1, y1 one after the other, `wide` the distance from the middle to a
-    corner, rounded up; the rest is as in `planner.sight.kernel.look`.
+    corner, rounded up; the rest is as in `stopgo.planner.sight.kernel.look`.
     """
     x0, y0, x1, y1 = cells[4 * row], cells[4 * row + 1], cells[4 * row + 2], cells[4 * row + 3]
     x, y = (x0 + x1) // 2, (y0 + y1) // 2

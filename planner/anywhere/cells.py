@@ -13,19 +13,14 @@ from typing import Any
 import numpy as np
 import shapely
 
-from mission.geometry import BoolArray, FloatArray, IntArray
-from mission.limits import ViewLimits, limits_of
-from mission.planning import Candidates
-from planner.anywhere.cell_kernel import (
-    most_turn,
-    overlook,
-    overlook_all,
-    part_too_far,
-)
-from planner.candidates.place import Place
-from planner.compiling import compiled
-from planner.shapes import GRID, SLACK, local_origin, to_grid
-from planner.sight.kernel import (
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.limits import ViewLimits, limits_of
+from stopgo.mission.planning import Candidates
+from stopgo.planner.anywhere.cell_kernel import most_turn, overlook, overlook_all, part_too_far
+from stopgo.planner.candidates.place import Place
+from stopgo.planner.compiling import compiled
+from stopgo.planner.shapes import GRID, SLACK, local_origin, to_grid
+from stopgo.planner.sight.kernel import (
     clip_reach,
     clip_side,
     first_not_negative,
@@ -34,10 +29,10 @@ from planner.sight.kernel import (
     turn,
     within_reach,
 )
-from planner.sight.sight import Scene, scene_of
-from planner.space.reach import reach_of
-from planner.visibility.exact_sight import open_space
-from planner.visibility.runs import ranges
+from stopgo.planner.sight.sight import Scene, scene_of
+from stopgo.planner.space.reach import reach_of
+from stopgo.planner.visibility.exact_sight import open_space
+from stopgo.planner.visibility.runs import ranges
 
 LARGEST_CELL = 0.5
 """Metres; of a cell narrower than its places' distance from walls, no wall is within."""

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import coo_array, csr_array, diags_array, hstack, vstack
 
-from mission.geometry import FloatArray, IntArray
-from planner.visibility.runs import ranges
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.visibility.runs import ranges
 
 
 @dataclass(frozen=True, eq=False)

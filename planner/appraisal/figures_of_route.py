@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from mission.figures import Figures, Shares
-from mission.floor import Finding, Rank
-from mission.ledger import ledger_of
-from mission.planning import Candidates, Route, Selection
-from mission.seen import seen_units
-from planner.appraisal.plausible import doubts_of, near_legs
-from planner.appraisal.quality import NOT_MET, not_met, quality_of
-from planner.appraisal.unreached import unreached
-from planner.overlap.registered import SCANS_APART, scans_apart
-from planner.shapes import local_origin, to_shape
-from planner.space.reach import reach_of
+from stopgo.mission.figures import Figures, Shares
+from stopgo.mission.floor import Finding, Rank
+from stopgo.mission.ledger import ledger_of
+from stopgo.mission.planning import Candidates, Route, Selection
+from stopgo.mission.seen import seen_units
+from stopgo.planner.appraisal.plausible import doubts_of, near_legs
+from stopgo.planner.appraisal.quality import NOT_MET, not_met, quality_of
+from stopgo.planner.appraisal.unreached import unreached
+from stopgo.planner.overlap.registered import SCANS_APART, scans_apart
+from stopgo.planner.shapes import local_origin, to_shape
+from stopgo.planner.space.reach import reach_of
 
 
 def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figures:

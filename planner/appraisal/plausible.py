@@ -9,12 +9,12 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from mission.figures import LEG_OVER_IGNORED
-from mission.floor import Finding, FloorPlan
-from mission.geometry import FloatArray
-from mission.planning import NavigableSpace, Route
-from planner.shapes import HAIRLINE, local_origin, to_shape, union
-from planner.space.targets import solid_of
+from stopgo.mission.figures import LEG_OVER_IGNORED
+from stopgo.mission.floor import Finding, FloorPlan
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.planning import NavigableSpace, Route
+from stopgo.planner.shapes import HAIRLINE, local_origin, to_shape, union
+from stopgo.planner.space.targets import solid_of
 
 BESIDE_WALL = 0.35
 """A room's outline this close (m) to an element has a wall there."""

@@ -7,17 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from mission.figures import LimitCost, Quality, percent
-from mission.floor import Finding
-from mission.geometry import BoolArray, frozen
-from mission.ledger import ledger_of
-from mission.limits import limits_in_words
-from mission.planning import Selection, Visibility
-from mission.settings import Settings
-from mission.specs import limits_spec_of
-from planner.selection import quick
-from planner.visibility import seen_well
-from planner.visibility.limited import without
+from stopgo.mission.figures import LimitCost, Quality, percent
+from stopgo.mission.floor import Finding
+from stopgo.mission.geometry import BoolArray, frozen
+from stopgo.mission.ledger import ledger_of
+from stopgo.mission.limits import limits_in_words
+from stopgo.mission.planning import Selection, Visibility
+from stopgo.mission.settings import Settings
+from stopgo.mission.specs import limits_spec_of
+from stopgo.planner.selection import quick
+from stopgo.planner.visibility import seen_well
+from stopgo.planner.visibility.limited import without
 
 NOT_MET = "limits_not_met"
 MOST_NAMED = 5

@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mission.errors import AnswerIsNo, InputError
-from mission.geometry import BoolArray, FloatArray, IntArray, frozen
-from mission.planning import (
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
+from stopgo.mission.planning import (
     AT_EDGE,
     AVOIDED,
     DROP_REASONS,
@@ -25,15 +25,15 @@ from mission.planning import (
     Candidates,
     NavigableSpace,
 )
-from mission.plugins import variant
-from planner.candidates.fallback import best_point
-from planner.candidates.given import doorways, places_to_use
-from planner.candidates.grid import grid
-from planner.candidates.place import Place
-from planner.candidates.proposals import Proposals, in_order, joined
-from planner.candidates.triangulation import triangulation
-from planner.shapes import local_origin
-from planner.space.reach import Reach, reach_of
+from stopgo.mission.plugins import variant
+from stopgo.planner.candidates.fallback import best_point
+from stopgo.planner.candidates.given import doorways, places_to_use
+from stopgo.planner.candidates.grid import grid
+from stopgo.planner.candidates.place import Place
+from stopgo.planner.candidates.proposals import Proposals, in_order, joined
+from stopgo.planner.candidates.triangulation import triangulation
+from stopgo.planner.shapes import local_origin
+from stopgo.planner.space.reach import Reach, reach_of
 
 Strategy = Callable[[NavigableSpace], tuple[FloatArray, IntArray] | tuple[FloatArray, IntArray, IntArray]]
 STRATEGIES: dict[str, Strategy] = {"grid": grid, "triangulation": triangulation}

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from mission.geometry import FloatArray
-from mission.planning import KEPT
-from planner.candidates.place import Place
-from planner.shapes import polygon_parts, roughly_widened
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.planning import KEPT
+from stopgo.planner.candidates.place import Place
+from stopgo.planner.shapes import polygon_parts, roughly_widened
 
 HAIR = 1e-6
 """Clearances are shortened by this to find strips that are allowed but have no width."""

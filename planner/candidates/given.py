@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from mission.errors import InputError
-from mission.geometry import FloatArray
-from mission.planning import DROP_REASONS, KEPT, NavigableSpace, OpeningState
-from planner.candidates.place import Place
-from planner.candidates.proposals import Proposals
-from planner.shapes import local_origin, to_shape
-from planner.space.opening_joins import widest_clear
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.planning import DROP_REASONS, KEPT, NavigableSpace, OpeningState
+from stopgo.planner.candidates.place import Place
+from stopgo.planner.candidates.proposals import Proposals
+from stopgo.planner.shapes import local_origin, to_shape
+from stopgo.planner.space.opening_joins import widest_clear
 
 
 def doorways(space: NavigableSpace) -> Proposals:

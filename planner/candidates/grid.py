@@ -6,9 +6,9 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from mission.geometry import FloatArray, IntArray
-from mission.planning import NavigableSpace
-from planner.shapes import GRID, local_origin, segments_of, to_shape
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.planning import NavigableSpace
+from stopgo.planner.shapes import GRID, local_origin, segments_of, to_shape
 
 SAME_ANGLE = 1e-6
 """Directions this close (radians) are one; the longest segment then gives it."""

@@ -6,9 +6,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from mission.geometry import BoolArray, FloatArray, IntArray
-from mission.planning import AT_EDGE, AVOIDED, IN_HOLE, KEPT, OUTSIDE, TOO_CLOSE, NavigableSpace
-from planner.shapes import SLACK, boundary_lines, local_origin, to_shape
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.planning import AT_EDGE, AVOIDED, IN_HOLE, KEPT, OUTSIDE, TOO_CLOSE, NavigableSpace
+from stopgo.planner.shapes import SLACK, boundary_lines, local_origin, to_shape
 
 
 class Place:

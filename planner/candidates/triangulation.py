@@ -14,11 +14,11 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from mission.geometry import FloatArray, IntArray
-from mission.planning import KEPT, SLIVER, TOO_SMALL, NavigableSpace
-from planner.candidates.grid import main_axes
-from planner.candidates.place import Place
-from planner.shapes import GRID, one_shape, polygon_parts, roughly_widened, segments_of
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.planning import KEPT, SLIVER, TOO_SMALL, NavigableSpace
+from stopgo.planner.candidates.grid import main_axes
+from stopgo.planner.candidates.place import Place
+from stopgo.planner.shapes import GRID, one_shape, polygon_parts, roughly_widened, segments_of
 
 LEAST_ANGLE = float(np.arcsin(1 / 6))
 """alpha_min in radians: sin alpha_min = l_min / (6 l_min) (paper, Eq. 2), 9.594° whatever l_min is."""

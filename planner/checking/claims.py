@@ -16,20 +16,20 @@ from typing import Any
 import numpy as np
 from msgspec import UNSET
 
-from mission.document import Mission, Stop
-from mission.errors import AnswerIsNo, InputError
-from mission.figures import percent
-from mission.files.coverage_json import DIGITS, Coverage
-from mission.geometry import BoolArray, IntArray, frozen
-from mission.planning import Candidates, NavigableSpace, weights_of
-from mission.problems import Problem
-from planner.candidates import STRATEGIES, candidates
-from planner.shapes import local_origin
-from planner.sight.sightlines import SightLines
-from planner.space.reach import reach_of
-from planner.visibility.exact_sight import sides_of_door, viewpoints_of
-from planner.visibility.headings import in_view, with_headings
-from planner.visibility.runs import visibility_of
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.figures import percent
+from stopgo.mission.files.coverage_json import DIGITS, Coverage
+from stopgo.mission.geometry import BoolArray, IntArray, frozen
+from stopgo.mission.planning import Candidates, NavigableSpace, weights_of
+from stopgo.mission.problems import Problem
+from stopgo.planner.candidates import STRATEGIES, candidates
+from stopgo.planner.shapes import local_origin
+from stopgo.planner.sight.sightlines import SightLines
+from stopgo.planner.space.reach import reach_of
+from stopgo.planner.visibility.exact_sight import sides_of_door, viewpoints_of
+from stopgo.planner.visibility.headings import in_view, with_headings
+from stopgo.planner.visibility.runs import visibility_of
 
 ROUNDED = 10.0**-DIGITS
 """Shares in coverage.json are of lengths that are rounded themselves."""

@@ -15,18 +15,18 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from mission.document import Mission, Point, Stop
-from mission.floor import Element, FloorPlan
-from mission.geometry import FloatArray
-from mission.problems import Problem
-from mission.settings import Settings
-from mission.specs import limits_spec_of
-from planner.appraisal.plausible import over_ignored
-from planner.assemble import CLEAR_SLACK
-from planner.shapes import HAIRLINE, SLACK, holds, segments_of
-from planner.space.gaps import Walls
-from planner.space.ground import Ground
-from planner.space.targets import solid_of
+from stopgo.mission.document import Mission, Point, Stop
+from stopgo.mission.floor import Element, FloorPlan
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.problems import Problem
+from stopgo.mission.settings import Settings
+from stopgo.mission.specs import limits_spec_of
+from stopgo.planner.appraisal.plausible import over_ignored
+from stopgo.planner.assemble import CLEAR_SLACK
+from stopgo.planner.shapes import HAIRLINE, SLACK, holds, segments_of
+from stopgo.planner.space.gaps import Walls
+from stopgo.planner.space.ground import Ground
+from stopgo.planner.space.targets import solid_of
 
 ALLOWED = SLACK + CLEAR_SLACK
 """What a clearance may fall short by, in metres: as in planning, and rounded as in missions."""

@@ -1,6 +1,6 @@
 """Mission + navigable space -> pairs of its network that do not register, counted line by line.
 
-Every sight line to the boundary is held against every wall, as in `planner.checking.claims`.
+Every sight line to the boundary is held against every wall, as in `stopgo.planner.checking.claims`.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ import msgspec
 import numpy as np
 import shapely
 
-from mission.document import Mission, Stop
-from mission.geometry import IntArray
-from mission.planning import NavigableSpace
-from mission.problems import Problem
-from planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M
-from planner.overlap.boundary import Boundary, boundary_of, shown_by
-from planner.overlap.pairs import Overlaps
-from planner.shapes import GRID, local_origin, to_grid
-from planner.sight.sightlines import Midpoints, sees
-from planner.visibility.exact_sight import sides_of_door
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.geometry import IntArray
+from stopgo.mission.planning import NavigableSpace
+from stopgo.mission.problems import Problem
+from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M
+from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
+from stopgo.planner.overlap.pairs import Overlaps
+from stopgo.planner.shapes import GRID, local_origin, to_grid
+from stopgo.planner.sight.sightlines import Midpoints, sees
+from stopgo.planner.visibility.exact_sight import sides_of_door
 
 ROUNDED = 1e-5
 """Figures of a pair are sums of rounded lengths."""

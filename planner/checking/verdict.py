@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from mission.document import Mission
-from mission.errors import AnswerIsNo, InputError
-from mission.files.coverage_json import Coverage
-from mission.files.plan_toml import read_settings
-from mission.problems import Problem
-from planner.checking.claims import Recount, overclaims, recount
-from planner.checking.fit import misfits_on, other_machine
-from planner.checking.network_claims import network_overclaims
-from planner.floors import options_of, read_floor
-from planner.space.navigable import navigable
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.files.coverage_json import Coverage
+from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.problems import Problem
+from stopgo.planner.checking.claims import Recount, overclaims, recount
+from stopgo.planner.checking.fit import misfits_on, other_machine
+from stopgo.planner.checking.network_claims import network_overclaims
+from stopgo.planner.floors import options_of, read_floor
+from stopgo.planner.space.navigable import navigable
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,17 +12,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from mission.geometry import IntArray, frozen
-from mission.planning import LeastTime, Route, Selection
-from mission.schedule import schedule
-from planner.assemble import assemble
-from planner.covering_tour.least_time_bound import least_time
-from planner.covering_tour.problem import TourProblem, problem_of
-from planner.covering_tour.search import shorter_line
-from planner.covering_tour.timed_line import PointLine
-from planner.routing import assembled, legs_between, points_and_ends, tour_bound
-from planner.selection import coverage_steps
-from planner.selection.greedy import in_greedy_order
+from stopgo.mission.geometry import IntArray, frozen
+from stopgo.mission.planning import LeastTime, Route, Selection
+from stopgo.mission.schedule import schedule
+from stopgo.planner.assemble import assemble
+from stopgo.planner.covering_tour.least_time_bound import least_time
+from stopgo.planner.covering_tour.problem import TourProblem, problem_of
+from stopgo.planner.covering_tour.search import shorter_line
+from stopgo.planner.covering_tour.timed_line import PointLine
+from stopgo.planner.routing import assembled, legs_between, points_and_ends, tour_bound
+from stopgo.planner.selection import coverage_steps
+from stopgo.planner.selection.greedy import in_greedy_order
 
 METHOD = "stops and tour together, by tabu search"
 

@@ -20,13 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.document import RobotSpec
-from mission.geometry import FloatArray, IntArray
-from mission.schedule import straight_time
-from planner.covering_tour.zones import Zone
-from planner.routing import Ends, far_edge, tour_matrix
-from planner.routing.tour import NANOMETRES, best_of_all, length_of, nanometres
-from planner.routing.tour_bound import one_tree_bound
+from stopgo.mission.document import RobotSpec
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.schedule import straight_time
+from stopgo.planner.covering_tour.zones import Zone
+from stopgo.planner.routing import Ends, far_edge, tour_matrix
+from stopgo.planner.routing.tour import NANOMETRES, best_of_all, length_of, nanometres
+from stopgo.planner.routing.tour_bound import one_tree_bound
 
 APART_M = (0.0, 1.0, 3.0, 6.0)
 """How far zones are from one another at least, of several sets of them; the set that proves most counts."""

@@ -9,23 +9,23 @@ from functools import cached_property
 
 import numpy as np
 
-from mission.geometry import FloatArray, IntArray, frozen
-from mission.planning import Candidates, Route, Visibility
-from mission.schedule import straight_times
-from mission.settings import Settings
-from mission.specs import robot_of
-from planner.covering_tour.least_time_bound import RouteAsked
-from planner.covering_tour.leg_table import MICROSECONDS, NO_HEADING, LegTable, leg_table
-from planner.covering_tour.search import LineTask
-from planner.covering_tour.timed_line import LineTimes, PointLine
-from planner.covering_tour.zones import Zone, zones_of
-from planner.overlap import links_of
-from planner.routing import legs_between, rank_at_door
-from planner.routing.legs import Legs
-from planner.selection import METHODS, left_by, offered_further, posed
-from planner.selection.bound import lower_bound
-from planner.selection.cover import Cover
-from planner.selection.hanging_together import JoinedCover
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.planning import Candidates, Route, Visibility
+from stopgo.mission.schedule import straight_times
+from stopgo.mission.settings import Settings
+from stopgo.mission.specs import robot_of
+from stopgo.planner.covering_tour.least_time_bound import RouteAsked
+from stopgo.planner.covering_tour.leg_table import MICROSECONDS, NO_HEADING, LegTable, leg_table
+from stopgo.planner.covering_tour.search import LineTask
+from stopgo.planner.covering_tour.timed_line import LineTimes, PointLine
+from stopgo.planner.covering_tour.zones import Zone, zones_of
+from stopgo.planner.overlap import links_of
+from stopgo.planner.routing import legs_between, rank_at_door
+from stopgo.planner.routing.legs import Legs
+from stopgo.planner.selection import METHODS, left_by, offered_further, posed
+from stopgo.planner.selection.bound import lower_bound
+from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.hanging_together import JoinedCover
 
 MOST_PLACES = 1500
 """Candidates that may become stops: those nearest to the stops there are."""

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.geometry import BoolArray, IntArray
-from planner.covering_tour.timed_line import LineTimes, PointLine, without
-from planner.selection.board import Board
-from planner.selection.cover import Cover
+from stopgo.mission.geometry import BoolArray, IntArray
+from stopgo.planner.covering_tour.timed_line import LineTimes, PointLine, without
+from stopgo.planner.selection.board import Board
+from stopgo.planner.selection.cover import Cover
 
 STEPS = 400
 """Changes made at most; a count, so that no plan depends on speed."""

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.geometry import FloatArray, IntArray
-from planner.selection.cover import Cover
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.selection.cover import Cover
 
 MOST_SEEDS = 1500
 """Candidates round which zones are grown, at most."""

@@ -1,8 +1,8 @@
 """Reads a building floor from a file: one module per kind of file, one entry in `READERS` for each.
 
 A reader's module has two functions, `survey(file, options) -> Survey` and `read(file, options) -> FloorPlan`
-(planner.floors.reader.ReaderModule). It is found by the file's suffix and by what its bytes look like, among
-ours first, then among those of installed packages.
+(stopgo.planner.floors.reader.ReaderModule). It is found by the file's suffix and by what its bytes look like,
+among ours first, then among those of installed packages.
 """
 
 from __future__ import annotations
@@ -11,35 +11,35 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import cast
 
-from mission.errors import InputError
-from mission.floor import FloorPlan
-from mission.layer_kinds import kinds_by_name
-from mission.plugins import Variant
-from mission.settings import FLOOR_PARAMETERS, Settings
-from planner.floors.foreign import foreign_readers, sound
-from planner.floors.reader import FloorFile, FloorOptions, Reader
-from planner.floors.survey import Survey
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.layer_kinds import kinds_by_name
+from stopgo.mission.plugins import Variant
+from stopgo.mission.settings import FLOOR_PARAMETERS, Settings
+from stopgo.planner.floors.foreign import foreign_readers, sound
+from stopgo.planner.floors.reader import FloorFile, FloorOptions, Reader
+from stopgo.planner.floors.survey import Survey
 
 READERS: tuple[Reader, ...] = (
     Reader(
         kind="DXF drawing",
         suffixes=(".dxf",),
         holds=lambda data: data.startswith(b"AutoCAD Binary DXF") or b"\nSECTION" in data[:4096],
-        module="planner.floors.dxf",
+        module="stopgo.planner.floors.dxf",
         takes=frozenset({"layers", "layer_map", "drawing", "region", "units"}),
     ),
     Reader(
         kind="robot map",
         suffixes=(".yaml", ".yml"),
         holds=lambda data: all(key in data[:4096] for key in (b"image:", b"resolution:", b"origin:")),
-        module="planner.floors.robot_map",
+        module="stopgo.planner.floors.robot_map",
         takes=frozenset(),
     ),
     Reader(
         kind="building model",
         suffixes=(".ifc", ".ifczip"),
         holds=lambda data: b"ISO-10303-21" in data[:1024] or _is_zipped_model(data),
-        module="planner.floors.ifc",
+        module="stopgo.planner.floors.ifc",
         takes=frozenset(
             {
                 *("storey", "level", "scan_height", "robot_height", "date", "since", "schedule"),

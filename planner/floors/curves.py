@@ -16,7 +16,7 @@ from ezdxf import path
 from ezdxf.entities import Arc, Circle, DXFEntity, Ellipse, Hatch, Line, LWPolyline, Polyline, Solid, Spline
 from ezdxf.math import OCS, ConstructionEllipse, Vec3
 
-from mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray
 
 LARGEST = 1e11
 """No coordinate of a building is larger in any unit (1e8 m in mm); beyond it a number is damage."""

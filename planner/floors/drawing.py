@@ -17,9 +17,9 @@ from ezdxf.document import Drawing
 from ezdxf.filemanagement import dxf_stream_info
 from ezdxf.lldxf.tagger import binary_tags_loader
 
-from mission.errors import InputError
-from mission.floor import Finding
-from mission.geometry import FloatArray
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import Finding
+from stopgo.mission.geometry import FloatArray
 
 BROKEN_INPUT = (
     ezdxf.DXFError,

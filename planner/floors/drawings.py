@@ -11,9 +11,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from mission.geometry import FloatArray, polyline_length
-from planner.floors.linework.swings import swings_of
-from planner.floors.strokes import Stroke
+from stopgo.mission.geometry import FloatArray, polyline_length
+from stopgo.planner.floors.linework.swings import swings_of
+from stopgo.planner.floors.strokes import Stroke
 
 DrawingBox = tuple[float, float, float, float]
 """x0, y0, x1, y1 in metres."""

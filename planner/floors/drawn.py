@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
-from mission.floor import Finding
-from mission.geometry import FloatArray, polyline_length, ring_area
-from planner.floors.rings import (
+from stopgo.mission.floor import Finding
+from stopgo.mission.geometry import FloatArray, polyline_length, ring_area
+from stopgo.planner.floors.rings import (
     GAP,
     SNAP,
     Region,
@@ -25,7 +25,7 @@ from planner.floors.rings import (
     repaired,
     without_repeats,
 )
-from planner.floors.strokes import Stroke
+from stopgo.planner.floors.strokes import Stroke
 
 
 @dataclass(frozen=True)

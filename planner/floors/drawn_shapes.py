@@ -14,11 +14,11 @@ from ezdxf.entities import DXFEntity, DXFTagStorage, Insert, MLine
 from ezdxf.math import Matrix44
 from ezdxf.xclip import XClip
 
-from mission.errors import InputError
-from mission.floor import Finding
-from planner.floors.drawing import BROKEN_INPUT, legible
-from planner.floors.layer_names import LayerReading
-from planner.floors.layers import IGNORE, ROLES, Layers
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import Finding
+from stopgo.planner.floors.drawing import BROKEN_INPUT, legible
+from stopgo.planner.floors.layer_names import LayerReading
+from stopgo.planner.floors.layers import IGNORE, ROLES, Layers
 
 _PREFIX = re.compile(r"^.*(\$\d+\$|\|)")
 _NOT_DRAWN = {"ATTDEF", "VIEWPORT", "SEQEND", "POINT", "WIPEOUT", "XLINE", "RAY"}

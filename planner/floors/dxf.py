@@ -13,17 +13,17 @@ from pathlib import Path
 
 from ezdxf.document import Drawing
 
-from mission.errors import InputError
-from mission.floor import Finding, FloorPlan
-from mission.floor_source import FloorSource
-from mission.geometry import bounds
-from planner.floors.drawing import METRES, open_drawing
-from planner.floors.drawn_shapes import ignored_in
-from planner.floors.dxf_sheet import DxfSheet, drawings_told, sheet_of
-from planner.floors.linework import Derived, as_room_name, completed, derived
-from planner.floors.parts import in_order, parts_of
-from planner.floors.reader import FloorFile, FloorOptions
-from planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import Finding, FloorPlan
+from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.geometry import bounds
+from stopgo.planner.floors.drawing import METRES, open_drawing
+from stopgo.planner.floors.drawn_shapes import ignored_in
+from stopgo.planner.floors.dxf_sheet import DxfSheet, drawings_told, sheet_of
+from stopgo.planner.floors.linework import Derived, as_room_name, completed, derived
+from stopgo.planner.floors.parts import in_order, parts_of
+from stopgo.planner.floors.reader import FloorFile, FloorOptions
+from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLine
 
 
 def read(file: FloorFile, options: FloorOptions) -> FloorPlan:

@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 from ezdxf.document import Drawing
 
-from mission.errors import InputError
-from mission.floor import Finding
-from mission.geometry import FloatArray
-from planner.floors.drawing import metres_per_unit, told_unit
-from planner.floors.drawings import DrawingBox, DrawingFound, chosen_of, drawings_in, is_in
-from planner.floors.drawn_shapes import Shape, shapes_of
-from planner.floors.layers import Layers, is_layered, missing_in
-from planner.floors.linework.swings import radii_in
-from planner.floors.reader import FloorOptions
-from planner.floors.strokes import Stroke, Word, sketch, strokes_of
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import Finding
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors.drawing import metres_per_unit, told_unit
+from stopgo.planner.floors.drawings import DrawingBox, DrawingFound, chosen_of, drawings_in, is_in
+from stopgo.planner.floors.drawn_shapes import Shape, shapes_of
+from stopgo.planner.floors.layers import Layers, is_layered, missing_in
+from stopgo.planner.floors.linework.swings import radii_in
+from stopgo.planner.floors.reader import FloorOptions
+from stopgo.planner.floors.strokes import Stroke, Word, sketch, strokes_of
 
 _MARGIN = 1.0
 """What lies this near to a drawing, in metres, belongs to it."""

@@ -9,11 +9,11 @@ from functools import cached_property, partial
 import numpy as np
 import shapely
 
-from mission.floor import Element, Finding, IgnoredLine, Room
-from mission.geometry import FloatArray, Polygon, frozen
-from mission.kinds import KINDS
-from planner.floors.drawn import Closed, Drawn, Oddity, Open, faces_of, hole_indices, place
-from planner.floors.rings import SNAP, Region, canonical_region, parents, polygons_of, to_shapely
+from stopgo.mission.floor import Element, Finding, IgnoredLine, Room
+from stopgo.mission.geometry import FloatArray, Polygon, frozen
+from stopgo.mission.kinds import KINDS
+from stopgo.planner.floors.drawn import Closed, Drawn, Oddity, Open, faces_of, hole_indices, place
+from stopgo.planner.floors.rings import SNAP, Region, canonical_region, parents, polygons_of, to_shapely
 
 _NEAR = 1.0
 """An unknown shape farther than this from the floor, in metres, is not part of the plan."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mission.floor import FloorPlan
-from mission.kinds import KINDS
-from mission.plugins import Variant, installed, variant
-from planner.floors.reader import Reader
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.kinds import KINDS
+from stopgo.mission.plugins import Variant, installed, variant
+from stopgo.planner.floors.reader import Reader
 
 
 def foreign_readers() -> Iterator[Variant[Reader]]:

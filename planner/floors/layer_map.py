@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 
-from mission.errors import InputError
-from mission.layer_kinds import LAYER_ROLES
-from planner.floors.survey import LayerUse, Survey
+from stopgo.mission.errors import InputError
+from stopgo.mission.layer_kinds import LAYER_ROLES
+from stopgo.planner.floors.survey import LayerUse, Survey
 
 
 def layer_map(found: Survey) -> str:

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from mission.kinds import KINDS
-from planner.floors.layer_names import LayerReading, reading_of
+from stopgo.mission.kinds import KINDS
+from stopgo.planner.floors.layer_names import LayerReading, reading_of
 
 ROLES: dict[str, str] = {
     "FLOOR": "floor",

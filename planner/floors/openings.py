@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from mission.floor import Finding, Opening
-from mission.geometry import FloatArray, frozen
-from planner.floors.drawn import Closed, Drawn, Oddity, Open, place
-from planner.floors.rings import SNAP, canonical_line
+from stopgo.mission.floor import Finding, Opening
+from stopgo.mission.geometry import FloatArray, frozen
+from stopgo.planner.floors.drawn import Closed, Drawn, Oddity, Open, place
+from stopgo.planner.floors.rings import SNAP, canonical_line
 
 Across = tuple[FloatArray, str | None, tuple[Oddity, ...]]
 """A line (2, 2) across an opening, its GlobalId, and what is odd about it."""

@@ -7,16 +7,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mission.errors import InputError
-from mission.floor import Element, Finding, IgnoredLine, Opening, Room
-from mission.geometry import Polygon
-from planner.floors.drawn import Drawn, drawn, outline_faces
-from planner.floors.elements import elements_of
-from planner.floors.joints import without_joints
-from planner.floors.openings import openings_of
-from planner.floors.rings import GAP, SNAP, Region, canonical_region, even_odd
-from planner.floors.rooms import rooms_of
-from planner.floors.strokes import Stroke, Word
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import Element, Finding, IgnoredLine, Opening, Room
+from stopgo.mission.geometry import Polygon
+from stopgo.planner.floors.drawn import Drawn, drawn, outline_faces
+from stopgo.planner.floors.elements import elements_of
+from stopgo.planner.floors.joints import without_joints
+from stopgo.planner.floors.openings import openings_of
+from stopgo.planner.floors.rings import GAP, SNAP, Region, canonical_region, even_odd
+from stopgo.planner.floors.rooms import rooms_of
+from stopgo.planner.floors.strokes import Stroke, Word
 
 
 @dataclass(frozen=True, eq=False)

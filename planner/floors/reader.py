@@ -11,9 +11,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, Protocol, cast
 
-from mission.floor import FloorPlan
-from mission.floor_source import FloorSource
-from planner.floors.survey import Survey
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.floor_source import FloorSource
+from stopgo.planner.floors.survey import Survey
 
 
 @dataclass(frozen=True, eq=False)

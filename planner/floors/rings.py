@@ -16,8 +16,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
-from mission.geometry import FloatArray, Polygon, frozen, ring_area
-from planner.shapes import QUARTER, boundary_lines, widened
+from stopgo.mission.geometry import FloatArray, Polygon, frozen, ring_area
+from stopgo.planner.shapes import QUARTER, boundary_lines, widened
 
 SNAP = 1e-3
 """Ends closer than this, in metres, meet."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import shapely
 
-from mission.floor import Finding, Room
-from planner.floors.drawn import Closed, Drawn, Oddity, hole_indices, outline_faces, place, region_key
-from planner.floors.rings import Region, canonical_region, parents, polygons_of
-from planner.floors.strokes import Word
+from stopgo.mission.floor import Finding, Room
+from stopgo.planner.floors.drawn import Closed, Drawn, Oddity, hole_indices, outline_faces, place, region_key
+from stopgo.planner.floors.rings import Region, canonical_region, parents, polygons_of
+from stopgo.planner.floors.strokes import Word
 
 _NOISE = 1e-4
 """Area in m² below which an overlap of two rooms is numerical noise."""

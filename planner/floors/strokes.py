@@ -11,13 +11,13 @@ import shapely
 from ezdxf.entities import LWPolyline
 from ezdxf.math import OCS, Z_AXIS, Matrix44, Vec3
 
-from mission.floor import Finding
-from mission.geometry import FloatArray, frozen, ring_area
-from mission.kinds import KINDS
-from planner.floors.curves import LARGEST, Curve, Fineness, curves_of
-from planner.floors.drawing import BROKEN_INPUT, legible
-from planner.floors.drawn_shapes import Shape
-from planner.floors.rings import depths
+from stopgo.mission.floor import Finding
+from stopgo.mission.geometry import FloatArray, frozen, ring_area
+from stopgo.mission.kinds import KINDS
+from stopgo.planner.floors.curves import LARGEST, Curve, Fineness, curves_of
+from stopgo.planner.floors.drawing import BROKEN_INPUT, legible
+from stopgo.planner.floors.drawn_shapes import Shape
+from stopgo.planner.floors.rings import depths
 
 SAGITTA = 0.001
 """Greatest distance in metres between a curve and its chords."""

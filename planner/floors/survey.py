@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from mission.floor import Finding, FloorPlan
-from mission.geometry import FloatArray
+from stopgo.mission.floor import Finding, FloorPlan
+from stopgo.mission.geometry import FloatArray
 
 
 @dataclass(frozen=True)

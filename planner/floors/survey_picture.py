@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from mission.files.floor_drawing import LOOKS
-from mission.files.svg import attributes, group, line_data, path, rect, ring_data, text
-from mission.floor import FloorPlan
-from mission.geometry import FloatArray, bounds
-from planner.floors.survey import SurveyLine
+from stopgo.mission.files.floor_drawing import LOOKS
+from stopgo.mission.files.svg import attributes, group, line_data, path, rect, ring_data, text
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import FloatArray, bounds
+from stopgo.planner.floors.survey import SurveyLine
 
 _SIZE = 280.0
 """The longer side of the picture, in millimetres."""

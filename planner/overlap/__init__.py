@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_array
 
-from mission.geometry import IntArray
-from mission.planning import Candidates
-from planner.kept import kept
-from planner.overlap.boundary import shown
-from planner.overlap.pairs import Overlaps, Pairs
+from stopgo.mission.geometry import IntArray
+from stopgo.mission.planning import Candidates
+from stopgo.planner.kept import kept
+from stopgo.planner.overlap.boundary import shown
+from stopgo.planner.overlap.pairs import Overlaps, Pairs
 
 LEAST_HOLD_M = 0.15
 """Metres of wall that must face the weakest move of a pair of scans, so that it registers."""

@@ -14,9 +14,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mission.geometry import FloatArray, IntArray
-from planner.overlap.boundary import Shown
-from planner.visibility.runs import ranges
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.overlap.boundary import Shown
+from stopgo.planner.visibility.runs import ranges
 
 LEVER_M = 0.01 / math.radians(0.1)
 """A turn counts as the way it makes at this distance: 0.1° as much as 1 cm, what is allowed of each."""

@@ -7,17 +7,17 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
-from mission.document import Overlap, stop_names
-from mission.floor import Finding
-from mission.geometry import FloatArray, IntArray
-from mission.network import Network
-from mission.planning import OpeningState, Route
-from mission.settings import Settings
-from mission.specs import rounded
-from planner.kept import kept
-from planner.overlap import USUAL_SHARE, Overlaps, registers
-from planner.overlap.boundary import shown
-from planner.shapes import local_origin
+from stopgo.mission.document import Overlap, stop_names
+from stopgo.mission.floor import Finding
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.network import Network
+from stopgo.mission.planning import OpeningState, Route
+from stopgo.mission.settings import Settings
+from stopgo.mission.specs import rounded
+from stopgo.planner.kept import kept
+from stopgo.planner.overlap import USUAL_SHARE, Overlaps, registers
+from stopgo.planner.overlap.boundary import shown
+from stopgo.planner.shapes import local_origin
 
 
 @kept

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.geometry import BoolArray, FloatArray, IntArray
-from mission.limits import limits_of, scanner_height
-from mission.settings import Settings
-from planner.proving.scanning import ScanCount
-from planner.proving.strips import CELL_M, Strips
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.limits import limits_of, scanner_height
+from stopgo.mission.settings import Settings
+from stopgo.planner.proving.scanning import ScanCount
+from stopgo.planner.proving.strips import CELL_M, Strips
 
 SLACK_DEG = 0.5
 """Angles are those of a cell's middle, up to 5 cm off the unit's."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.geometry import BoolArray, FloatArray, IntArray, frozen
-from mission.plan_proof import Simulation
-from planner.proving.extrusion import NONE, ExtrudedFloor
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
+from stopgo.mission.plan_proof import Simulation
+from stopgo.planner.proving.extrusion import NONE, ExtrudedFloor
 
 MOST_RAYS = 1_000_000
 """Rays that are cast at a time."""

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from mission.floor import Element, FloorPlan
-from mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
+from stopgo.mission.floor import Element, FloorPlan
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
 
 BEAM_M = 0.3
 """How far beams hang below the ceiling, where nothing tells."""

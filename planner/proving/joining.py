@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mission.geometry import FloatArray, frozen
-from mission.plan_proof import ScanNetwork
-from planner.proving.registering import Registered, off
+from stopgo.mission.geometry import FloatArray, frozen
+from stopgo.mission.plan_proof import ScanNetwork
+from stopgo.planner.proving.registering import Registered, off
 
 PairPoses = dict[int, list[tuple[int, FloatArray]]]
 """Of each scan, the others it is registered with, and their poses in it."""

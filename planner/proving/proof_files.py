@@ -7,15 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mission.document import Mission
-from mission.errors import AnswerIsNo, InputError
-from mission.files.coverage_json import Coverage, read_coverage
-from mission.files.mission_json import read
-from mission.limits import scanner_height
-from mission.plan_proof import PlanProof, Simulation
-from mission.problems import problems_of
-from planner.further import PlannedFloor, planned_floor
-from planner.proving.proving import prove
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.files.coverage_json import Coverage, read_coverage
+from stopgo.mission.files.mission_json import read
+from stopgo.mission.limits import scanner_height
+from stopgo.mission.plan_proof import PlanProof, Simulation
+from stopgo.mission.problems import problems_of
+from stopgo.planner.further import PlannedFloor, planned_floor
+from stopgo.planner.proving.proving import prove
 
 NAMES = {"recording": "proof.rrd", "page": "proof.html", "proof": "proof.json"}
 """A proof's files in the order in which they appear."""

@@ -11,29 +11,22 @@ import numpy as np
 import shapely
 from msgspec import UNSET
 
-from mission.document import Mission, Stop
-from mission.errors import AnswerIsNo, InputError
-from mission.files.coverage_json import Coverage
-from mission.floor import FloorPlan
-from mission.geometry import BoolArray, FloatArray, frozen
-from mission.ledger import OUTSIDE
-from mission.limits import limits_of
-from mission.plan_proof import (
-    CloudQuality,
-    PlanProof,
-    PromisedShare,
-    ScanCloud,
-    Simulation,
-    StopScan,
-)
-from mission.planning import NavigableSpace, Targets, weights_of
-from planner.proving.asked import AskedPoints
-from planner.proving.casting import SolidScene
-from planner.proving.extrusion import NONE, ExtrudedFloor, extruded, heights_of
-from planner.proving.joining import joined
-from planner.proving.registering import registered, surface_of
-from planner.proving.scanning import ScanCount, Stand, scanned, stand_of
-from planner.proving.strips import Strips, strips_of
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.files.coverage_json import Coverage
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import BoolArray, FloatArray, frozen
+from stopgo.mission.ledger import OUTSIDE
+from stopgo.mission.limits import limits_of
+from stopgo.mission.plan_proof import CloudQuality, PlanProof, PromisedShare, ScanCloud, Simulation, StopScan
+from stopgo.mission.planning import NavigableSpace, Targets, weights_of
+from stopgo.planner.proving.asked import AskedPoints
+from stopgo.planner.proving.casting import SolidScene
+from stopgo.planner.proving.extrusion import NONE, ExtrudedFloor, extruded, heights_of
+from stopgo.planner.proving.joining import joined
+from stopgo.planner.proving.registering import registered, surface_of
+from stopgo.planner.proving.scanning import ScanCount, Stand, scanned, stand_of
+from stopgo.planner.proving.strips import Strips, strips_of
 
 SPACINGS_MM = (2, 5, 10, 20, 50)
 INCIDENCES_DEG = (45, 60, 70, 80)

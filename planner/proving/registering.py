@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mission.geometry import BoolArray, FloatArray, frozen
-from mission.plan_proof import ScanPair, Simulation
+from stopgo.mission.geometry import BoolArray, FloatArray, frozen
+from stopgo.mission.plan_proof import ScanPair, Simulation
 
 VOXEL_M = 0.075
 """Clouds are thinned to a point per cube of this size."""

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.document import Stop
-from mission.geometry import BoolArray, FloatArray, IntArray, frozen
-from mission.plan_proof import Simulation
-from planner.proving.casting import Met, RayFan, SolidScene, distances
-from planner.proving.extrusion import NONE, ExtrudedFloor
-from planner.proving.strips import CELL_M, Strips
+from stopgo.mission.document import Stop
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
+from stopgo.mission.plan_proof import Simulation
+from stopgo.planner.proving.casting import Met, RayFan, SolidScene, distances
+from stopgo.planner.proving.extrusion import NONE, ExtrudedFloor
+from stopgo.planner.proving.strips import CELL_M, Strips
 
 CLOUD_DEG = 0.4
 """Between the rays that are kept as a cloud, where their points lie dense enough."""

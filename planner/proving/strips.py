@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from mission.floor import FloorPlan
-from mission.geometry import BoolArray, FloatArray, IntArray, frozen
-from mission.planning import Targets
-from planner.proving.extrusion import HANGING, NONE, ExtrudedFloor, heights_of
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
+from stopgo.mission.planning import Targets
+from stopgo.planner.proving.extrusion import HANGING, NONE, ExtrudedFloor, heights_of
 
 CELL_M = 0.1
 """Height of a cell; it is as wide as its unit."""

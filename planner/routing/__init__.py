@@ -13,19 +13,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.errors import AnswerIsNo, InputError
-from mission.geometry import FloatArray, IntArray, frozen, polyline_length
-from mission.planning import Candidates, NavigableSpace, Route, Selection
-from mission.plugins import Variant, variant
-from planner.routing.colony import ant_colony
-from planner.routing.grid_graph import grid_ways
-from planner.routing.legs import Legs
-from planner.routing.proof import proved
-from planner.routing.roadmap import ways_between
-from planner.routing.tour import NANOMETRES, nanometres, shortest_tour
-from planner.routing.ways import Ways
-from planner.shapes import local_origin
-from planner.space.reach import reach_of
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.geometry import FloatArray, IntArray, frozen, polyline_length
+from stopgo.mission.planning import Candidates, NavigableSpace, Route, Selection
+from stopgo.mission.plugins import Variant, variant
+from stopgo.planner.routing.colony import ant_colony
+from stopgo.planner.routing.grid_graph import grid_ways
+from stopgo.planner.routing.legs import Legs
+from stopgo.planner.routing.proof import proved
+from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.routing.tour import NANOMETRES, nanometres, shortest_tour
+from stopgo.planner.routing.ways import Ways
+from stopgo.planner.shapes import local_origin
+from stopgo.planner.space.reach import reach_of
 
 Router = Callable[..., IntArray]
 ROUTERS: dict[str, Router] = {"default": shortest_tour, "aco": ant_colony}

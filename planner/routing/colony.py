@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mission.geometry import FloatArray, IntArray
-from planner.routing.tour import canonical
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.routing.tour import canonical
 
 ALPHA = 1
 """Power of the trail in an ant's choice."""

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from mission.geometry import BoolArray, FloatArray, IntArray
-from planner.routing.relaxation import Cut
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.planner.routing.relaxation import Cut
 
 LITTLE = 1e-6
 """Shares and violations below this are the solver's noise."""

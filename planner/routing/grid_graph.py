@@ -23,15 +23,15 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 from shapely.geometry.base import BaseGeometry
 
-from mission.errors import AnswerIsNo
-from mission.geometry import FloatArray, IntArray
-from mission.planning import NavigableSpace
-from mission.settings import Settings
-from planner.candidates.grid import main_axes, room_grid
-from planner.routing.roadmap import anchors_of, on_crossings, outward_corners
-from planner.routing.ways import Ways, shortest_ways
-from planner.shapes import GRID, local_origin, to_shape
-from planner.space.opening_joins import middle_and_normal
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.planning import NavigableSpace
+from stopgo.mission.settings import Settings
+from stopgo.planner.candidates.grid import main_axes, room_grid
+from stopgo.planner.routing.roadmap import anchors_of, on_crossings, outward_corners
+from stopgo.planner.routing.ways import Ways, shortest_ways
+from stopgo.planner.shapes import GRID, local_origin, to_shape
+from stopgo.planner.space.opening_joins import middle_and_normal
 
 RESOLUTIONS = (1.0, 0.5, 0.25, 0.125, 0.0625)
 """Greatest spacings in metres: the paper's first one, then ours."""

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from mission.geometry import FloatArray, frozen, polyline_length
-from mission.plugins import Variant
-from planner.routing.ways import Ways
+from stopgo.mission.geometry import FloatArray, frozen, polyline_length
+from stopgo.mission.plugins import Variant
+from stopgo.planner.routing.ways import Ways
 
 TOLERANCE = 1e-6
 """Metres by which a way may miss its ends, or its length."""

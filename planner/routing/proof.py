@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import networkx as nx
 import numpy as np
 
-from mission.geometry import FloatArray, IntArray
-from planner.routing.cuts import violated_cuts
-from planner.routing.relaxation import Relaxation
-from planner.routing.subsets import best_of_all
-from planner.routing.tour import canonical, length_of
-from planner.routing.tour_bound import one_tree_bound, useful_edges
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.routing.cuts import violated_cuts
+from stopgo.planner.routing.relaxation import Relaxation
+from stopgo.planner.routing.subsets import best_of_all
+from stopgo.planner.routing.tour import canonical, length_of
+from stopgo.planner.routing.tour_bound import one_tree_bound, useful_edges
 
 COMPARE_ALL_UP_TO = 12
 """Points up to which all tours are compared."""

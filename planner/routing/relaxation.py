@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mission.geometry import FloatArray, IntArray
+from stopgo.mission.geometry import FloatArray, IntArray
 
 NANOMETRES = 1e9
 """Per metre, the solver's unit."""

@@ -13,13 +13,13 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from mission.geometry import FloatArray, IntArray
-from mission.planning import NavigableSpace
-from planner.routing.ways import Ways, shortest_ways
-from planner.shapes import GRID, local_origin, polygon_parts, snapped, to_grid, to_shape, whole_steps
-from planner.sight.mesh import mesh_of
-from planner.sight.sight import scene_of, sight
-from planner.space.reach import reach_of
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.planning import NavigableSpace
+from stopgo.planner.routing.ways import Ways, shortest_ways
+from stopgo.planner.shapes import GRID, local_origin, polygon_parts, snapped, to_grid, to_shape, whole_steps
+from stopgo.planner.sight.mesh import mesh_of
+from stopgo.planner.sight.sight import scene_of, sight
+from stopgo.planner.space.reach import reach_of
 
 PAIRS = 1_000_000
 """Pairs of nodes held at a time, about 200 bytes each."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mission.geometry import IntArray
+from stopgo.mission.geometry import IntArray
 
 NOWHERE = 2**62
 """More than any tour is long."""

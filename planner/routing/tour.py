@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from mission.errors import InputError
-from mission.geometry import FloatArray, IntArray
-from planner.compiling import compiled
-from planner.routing.subsets import best_of_all
-from planner.routing.tour_kernel import HELPERS, iterated_search
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.compiling import compiled
+from stopgo.planner.routing.subsets import best_of_all
+from stopgo.planner.routing.tour_kernel import HELPERS, iterated_search
 
 NANOMETRES = 1e9
 """Per metre."""

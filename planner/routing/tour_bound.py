@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.geometry import BoolArray, IntArray
+from stopgo.mission.geometry import BoolArray, IntArray
 
 STEPS = 300
 """One-trees looked at; a count, so that the bound does not depend on speed."""

@@ -3,7 +3,7 @@
 Plain functions over lists or arrays of whole numbers, so that the same source runs interpreted and
 compiled with the same result. `cost` is the symmetric matrix, `near` the lists of each point's nearest
 points, both flat; `order` is the tour, `place` where each point stands in it. No number exceeds 64
-bits: the longest edge times the number of points is below 2**62 (`planner.routing.tour.nanometres`
+bits: the longest edge times the number of points is below 2**62 (`stopgo.planner.routing.tour.nanometres`
 refuses more), and neither a tour nor what a trial gains or loses is more than that.
 
 Sources: Bentley, "Fast algorithms for geometric traveling salesman problems", ORSA J. Computing 1992

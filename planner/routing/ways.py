@@ -9,8 +9,8 @@ import shapely
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from mission.geometry import FloatArray, IntArray, frozen
-from planner.shapes import SLACK
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.planner.shapes import SLACK
 
 CHUNK = 256
 """Points whose distances to all nodes are held at a time."""

@@ -11,20 +11,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from mission.errors import AnswerIsNo
-from mission.geometry import FloatArray, IntArray, frozen
-from mission.planning import Selection, Visibility
-from mission.plugins import Variant, variant
-from mission.settings import Settings
-from planner.overlap import links_of
-from planner.selection.bound import counting_bound, lower_bound
-from planner.selection.cover import Cover, cover_of
-from planner.selection.demands import demands_of
-from planner.selection.exact_cover import exact
-from planner.selection.greedy import greedy, in_greedy_order
-from planner.selection.hanging_together import JoinedCover, Search, connected
-from planner.selection.improve import improved
-from planner.selection.separators import Conditions
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.planning import Selection, Visibility
+from stopgo.mission.plugins import Variant, variant
+from stopgo.mission.settings import Settings
+from stopgo.planner.overlap import links_of
+from stopgo.planner.selection.bound import counting_bound, lower_bound
+from stopgo.planner.selection.cover import Cover, cover_of
+from stopgo.planner.selection.demands import demands_of
+from stopgo.planner.selection.exact_cover import exact
+from stopgo.planner.selection.greedy import greedy, in_greedy_order
+from stopgo.planner.selection.hanging_together import JoinedCover, Search, connected
+from stopgo.planner.selection.improve import improved
+from stopgo.planner.selection.separators import Conditions
 
 Selector = Callable[[Cover, Settings], tuple[IntArray, int]]
 

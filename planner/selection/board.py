@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mission.geometry import IntArray
-from planner.selection.cover import Cover
-from planner.visibility.runs import ranges
+from stopgo.mission.geometry import IntArray
+from stopgo.planner.selection.cover import Cover
+from stopgo.planner.visibility.runs import ranges
 
 
 class Board:

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
-from mission.geometry import FloatArray, IntArray
-from planner.selection.cover import Cover
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.selection.cover import Cover
 
 LARGEST = 150_000
 """Entries of the covering matrix above which the relaxation is not solved: it takes seconds then."""

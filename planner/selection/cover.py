@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import block_diag, coo_array, csr_array, diags_array, hstack
 
-from mission.geometry import IntArray
-from mission.planning import Visibility
-from planner.selection.demands import Demands
-from planner.visibility.runs import ranges
+from stopgo.mission.geometry import IntArray
+from stopgo.mission.planning import Visibility
+from stopgo.planner.selection.demands import Demands
+from stopgo.planner.visibility.runs import ranges
 
 
 @dataclass(frozen=True, eq=False)

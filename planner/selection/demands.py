@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.geometry import FloatArray, IntArray, frozen
-from mission.planning import Visibility, weights_of
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.planning import Visibility, weights_of
 
 
 @dataclass(frozen=True, eq=False)

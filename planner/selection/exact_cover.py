@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
-from mission.geometry import IntArray
-from mission.settings import Settings
-from planner.selection.bound import scaled
-from planner.selection.cover import Cover
-from planner.selection.separators import Conditions
+from stopgo.mission.geometry import IntArray
+from stopgo.mission.settings import Settings
+from stopgo.planner.selection.bound import scaled
+from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.separators import Conditions
 
 WHOLE = 1e-6
 """The solver's bound may exceed the truth by its tolerance; this much is taken off before rounding up."""

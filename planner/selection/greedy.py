@@ -7,9 +7,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from mission.geometry import IntArray
-from planner.selection.cover import Cover
-from planner.visibility.runs import ranges
+from stopgo.mission.geometry import IntArray
+from stopgo.planner.selection.cover import Cover
+from stopgo.planner.visibility.runs import ranges
 
 
 def greedy(cover: Cover) -> IntArray:

@@ -15,10 +15,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse import csr_array
 
-from mission.geometry import IntArray
-from planner.selection.cover import Cover
-from planner.selection.greedy import greedy
-from planner.selection.separators import (
+from stopgo.mission.geometry import IntArray
+from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.greedy import greedy
+from stopgo.planner.selection.separators import (
     Conditions,
     conditions_between,
     grounds_of,
@@ -26,7 +26,7 @@ from planner.selection.separators import (
     pieces_of,
     separators,
 )
-from planner.selection.steps_between import steps_between
+from stopgo.planner.selection.steps_between import steps_between
 
 Search = Callable[[Cover, IntArray, Conditions], tuple[IntArray, int]]
 """`(problem, start, conditions) -> (rows, bound)`: rows that solve the problem, from ones that do."""

@@ -6,9 +6,9 @@ from collections import deque
 
 import numpy as np
 
-from mission.geometry import IntArray
-from planner.selection.board import Board
-from planner.selection.cover import Cover
+from stopgo.mission.geometry import IntArray
+from stopgo.planner.selection.board import Board
+from stopgo.planner.selection.cover import Cover
 
 SWAPS = 400
 """Most swaps tried before a smaller selection is given up; a count, so that no plan depends on speed."""

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from mission.geometry import FloatArray, IntArray
-from planner.selection.cover import Cover
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.selection.cover import Cover
 
 
 def pieces_of(links: csr_array, rows: IntArray) -> list[IntArray]:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from mission.geometry import IntArray
+from stopgo.mission.geometry import IntArray
 
 
 def steps_between(links: csr_array, ground: IntArray, pieces: list[IntArray], gain: IntArray) -> IntArray:

@@ -8,21 +8,21 @@ from itertools import pairwise
 
 import numpy as np
 
-from mission.division import DividedRoute
-from mission.errors import AnswerIsNo, InputError
-from mission.geometry import IntArray, frozen, polyline_length
-from mission.planning import Route, Selection
-from mission.schedule import schedule
-from mission.settings import Settings
-from planner.assemble import assemble
-from planner.routing import Ends, check_place, tour_bound
-from planner.selection import coverage_steps
-from planner.selection.cover import cover_of
-from planner.selection.demands import demands_of
-from planner.sharing.exchange import Tours, filled, shorter, shorter_longest
-from planner.sharing.least_times import least_makespan, least_tours
-from planner.sharing.tour_times import Tour, TourTimes, tour_times
-from planner.sharing.vehicles import vehicle_tours
+from stopgo.mission.division import DividedRoute
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.geometry import IntArray, frozen, polyline_length
+from stopgo.mission.planning import Route, Selection
+from stopgo.mission.schedule import schedule
+from stopgo.mission.settings import Settings
+from stopgo.planner.assemble import assemble
+from stopgo.planner.routing import Ends, check_place, tour_bound
+from stopgo.planner.selection import coverage_steps
+from stopgo.planner.selection.cover import cover_of
+from stopgo.planner.selection.demands import demands_of
+from stopgo.planner.sharing.exchange import Tours, filled, shorter, shorter_longest
+from stopgo.planner.sharing.least_times import least_makespan, least_tours
+from stopgo.planner.sharing.tour_times import Tour, TourTimes, tour_times
+from stopgo.planner.sharing.vehicles import vehicle_tours
 
 TURNING = (0.2, 0.4, 0.7, 1.0)
 """Shares of half a turn allowed for each way while tours are looked for, until they keep their time."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from planner.sharing.tour_times import Tour, TourTimes
+from stopgo.planner.sharing.tour_times import Tour, TourTimes
 
 ROUNDS = 200
 """Improvements made at most; a count, so that plans do not depend on speed."""

@@ -11,10 +11,10 @@ import math
 import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from mission.geometry import FloatArray, IntArray
-from planner.routing.proof import proved
-from planner.routing.tour import NANOMETRES, nanometres, shortest_tour
-from planner.sharing.tour_times import TourTimes
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.routing.proof import proved
+from stopgo.planner.routing.tour import NANOMETRES, nanometres, shortest_tour
+from stopgo.planner.sharing.tour_times import TourTimes
 
 NOISE = 1e-6
 """Seconds by which float noise may lift a bound."""

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mission.document import Mission
-from mission.network import Network, network_of
-from mission.plan import DividedPlan, PartPlan
-from mission.schedule import schedule
-from mission.table import duration
-from planner.report import PlanReport, time_lines
+from stopgo.mission.document import Mission
+from stopgo.mission.network import Network, network_of
+from stopgo.mission.plan import DividedPlan, PartPlan
+from stopgo.mission.schedule import schedule
+from stopgo.mission.table import duration
+from stopgo.planner.report import PlanReport, time_lines
 
 
 def shared_report(divided: DividedPlan, reports: Sequence[PlanReport]) -> SharedReport:

@@ -1,4 +1,4 @@
-"""How long a tour over some of the stops takes, counted as `mission.schedule` counts it.
+"""How long a tour over some of the stops takes, counted as `stopgo.mission.schedule` counts it.
 
 Points are the stops, in the order of the selection, and after them the starts.
 """
@@ -12,13 +12,13 @@ from functools import cached_property
 
 import numpy as np
 
-from mission.document import RobotSpec
-from mission.geometry import FloatArray, IntArray, frozen
-from mission.planning import Selection
-from mission.schedule import leg_times, straight_times, turn_time
-from mission.specs import robot_of
-from planner.routing import legs_between
-from planner.routing.legs import Legs
+from stopgo.mission.document import RobotSpec
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.planning import Selection
+from stopgo.mission.schedule import leg_times, straight_times, turn_time
+from stopgo.mission.specs import robot_of
+from stopgo.planner.routing import legs_between
+from stopgo.planner.routing.legs import Legs
 
 Tour = tuple[int, ...]
 """Stops in the order of driving."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray
 
 ITERATIONS = 100
 """Of each search."""

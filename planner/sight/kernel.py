@@ -8,7 +8,7 @@ an arbitrarily small angle. A gap of no width is not looked through, a face is n
 wedge's limits, which are always vertices, belong to it.
 
 No number exceeds 64 bits, where machine code and Python would part. What is given lies within these
-bounds, which `planner.sight.sight` sees to:
+bounds, which `stopgo.planner.sight.sight` sees to:
 
 - coordinates within ±2**29, so differences within 2**30 and turns within 2**61; what a viewpoint looks
   between lies within 2**30 of it;

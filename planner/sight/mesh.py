@@ -10,9 +10,9 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from mission.errors import StopgoError
-from mission.geometry import IntArray
-from planner.shapes import GRID, polygon_parts, segments_of
+from stopgo.mission.errors import StopgoError
+from stopgo.mission.geometry import IntArray
+from stopgo.planner.shapes import GRID, polygon_parts, segments_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,12 +10,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from mission.errors import InputError, StopgoError
-from mission.geometry import BoolArray, FloatArray, IntArray
-from planner.compiling import compiled
-from planner.shapes import GRID, to_grid
-from planner.sight.kernel import FARTHEST, HELPERS, MOST_UNITS, look_all, not_negative
-from planner.sight.mesh import Mesh, containing, place_of, rim_of
+from stopgo.mission.errors import InputError, StopgoError
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.planner.compiling import compiled
+from stopgo.planner.shapes import GRID, to_grid
+from stopgo.planner.sight.kernel import FARTHEST, HELPERS, MOST_UNITS, look_all, not_negative
+from stopgo.planner.sight.mesh import Mesh, containing, place_of, rim_of
 
 COMPILE_ABOVE = 2_000_000
 """Viewpoints × mesh triangles above which loading the compiled kernel pays for itself."""

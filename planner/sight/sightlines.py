@@ -1,7 +1,7 @@
 """What a place sees, told line by line: every sight line is held against every edge that may block it.
 
-Slow and plain: it shares nothing with the triangular expansion of `planner.sight.sight`, so that each proves
-the other. The rule for lines through a vertex is the same: a midpoint is seen if a ray turned to one
+Slow and plain: it shares nothing with the triangular expansion of `stopgo.planner.sight.sight`, so that each
+proves the other. The rule for lines through a vertex is the same: a midpoint is seen if a ray turned to one
 side by an arbitrarily small angle reaches it.
 
 Everything is whole grid steps and exact. Coordinates lie within ±2**29 steps, as `to_grid` sees to, and
@@ -16,12 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from mission.geometry import BoolArray, FloatArray, IntArray
-from mission.limits import limits_of
-from mission.planning import NavigableSpace
-from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
-from planner.sight.well_seen import SeenSegments, well_seen
-from planner.space.targets import face_segments
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.limits import limits_of
+from stopgo.mission.planning import NavigableSpace
+from stopgo.planner.shapes import GRID, local_origin, to_grid, whole_steps_of
+from stopgo.planner.sight.well_seen import SeenSegments, well_seen
+from stopgo.planner.space.targets import face_segments
 
 SPLIT = 27
 LOW = (1 << SPLIT) - 1

@@ -7,7 +7,7 @@ midpoint after the other. Both decide exactly, the limits being what their float
 what is exactly at a limit is seen.
 
 Coordinates are whole grid steps from the place, within 2**30, and units are at least 1 mm long, as in
-`planner.sight.sightlines`.
+`stopgo.planner.sight.sightlines`.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from mission.geometry import BoolArray, FloatArray, IntArray
-from mission.limits import ViewLimits
-from planner.shapes import GRID
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.limits import ViewLimits
+from stopgo.planner.shapes import GRID
 
 CLOSE = 1e-9
 """Numbers that differ by less than this share are compared exactly."""

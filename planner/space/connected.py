@@ -11,8 +11,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from shapely.geometry.base import BaseGeometry
 
-from mission.geometry import FloatArray, IntArray
-from planner.shapes import GRID, polygon_parts
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.shapes import GRID, polygon_parts
 
 
 @dataclass(frozen=True, eq=False)

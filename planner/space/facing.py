@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from mission.geometry import FloatArray, IntArray, frozen
-from mission.planning import RoomSpace, Targets
-from planner.shapes import to_shape
-from planner.space.ground import Ground
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.planning import RoomSpace, Targets
+from stopgo.planner.shapes import to_shape
+from stopgo.planner.space.ground import Ground
 
 AHEAD = (0.02, 0.1, 0.25)
 """Distances (m) in front of a face at which its room is looked for: rooms often begin a little off it."""

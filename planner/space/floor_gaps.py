@@ -10,11 +10,11 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from mission.geometry import BoolArray, FloatArray, IntArray
-from mission.planning import NavigableSpace
-from planner.kept import kept
-from planner.shapes import SLACK, local_origin, polygon_parts, segments_of, to_shape
-from planner.space.reach import INSIDE, reach_of
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.planning import NavigableSpace
+from stopgo.planner.kept import kept
+from stopgo.planner.shapes import SLACK, local_origin, polygon_parts, segments_of, to_shape
+from stopgo.planner.space.reach import INSIDE, reach_of
 
 APART = 0.1
 """Floor edges are asked every so many metres what lies across."""

@@ -16,8 +16,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from mission.geometry import FloatArray
-from planner.shapes import GRID, GROWTH, SLACK, holds
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.shapes import GRID, GROWTH, SLACK, holds
 
 STEPS = 0.02 * 1.4 ** np.arange(15)
 """Distances from a gap's middle, up to about 2 m, at which the drive area is looked for."""

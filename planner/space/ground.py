@@ -8,11 +8,11 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from mission.errors import InputError
-from mission.floor import FloorPlan
-from mission.geometry import FloatArray
-from mission.settings import Settings
-from planner.shapes import (
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.settings import Settings
+from stopgo.planner.shapes import (
     GRID,
     GROWTH,
     HAIRLINE,
@@ -26,9 +26,9 @@ from planner.shapes import (
     union,
     widened,
 )
-from planner.space.gaps import Walls, crossings_through, tight_gaps
-from planner.space.opening_joins import Crossing, barrier, crossings_of, threshold
-from planner.space.targets import solid_of
+from stopgo.planner.space.gaps import Walls, crossings_through, tight_gaps
+from stopgo.planner.space.opening_joins import Crossing, barrier, crossings_of, threshold
+from stopgo.planner.space.targets import solid_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from mission.errors import AnswerIsNo, InputError
-from mission.floor import FloorPlan
-from mission.geodesy import out_of_reach
-from mission.geometry import FloatArray, frozen
-from mission.planning import NavigableSpace
-from mission.settings import Settings
-from planner.shapes import local_origin, to_polygons
-from planner.space.facing import faced_rooms
-from planner.space.ground import Ground, drivable
-from planner.space.opening_joins import Crossing, barrier
-from planner.space.passable import opening_states
-from planner.space.room_spaces import room_spaces
-from planner.space.targets import occluders_of, targets_of
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geodesy import out_of_reach
+from stopgo.mission.geometry import FloatArray, frozen
+from stopgo.mission.planning import NavigableSpace
+from stopgo.mission.settings import Settings
+from stopgo.planner.shapes import local_origin, to_polygons
+from stopgo.planner.space.facing import faced_rooms
+from stopgo.planner.space.ground import Ground, drivable
+from stopgo.planner.space.opening_joins import Crossing, barrier
+from stopgo.planner.space.passable import opening_states
+from stopgo.planner.space.room_spaces import room_spaces
+from stopgo.planner.space.targets import occluders_of, targets_of
 
 
 def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:

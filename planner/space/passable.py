@@ -12,16 +12,16 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from mission.floor import Finding
-from mission.geometry import FloatArray
-from mission.planning import OpeningState
-from mission.settings import Settings
-from planner.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
-from planner.space.connected import Parts, parts_of
-from planner.space.gaps import Gap, gaps_between
-from planner.space.ground import Ground
-from planner.space.opening_joins import Crossing, middle_and_normal
-from planner.space.targets import LINE_WALL, solid_of
+from stopgo.mission.floor import Finding
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.planning import OpeningState
+from stopgo.mission.settings import Settings
+from stopgo.planner.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
+from stopgo.planner.space.connected import Parts, parts_of
+from stopgo.planner.space.gaps import Gap, gaps_between
+from stopgo.planner.space.ground import Ground
+from stopgo.planner.space.opening_joins import Crossing, middle_and_normal
+from stopgo.planner.space.targets import LINE_WALL, solid_of
 
 NEAR_OPENING = 1.6
 """How far from an opening (m) the obstacle that blocks it is looked for."""

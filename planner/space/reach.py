@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from mission.geometry import BoolArray, FloatArray, IntArray
-from mission.planning import NavigableSpace
-from planner.kept import kept
-from planner.shapes import GRID, boundary_lines, local_origin, segments_of, to_shape
-from planner.space.connected import Parts, parts_of
-from planner.space.gaps import Site, Walls
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.planning import NavigableSpace
+from stopgo.planner.kept import kept
+from stopgo.planner.shapes import GRID, boundary_lines, local_origin, segments_of, to_shape
+from stopgo.planner.space.connected import Parts, parts_of
+from stopgo.planner.space.gaps import Site, Walls
 
 INSIDE = 3 * GRID
 """Points nearer than this (m) to the drive area's edge are anchored, since the mesh is snapped."""

@@ -6,12 +6,12 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from mission.floor import FloorPlan
-from mission.planning import RoomSpace
-from mission.settings import Settings
-from planner.shapes import polygon_parts, roughly_widened, to_polygons, to_shape, union
-from planner.space.ground import Ground
-from planner.space.opening_joins import part_near, threshold
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.planning import RoomSpace
+from stopgo.mission.settings import Settings
+from stopgo.planner.shapes import polygon_parts, roughly_widened, to_polygons, to_shape, union
+from stopgo.planner.space.ground import Ground
+from stopgo.planner.space.opening_joins import part_near, threshold
 
 LEAST_UNNAMED = 0.5
 """Floor outside every room smaller than this (m²) is a threshold or a niche, not a room."""

@@ -11,11 +11,11 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from mission.floor import Element, FloorPlan
-from mission.geometry import FloatArray, frozen, polyline_length
-from mission.planning import Targets
-from planner.kept import kept
-from planner.shapes import (
+from stopgo.mission.floor import Element, FloorPlan
+from stopgo.mission.geometry import FloatArray, frozen, polyline_length
+from stopgo.mission.planning import Targets
+from stopgo.planner.kept import kept
+from stopgo.planner.shapes import (
     GRID,
     local_origin,
     mended,

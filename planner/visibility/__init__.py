@@ -9,14 +9,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mission.errors import AnswerIsNo
-from mission.geometry import frozen
-from mission.planning import Candidates, Visibility
-from mission.plugins import Variant, variant
-from planner.visibility.bresenham import bresenham
-from planner.visibility.exact_sight import exact
-from planner.visibility.headings import with_headings
-from planner.visibility.limited import within_limits
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.geometry import frozen
+from stopgo.mission.planning import Candidates, Visibility
+from stopgo.mission.plugins import Variant, variant
+from stopgo.planner.visibility.bresenham import bresenham
+from stopgo.planner.visibility.exact_sight import exact
+from stopgo.planner.visibility.headings import with_headings
+from stopgo.planner.visibility.limited import within_limits
 
 VisibilityMethod = Callable[[Candidates], Visibility]
 METHODS: dict[str, VisibilityMethod] = {"exact": exact, "bresenham": bresenham}

@@ -13,12 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from mission.geometry import BoolArray, FloatArray, IntArray, frozen
-from mission.planning import Candidates, Visibility
-from mission.specs import rounded
-from planner.candidates.grid import main_axes
-from planner.shapes import local_origin, to_shape
-from planner.visibility.runs import visibility_of
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
+from stopgo.mission.planning import Candidates, Visibility
+from stopgo.mission.specs import rounded
+from stopgo.planner.candidates.grid import main_axes
+from stopgo.planner.shapes import local_origin, to_shape
+from stopgo.planner.visibility.runs import visibility_of
 
 FEWEST = 8
 """Headings of each position, at least; more where the field of view is below 90°."""

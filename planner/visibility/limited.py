@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from mission.errors import AnswerIsNo
-from mission.geometry import frozen
-from mission.limits import ViewLimits, limits_in_words, limits_of
-from mission.planning import Visibility
-from mission.settings import Settings
-from mission.specs import limits_spec_of
-from planner.shapes import local_origin, to_grid
-from planner.sight.well_seen import SeenSegments, clipped
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.geometry import frozen
+from stopgo.mission.limits import ViewLimits, limits_in_words, limits_of
+from stopgo.mission.planning import Visibility
+from stopgo.mission.settings import Settings
+from stopgo.mission.specs import limits_spec_of
+from stopgo.planner.shapes import local_origin, to_grid
+from stopgo.planner.sight.well_seen import SeenSegments, clipped
 
 
 def within_limits(in_sight: Visibility) -> Visibility:

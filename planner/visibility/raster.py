@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.errors import InputError
-from mission.geometry import BoolArray, FloatArray, IntArray
-from mission.planning import Candidates
-from planner.candidates.grid import main_axes
-from planner.shapes import local_origin, segments_of, to_shape
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.planning import Candidates
+from stopgo.planner.candidates.grid import main_axes
+from stopgo.planner.shapes import local_origin, segments_of, to_shape
 
 MARGIN = 2.25
 """Free cells around everything; the quarter keeps faces and units, which often lie on multiples of half

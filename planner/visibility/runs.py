@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from mission.geometry import IntArray, frozen
-from mission.planning import Candidates, Visibility
+from stopgo.mission.geometry import IntArray, frozen
+from stopgo.mission.planning import Candidates, Visibility
 
 
 def visibility_of(candidates: Candidates, seen: Iterable[IntArray], *, method: str) -> Visibility:

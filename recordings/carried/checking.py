@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from recordings import entities
-from recordings.canvas import Canvas
-from recordings.carried.reading import Recording
+from stopgo.recordings import entities
+from stopgo.recordings.canvas import Canvas
+from stopgo.recordings.carried.reading import Recording
 
 
 def carry_end(canvas: Canvas) -> None:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import rerun as rr
 
-from mission.figures import Figures
-from recordings import entities
-from recordings.canvas import Canvas
-from recordings.carried.values import Cells, Values
+from stopgo.mission.figures import Figures
+from stopgo.recordings import entities
+from stopgo.recordings.canvas import Canvas
+from stopgo.recordings.carried.values import Cells, Values
 
 
 @dataclass(frozen=True)

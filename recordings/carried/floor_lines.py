@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.geometry import FloatArray
-from mission.kinds import KINDS
-from recordings import entities
-from recordings.carried.values import Values
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.kinds import KINDS
+from stopgo.recordings import entities
+from stopgo.recordings.carried.values import Values
 
 Polylines = tuple[FloatArray, ...]
 

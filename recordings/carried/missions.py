@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import rerun as rr
 
-from mission.document import Mission
-from mission.files.mission_json import encode, parse
-from recordings import entities
-from recordings.canvas import Canvas
-from recordings.carried.values import Values
+from stopgo.mission.document import Mission
+from stopgo.mission.files.mission_json import encode, parse
+from stopgo.recordings import entities
+from stopgo.recordings.canvas import Canvas
+from stopgo.recordings.carried.values import Values
 
 
 def carry_mission(canvas: Canvas, mission: Mission) -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from mission.document import Mission
-from mission.geometry import bounds
-from recordings import entities
-from recordings.canvas import Canvas
-from recordings.carried.floor_lines import floor_lines
-from recordings.carried.reading import Recording
-from recordings.layout import Bounds
-from recordings.read import chunks
+from stopgo.mission.document import Mission
+from stopgo.mission.geometry import bounds
+from stopgo.recordings import entities
+from stopgo.recordings.canvas import Canvas
+from stopgo.recordings.carried.floor_lines import floor_lines
+from stopgo.recordings.carried.reading import Recording
+from stopgo.recordings.layout import Bounds
+from stopgo.recordings.read import chunks
 
 TAKEN = (
     *(entities.FLOOR, entities.COVERAGE, entities.WORLD_FLOOR, entities.REPORT),

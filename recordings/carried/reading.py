@@ -6,17 +6,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mission.document import Mission
-from mission.errors import InputError
-from mission.run_log import RunLog
-from mission.sight import Sight
-from recordings import entities
-from recordings.carried.missions import missions_in
-from recordings.carried.run_logs import logs_in
-from recordings.carried.sight import sights_in
-from recordings.carried.values import Values
-from recordings.read import Contents, check
-from recordings.read_apart import fatal_faults
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.run_log import RunLog
+from stopgo.mission.sight import Sight
+from stopgo.recordings import entities
+from stopgo.recordings.carried.missions import missions_in
+from stopgo.recordings.carried.run_logs import logs_in
+from stopgo.recordings.carried.sight import sights_in
+from stopgo.recordings.carried.values import Values
+from stopgo.recordings.read import Contents, check
+from stopgo.recordings.read_apart import fatal_faults
 
 
 @dataclass(frozen=True, eq=False)

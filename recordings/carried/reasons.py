@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import msgspec
 import rerun as rr
 
-from mission.decoding import one_decode_error
-from mission.errors import InputError
-from mission.stop_reasons import StopReason
-from recordings import entities
-from recordings.canvas import Canvas
-from recordings.carried.values import Values
+from stopgo.mission.decoding import one_decode_error
+from stopgo.mission.errors import InputError
+from stopgo.mission.stop_reasons import StopReason
+from stopgo.recordings import entities
+from stopgo.recordings.canvas import Canvas
+from stopgo.recordings.carried.values import Values
 
 
 def carry_reasons(canvas: Canvas, reasons: Sequence[StopReason]) -> None:

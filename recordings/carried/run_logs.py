@@ -7,12 +7,12 @@ from pathlib import Path
 
 import msgspec
 
-from mission.errors import InputError
-from mission.events import AnyEvent, event_of
-from mission.run_log import LogSource, RunLog, Track
-from recordings import entities
-from recordings.carried.values import Values
-from recordings.read import Contents
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import AnyEvent, event_of
+from stopgo.mission.run_log import LogSource, RunLog, Track
+from stopgo.recordings import entities
+from stopgo.recordings.carried.values import Values
+from stopgo.recordings.read import Contents
 
 
 def logs_in(values: Values, contents: Contents, path: Path) -> tuple[RunLog, ...]:

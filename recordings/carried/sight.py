@@ -7,14 +7,14 @@ from collections.abc import Sized
 import numpy as np
 import rerun as rr
 
-from mission.errors import InputError
-from mission.geometry import IntArray, frozen
-from mission.ledger import Group, Ledger, Seen
-from mission.planning import Targets
-from mission.sight import SeenFrom, Sight
-from recordings import entities
-from recordings.canvas import Canvas
-from recordings.carried.values import Cells, Values
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import IntArray, frozen
+from stopgo.mission.ledger import Group, Ledger, Seen
+from stopgo.mission.planning import Targets
+from stopgo.mission.sight import SeenFrom, Sight
+from stopgo.recordings import entities
+from stopgo.recordings.canvas import Canvas
+from stopgo.recordings.carried.values import Cells, Values
 
 NOT_ASKED = -1.0
 """Stands where no share is asked."""

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from rerun.chunk import Chunk
 
-from mission.geometry import FloatArray, IntArray
-from recordings import entities
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.recordings import entities
 
 Cells = dict[str, Any]
 """Values by component, without the archetype's name: numbers as arrays, texts as tuples."""

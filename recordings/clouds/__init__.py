@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mission.errors import InputError
-from mission.geometry import FloatArray
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import FloatArray
 
 CloudPieces = Iterator[FloatArray]
 """Points (n, 3), one station or one part of a file at a time."""
@@ -24,19 +24,19 @@ FLOOR_SHARE = 0.5
 
 
 def _e57(path: Path) -> CloudPieces:
-    from recordings.clouds.e57 import read_e57
+    from stopgo.recordings.clouds.e57 import read_e57
 
     return read_e57(path)
 
 
 def _las(path: Path) -> CloudPieces:
-    from recordings.clouds.las import read_las
+    from stopgo.recordings.clouds.las import read_las
 
     return read_las(path)
 
 
 def _ply(path: Path) -> CloudPieces:
-    from recordings.clouds.ply import read_ply
+    from stopgo.recordings.clouds.ply import read_ply
 
     return read_ply(path)
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mission.errors import InputError
-from mission.geometry import FloatArray
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import FloatArray
 
 
 def read_e57(path: Path) -> Iterator[FloatArray]:

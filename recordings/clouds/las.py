@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mission.errors import InputError
-from mission.geometry import FloatArray
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import FloatArray
 
 PIECE = 1_000_000
 """Points that are in memory at a time."""

@@ -9,8 +9,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from mission.errors import InputError
-from mission.geometry import FloatArray
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import FloatArray
 
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from mission.errors import InputError
-from mission.plugins import Variant
-from recordings.logs.field_log import FieldLog, Reading
-from recordings.logs.files import head, must_be_readable
-from recordings.logs.foreign_logs import foreign_formats, sound_log
+from stopgo.mission.errors import InputError
+from stopgo.mission.plugins import Variant
+from stopgo.recordings.logs.field_log import FieldLog, Reading
+from stopgo.recordings.logs.files import head, must_be_readable
+from stopgo.recordings.logs.foreign_logs import foreign_formats, sound_log
 
 LogReader = Callable[[Path, Reading], FieldLog]
 
@@ -33,43 +33,43 @@ class LogFormat:
 
 
 def _ros() -> LogReader:
-    from recordings.logs.ros import read_ros
+    from stopgo.recordings.logs.ros import read_ros
 
     return read_ros
 
 
 def _dataflash() -> LogReader:
-    from recordings.logs.dataflash import read_dataflash
+    from stopgo.recordings.logs.dataflash import read_dataflash
 
     return read_dataflash
 
 
 def _telemetry() -> LogReader:
-    from recordings.logs.telemetry_log import read_telemetry_log
+    from stopgo.recordings.logs.telemetry_log import read_telemetry_log
 
     return read_telemetry_log
 
 
 def _ulog() -> LogReader:
-    from recordings.logs.ulog import read_ulog
+    from stopgo.recordings.logs.ulog import read_ulog
 
     return read_ulog
 
 
 def _table() -> LogReader:
-    from recordings.logs.tables import read_table
+    from stopgo.recordings.logs.tables import read_table
 
     return read_table
 
 
 def _journal() -> LogReader:
-    from recordings.logs.own import read_journal
+    from stopgo.recordings.logs.own import read_journal
 
     return read_journal
 
 
 def _recording() -> LogReader:
-    from recordings.logs.own_recording import read_run_recording
+    from stopgo.recordings.logs.own_recording import read_run_recording
 
     return read_run_recording
 

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from mission.document import SiteOrigin
-from mission.errors import InputError
-from mission.geometry import FloatArray, IntArray
-from mission.mavlink.autopilots.ardupilot import ARDUPILOT
-from mission.mavlink.autopilots.kind import Mode
-from mission.mavlink.items import Command, Item
-from recordings.logs.field_log import (
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
+from stopgo.mission.mavlink.autopilots.kind import Mode
+from stopgo.mission.mavlink.items import Command, Item
+from stopgo.recordings.logs.field_log import (
     Channel,
     FieldLog,
     LoggedMission,
@@ -33,7 +33,7 @@ from recordings.logs.field_log import (
     fixes_of,
     poses_of,
 )
-from recordings.logs.files import digest_of
+from stopgo.recordings.logs.files import digest_of
 
 HEAD = b"\xa3\x95"
 FMT = 0x80

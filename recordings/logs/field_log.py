@@ -1,7 +1,7 @@
 """What a robot's own log holds, in the log's own frames and times: the noun that every reader makes.
 
 Times are nanoseconds on the clock that `FieldLog.clock` names, lengths metres, angles radians
-counter-clockwise from +x. Nothing here knows a mission: `recordings.replay` lays a log beside one.
+counter-clockwise from +x. Nothing here knows a mission: `stopgo.recordings.replay` lays a log beside one.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mission.document import Mission, SiteOrigin
-from mission.events import AnyEvent
-from mission.geodesy import Geodetic, from_geodetic
-from mission.geometry import FloatArray, IntArray, frozen
-from mission.mavlink.items import Item
+from stopgo.mission.document import Mission, SiteOrigin
+from stopgo.mission.events import AnyEvent
+from stopgo.mission.geodesy import Geodetic, from_geodetic
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.mavlink.items import Item
 
 Stamps = Literal["header", "log"]
 RemarkKind = Literal["mode", "command", "trigger", "reached", "text"]
@@ -68,7 +68,7 @@ class Poses:
     origin: SiteOrigin | None = None
     """Where on earth (0, 0) is, where the source tells that; x is then east and y north."""
     rule: str = "wgs84"
-    """One of `mission.geodesy.RULES`: how whoever measured them turns degrees into metres."""
+    """One of `stopgo.mission.geodesy.RULES`: how whoever measured them turns degrees into metres."""
     truth: bool = False
     """From a simulator, which knows where the robot was; never taken for what the robot knew."""
     oddities: tuple[str, ...] = ()

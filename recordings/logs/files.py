@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from mission.errors import InputError
+from stopgo.mission.errors import InputError
 
 PIECE = 1 << 20
 

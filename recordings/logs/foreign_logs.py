@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from mission.plugins import Variant, installed, variant
-from recordings.logs.field_log import FieldLog
+from stopgo.mission.plugins import Variant, installed, variant
+from stopgo.recordings.logs.field_log import FieldLog
 
 CLOCKS = ("wall", "since boot", "simulated")
 """What `FieldLog.clock` may be."""

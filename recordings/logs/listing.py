@@ -6,8 +6,8 @@ from collections import Counter
 from datetime import UTC, datetime
 from typing import Any
 
-from mission.table import duration, table
-from recordings.logs.field_log import FieldLog, Poses
+from stopgo.mission.table import duration, table
+from stopgo.recordings.logs.field_log import FieldLog, Poses
 
 SHOWN = 12
 """Of the lines that a log tells at single moments, as many are shown."""

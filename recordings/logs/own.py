@@ -12,13 +12,13 @@ from tempfile import TemporaryDirectory
 import msgspec
 import numpy as np
 
-from mission.decoding import one_decode_error
-from mission.document import Mission
-from mission.errors import InputError
-from mission.events import AnyEvent, event_of
-from mission.geometry import frozen
-from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, poses_of
-from recordings.logs.files import digest_of
+from stopgo.mission.decoding import one_decode_error
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import AnyEvent, event_of
+from stopgo.mission.geometry import frozen
+from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, poses_of
+from stopgo.recordings.logs.files import digest_of
 
 SITE = "site"
 """What the mission's own frame is called in a log."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mission.errors import InputError
-from recordings.carried.reading import read_recording
-from recordings.logs.field_log import FieldLog, Reading, poses_of
-from recordings.logs.own import SITE, own_log, poses_of_events
+from stopgo.mission.errors import InputError
+from stopgo.recordings.carried.reading import read_recording
+from stopgo.recordings.logs.field_log import FieldLog, Reading, poses_of
+from stopgo.recordings.logs.own import SITE, own_log, poses_of_events
 
 
 def read_run_recording(path: Path, reading: Reading) -> FieldLog:

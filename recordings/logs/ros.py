@@ -10,21 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from mission.errors import InputError
-from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Sweep, fixes_of, poses_of
-from recordings.logs.files import digest_of
-from recordings.logs.ros_bag import (
-    Bag,
-    Damaged,
-    Topic,
-    UnknownType,
-    files_of,
-    salvaged_bag,
-    whole_bag,
-)
-from recordings.logs.ros_poses import TYPES, WITH_CHILD, PoseColumns, heading_of
-from recordings.logs.ros_sweeps import SWEEPS
-from recordings.logs.transforms import TransformTree
+from stopgo.mission.errors import InputError
+from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Sweep, fixes_of, poses_of
+from stopgo.recordings.logs.files import digest_of
+from stopgo.recordings.logs.ros_bag import Bag, Damaged, Topic, UnknownType, files_of, salvaged_bag, whole_bag
+from stopgo.recordings.logs.ros_poses import TYPES, WITH_CHILD, PoseColumns, heading_of
+from stopgo.recordings.logs.ros_sweeps import SWEEPS
+from stopgo.recordings.logs.transforms import TransformTree
 
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 FIX, BATTERY = "sensor_msgs/msg/NavSatFix", "sensor_msgs/msg/BatteryState"

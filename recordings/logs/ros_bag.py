@@ -13,8 +13,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from mission.errors import InputError
-from recordings.logs.salvage import Salvaged, salvage
+from stopgo.mission.errors import InputError
+from stopgo.recordings.logs.salvage import Salvaged, salvage
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray
 
 
 class Stamped(NamedTuple):

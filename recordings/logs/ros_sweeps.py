@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray
 
 
 def _of_laser_scan(message: Any) -> FloatArray:

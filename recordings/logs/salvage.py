@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 from urllib.parse import quote
 
-from mission.errors import InputError
+from stopgo.mission.errors import InputError
 
 Raw = tuple[int, int, bytes]
 """Number of the connection, when it was logged (ns), and the bytes."""

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mission.errors import InputError
-from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, fixes_of, poses_of
-from recordings.logs.files import digest_of
-from recordings.logs.ros_poses import headings_of
+from stopgo.mission.errors import InputError
+from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, fixes_of, poses_of
+from stopgo.recordings.logs.files import digest_of
+from stopgo.recordings.logs.ros_poses import headings_of
 
 Numbers = tuple[float, ...]
 TUM_COLUMNS = 8

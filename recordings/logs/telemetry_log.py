@@ -20,13 +20,13 @@ import numpy as np
 os.environ.setdefault("MAVLINK20", "1")
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from mission.document import SiteOrigin
-from mission.errors import InputError
-from mission.geometry import FloatArray, IntArray
-from mission.mavlink.autopilots import autopilot_named, autopilot_of
-from mission.mavlink.autopilots.kind import ROVERS
-from mission.mavlink.items import Command, Item
-from recordings.logs.field_log import (
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.mavlink.autopilots import autopilot_named, autopilot_of
+from stopgo.mission.mavlink.autopilots.kind import ROVERS
+from stopgo.mission.mavlink.items import Command, Item
+from stopgo.recordings.logs.field_log import (
     Channel,
     FieldLog,
     LoggedMission,
@@ -36,7 +36,7 @@ from recordings.logs.field_log import (
     fixes_of,
     poses_of,
 )
-from recordings.logs.files import digest_of
+from stopgo.recordings.logs.files import digest_of
 
 FORMAT = "MAVLink tlog"
 STAMP = 8

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mission.geometry import FloatArray, IntArray
+from stopgo.mission.geometry import FloatArray, IntArray
 
 Planar = tuple[FloatArray, FloatArray, FloatArray]
 """x, y, heading, each (n,)."""

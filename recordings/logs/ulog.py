@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from mission.document import SiteOrigin
-from mission.errors import InputError
-from mission.geometry import FloatArray
-from mission.mavlink.autopilots.kind import Mode
-from mission.mavlink.autopilots.px4 import PX4
-from mission.mavlink.items import Item
-from recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, fixes_of, poses_of
-from recordings.logs.files import digest_of
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.errors import InputError
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.mavlink.autopilots.kind import Mode
+from stopgo.mission.mavlink.autopilots.px4 import PX4
+from stopgo.mission.mavlink.items import Item
+from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, fixes_of, poses_of
+from stopgo.recordings.logs.files import digest_of
 
 WANTED = [
     "vehicle_local_position", "vehicle_global_position", "vehicle_gps_position", "vehicle_attitude",

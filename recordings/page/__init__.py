@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from recordings.page.sections import body
-from recordings.page.style import STYLE
-from recordings.page.subject import ReportSubject
-from recordings.page.words import shown
+from stopgo.recordings.page.sections import body
+from stopgo.recordings.page.style import STYLE
+from stopgo.recordings.page.subject import ReportSubject
+from stopgo.recordings.page.words import shown
 
 HEAD = """<!doctype html>
 <html lang="en">

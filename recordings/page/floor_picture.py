@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from mission.comparison import Comparison
-from mission.document import Mission, Stop
-from mission.events import Held, LinkLost, Paused
-from mission.files.svg import text_width
-from mission.geometry import BoolArray, FloatArray, bounds
-from mission.planning import Targets
-from mission.run.way import legs_of
-from mission.seen import runs_of
-from recordings.page.style import BLUE, GREY, INK, PALE, PURPLE, VERMILION, YELLOW
-from recordings.page.subject import ReportSubject
-from recordings.page.words import shown, tag
+from stopgo.mission.comparison import Comparison
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.events import Held, LinkLost, Paused
+from stopgo.mission.files.svg import text_width
+from stopgo.mission.geometry import BoolArray, FloatArray, bounds
+from stopgo.mission.planning import Targets
+from stopgo.mission.run.way import legs_of
+from stopgo.mission.seen import runs_of
+from stopgo.recordings.page.style import BLUE, GREY, INK, PALE, PURPLE, VERMILION, YELLOW
+from stopgo.recordings.page.subject import ReportSubject
+from stopgo.recordings.page.words import shown, tag
 
 FILLED = {"walls": PALE, "columns": "#b9bcc4", "stairs": "#e3e4e8", "other": "#e3e0d8"}
 """Kinds of elements that are filled; of the others the outline is drawn."""

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from hashlib import file_digest
 from typing import Any
 
-from mission.errors import InputError
-from mission.run_log import LogSource
-from mission.stop_reasons import StopReason
-from recordings.carried.findings import CarriedFindings, findings_in
-from recordings.carried.floor_lines import FloorLines, floor_lines
-from recordings.carried.plan import origin_in
-from recordings.carried.reading import Recording
-from recordings.carried.reasons import reasons_in
-from recordings.page.subject import ReportSubject
-from recordings.review import RecordingReview, Review, missions_of, sights_of, what_next
+from stopgo.mission.errors import InputError
+from stopgo.mission.run_log import LogSource
+from stopgo.mission.stop_reasons import StopReason
+from stopgo.recordings.carried.findings import CarriedFindings, findings_in
+from stopgo.recordings.carried.floor_lines import FloorLines, floor_lines
+from stopgo.recordings.carried.plan import origin_in
+from stopgo.recordings.carried.reading import Recording
+from stopgo.recordings.carried.reasons import reasons_in
+from stopgo.recordings.page.subject import ReportSubject
+from stopgo.recordings.review import RecordingReview, Review, missions_of, sights_of, what_next
 
 
 def subject_of(review: Review) -> ReportSubject:

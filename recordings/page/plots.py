@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.comparison import Comparison
-from mission.events import Scanned
-from mission.geometry import FloatArray
-from mission.table import duration
-from recordings.page.style import BLUE, GREY, PURPLE, VERMILION
-from recordings.page.words import shown, tag
+from stopgo.mission.comparison import Comparison
+from stopgo.mission.events import Scanned
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.table import duration
+from stopgo.recordings.page.style import BLUE, GREY, PURPLE, VERMILION
+from stopgo.recordings.page.words import shown, tag
 
 WIDTH, HEIGHT = 360, 150
 LEFT, BOTTOM, TOP, RIGHT = 44, 20, 8, 8

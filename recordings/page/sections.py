@@ -5,20 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from mission.acquired import Acquired
-from mission.comparison import Comparison, StopComparison
-from mission.document import Stop
-from mission.events import Scanned
-from mission.figures import Share, percent
-from mission.page import route_length
-from mission.schedule import schedule
-from mission.table import duration
-from recordings.page.floor_picture import legend, line_sample, plan_picture
-from recordings.page.plots import plots
-from recordings.page.stop_table import stop_table
-from recordings.page.style import ANSWERS, BLUE, GREY, PURPLE, STATES, VERMILION, YELLOW
-from recordings.page.subject import ReportSubject
-from recordings.page.words import grid, number, row, section, shown, tag, tile
+from stopgo.mission.acquired import Acquired
+from stopgo.mission.comparison import Comparison, StopComparison
+from stopgo.mission.document import Stop
+from stopgo.mission.events import Scanned
+from stopgo.mission.figures import Share, percent
+from stopgo.mission.page import route_length
+from stopgo.mission.schedule import schedule
+from stopgo.mission.table import duration
+from stopgo.recordings.page.floor_picture import legend, line_sample, plan_picture
+from stopgo.recordings.page.plots import plots
+from stopgo.recordings.page.stop_table import stop_table
+from stopgo.recordings.page.style import ANSWERS, BLUE, GREY, PURPLE, STATES, VERMILION, YELLOW
+from stopgo.recordings.page.subject import ReportSubject
+from stopgo.recordings.page.words import grid, number, row, section, shown, tag, tile
 
 MOST_ELEMENTS = 40
 """Elements that are listed: the ones least seen."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mission.figures import percent
-from mission.stop_reasons import LEAST_TOLD, StopReason
-from recordings.page.words import grid, number, row, section, shown
+from stopgo.mission.figures import percent
+from stopgo.mission.stop_reasons import LEAST_TOLD, StopReason
+from stopgo.recordings.page.words import grid, number, row, section, shown
 
 
 def stop_table(reasons: Sequence[StopReason]) -> str:

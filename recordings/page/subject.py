@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from mission.comparing.judging import Judgement, judge
-from mission.comparison import Comparison
-from mission.document import Mission
-from mission.run_log import LogSource
-from mission.sight import Sight
-from mission.stop_reasons import StopReason
-from recordings.carried.findings import CarriedFindings
-from recordings.carried.floor_lines import FloorLines
+from stopgo.mission.comparing.judging import Judgement, judge
+from stopgo.mission.comparison import Comparison
+from stopgo.mission.document import Mission
+from stopgo.mission.run_log import LogSource
+from stopgo.mission.sight import Sight
+from stopgo.mission.stop_reasons import StopReason
+from stopgo.recordings.carried.findings import CarriedFindings
+from stopgo.recordings.carried.floor_lines import FloorLines
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.document import Mission
-from mission.errors import AnswerIsNo
-from mission.geometry import FloatArray
-from recordings.replay.matching import matched, reaches
-from recordings.replay.standing import Standing
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.geometry import FloatArray
+from stopgo.recordings.replay.matching import matched, reaches
+from stopgo.recordings.replay.standing import Standing
 
 LOOK_AHEAD = 4
 """Stops up to this many places apart are tried as pairs: between them some may be skipped."""

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mission.document import Mission
-from mission.errors import InputError
-from mission.events import AnyEvent, Arrived
-from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.following.followed_run import FollowedRun
-from mission.mavlink.following.listed_mission import ListedMission, listed_mission
-from mission.mavlink.items import ItemList
-from mission.mavlink.recognise import recognise
-from recordings.logs.field_log import FieldLog, LoggedMission
-from recordings.logs.telemetry_log import FORMAT, messages_of
-from recordings.replay.log_placing import PlacedLog
-from recordings.replay.uploaded import differences
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import AnyEvent, Arrived
+from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.following.followed_run import FollowedRun
+from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
+from stopgo.mission.mavlink.items import ItemList
+from stopgo.mission.mavlink.recognise import recognise
+from stopgo.recordings.logs.field_log import FieldLog, LoggedMission
+from stopgo.recordings.logs.telemetry_log import FORMAT, messages_of
+from stopgo.recordings.replay.log_placing import PlacedLog
+from stopgo.recordings.replay.uploaded import differences
 
 
 def followed_events(log: FieldLog, mission: Mission, laid: PlacedLog) -> tuple[AnyEvent, ...]:

@@ -13,12 +13,22 @@ from typing import Any
 
 import numpy as np
 
-from mission.document import Mission, Stop
-from mission.events import AnyEvent, Arrived, Failed, Finished, Pose, Settled, Skipped, Started, Unconfirmed
-from mission.run_log import Track
-from recordings.logs.field_log import Remark
-from recordings.replay.matching import Match, long_enough
-from recordings.replay.standing import Standing
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.events import (
+    AnyEvent,
+    Arrived,
+    Failed,
+    Finished,
+    Pose,
+    Settled,
+    Skipped,
+    Started,
+    Unconfirmed,
+)
+from stopgo.mission.run_log import Track
+from stopgo.recordings.logs.field_log import Remark
+from stopgo.recordings.replay.matching import Match, long_enough
+from stopgo.recordings.replay.standing import Standing
 
 
 @dataclass(frozen=True)

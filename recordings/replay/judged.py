@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mission.acquired import Certainty
-from mission.comparing.judging import Judgement, named
-from mission.comparison import DONE, StopComparison
-from mission.figures import percent
-from recordings.replay.replayed import Replay
+from stopgo.mission.acquired import Certainty
+from stopgo.mission.comparing.judging import Judgement, named
+from stopgo.mission.comparison import DONE, StopComparison
+from stopgo.mission.figures import percent
+from stopgo.recordings.replay.replayed import Replay
 
 
 def judged(replay: Replay) -> Judgement:

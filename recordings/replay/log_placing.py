@@ -8,16 +8,16 @@ from typing import Literal
 
 import numpy as np
 
-from mission.document import Mission, Transform
-from mission.errors import InputError
-from mission.geodesy import Geodetic, from_geodetic
-from mission.geometry import FloatArray
-from mission.mavlink.local_frame import is_elsewhere
-from mission.run_log import Alignment, Track
-from recordings.logs.field_log import FieldLog, Poses
-from recordings.logs.own import AT_EVENTS, SITE
-from recordings.replay.fitting import Fit, fitted, turning
-from recordings.replay.standing import standings
+from stopgo.mission.document import Mission, Transform
+from stopgo.mission.errors import InputError
+from stopgo.mission.geodesy import Geodetic, from_geodetic
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.mavlink.local_frame import is_elsewhere
+from stopgo.mission.run_log import Alignment, Track
+from stopgo.recordings.logs.field_log import FieldLog, Poses
+from stopgo.recordings.logs.own import AT_EVENTS, SITE
+from stopgo.recordings.replay.fitting import Fit, fitted, turning
+from stopgo.recordings.replay.standing import standings
 
 Align = Literal["first", "stops"]
 FAR_M = 20_000.0

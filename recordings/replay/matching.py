@@ -13,10 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from mission.document import Mission, Stop
-from mission.geometry import FloatArray
-from mission.run_log import Track
-from recordings.replay.standing import Standing
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.run_log import Track
+from stopgo.recordings.replay.standing import Standing
 
 HaltKind = Literal["visit", "again", "back", "extra"]
 EXTRA, SKIP, PASSED, AGAIN, BACK = 1.0, 0.4, 0.1, 0.05, 0.6

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mission.geometry import FloatArray
-from recordings.logs.field_log import Sweep
-from recordings.replay.fitting import turning
-from recordings.replay.replayed import Replay
+from stopgo.mission.geometry import FloatArray
+from stopgo.recordings.logs.field_log import Sweep
+from stopgo.recordings.replay.fitting import turning
+from stopgo.recordings.replay.replayed import Replay
 
 BAND_M = 1.0
 """Points of a cloud that lie farther above or below the scanner than this are of floors and ceilings."""

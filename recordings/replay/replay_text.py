@@ -7,16 +7,16 @@ import io
 import math
 from typing import Any
 
-from mission.as_driven import AsDriven
-from mission.comparing.telling import comparison_json, comparison_table
-from mission.figures import percent
-from mission.measured import Measured
-from mission.run_log import Alignment
-from mission.table import printable, table
-from recordings.logs.field_log import FieldLog
-from recordings.replay.judged import judged
-from recordings.replay.replayed import Replay
-from recordings.replay.way_and_time import lost_times, way_of
+from stopgo.mission.as_driven import AsDriven
+from stopgo.mission.comparing.telling import comparison_json, comparison_table
+from stopgo.mission.figures import percent
+from stopgo.mission.measured import Measured
+from stopgo.mission.run_log import Alignment
+from stopgo.mission.table import printable, table
+from stopgo.recordings.logs.field_log import FieldLog
+from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.replay.way_and_time import lost_times, way_of
 
 MOST_LOST = 5
 """Places where time was lost that are listed on a terminal; --json has all."""

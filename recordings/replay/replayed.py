@@ -8,16 +8,16 @@ from functools import cached_property
 
 import numpy as np
 
-from mission.as_driven import AsDriven
-from mission.comparison import Comparison
-from mission.document import Mission
-from mission.events import Scanned, Unconfirmed
-from mission.geometry import FloatArray
-from mission.measured import Measured
-from mission.run_log import RunLog
-from recordings.logs.field_log import FieldLog
-from recordings.replay.log_placing import PlacedLog
-from recordings.replay.matching import Match
+from stopgo.mission.as_driven import AsDriven
+from stopgo.mission.comparison import Comparison
+from stopgo.mission.document import Mission
+from stopgo.mission.events import Scanned, Unconfirmed
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.measured import Measured
+from stopgo.mission.run_log import RunLog
+from stopgo.recordings.logs.field_log import FieldLog
+from stopgo.recordings.replay.log_placing import PlacedLog
+from stopgo.recordings.replay.matching import Match
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,23 +9,23 @@ from pathlib import Path
 
 import numpy as np
 
-from mission.comparing.compare import compare
-from mission.document import Mission
-from mission.errors import InputError
-from mission.events import AnyEvent
-from mission.geometry import FloatArray
-from mission.run.way import legs_of
-from mission.run_log import LogSource, RunLog, Track
-from mission.sight import Sight
-from recordings.logs.field_log import FieldLog, Remark
-from recordings.replay.followed import followed_events
-from recordings.replay.inferring import events_of
-from recordings.replay.log_placing import PlacedLog, Placing, placed
-from recordings.replay.matching import Match, matched, reaches
-from recordings.replay.replayed import Replay
-from recordings.replay.standing import Standing, standings
-from recordings.replay.told_visits import told_visits
-from recordings.replay.uploaded import differences_of
+from stopgo.mission.comparing.compare import compare
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import AnyEvent
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.run.way import legs_of
+from stopgo.mission.run_log import LogSource, RunLog, Track
+from stopgo.mission.sight import Sight
+from stopgo.recordings.logs.field_log import FieldLog, Remark
+from stopgo.recordings.replay.followed import followed_events
+from stopgo.recordings.replay.inferring import events_of
+from stopgo.recordings.replay.log_placing import PlacedLog, Placing, placed
+from stopgo.recordings.replay.matching import Match, matched, reaches
+from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.replay.standing import Standing, standings
+from stopgo.recordings.replay.told_visits import told_visits
+from stopgo.recordings.replay.uploaded import differences_of
 
 NEAR_ROUTE_M = 2.0
 LEAST_ON_ROUTE, LEAST_WITHOUT_HALTS = 0.5, 0.9

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.geometry import BoolArray, FloatArray, IntArray
-from mission.run_log import Track
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.run_log import Track
 
 BIN_S = 0.2
 """Poses are averaged over as long as this first: logs have from one to hundreds a second."""

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate, groupby
 
-from mission.document import Mission
-from mission.events import AnyEvent, Arrived, Homing, Pose
-from recordings.replay.matching import HaltKind, Match
-from recordings.replay.standing import Standing
+from stopgo.mission.document import Mission
+from stopgo.mission.events import AnyEvent, Arrived, Homing, Pose
+from stopgo.recordings.replay.matching import HaltKind, Match
+from stopgo.recordings.replay.standing import Standing
 
 
 def told_visits(events: Sequence[AnyEvent], mission: Mission, halts: Iterable[Standing]) -> tuple[Match, ...]:

@@ -7,15 +7,15 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from mission.document import Mission, SiteOrigin
-from mission.errors import InputError
-from mission.files.imports.assembling import mission_of
-from mission.files.imports.item_track import Listed, track_of
-from mission.mavlink.items import Item
-from mission.mavlink.recognise import PLACES, recognise
-from mission.mavlink.recognised_tour import RecognisedStop, recognised_tour
-from mission.settings import Settings
-from recordings.logs.field_log import FieldLog, LoggedMission
+from stopgo.mission.document import Mission, SiteOrigin
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.imports.assembling import mission_of
+from stopgo.mission.files.imports.item_track import Listed, track_of
+from stopgo.mission.mavlink.items import Item
+from stopgo.mission.mavlink.recognise import PLACES, recognise
+from stopgo.mission.mavlink.recognised_tour import RecognisedStop, recognised_tour
+from stopgo.mission.settings import Settings
+from stopgo.recordings.logs.field_log import FieldLog, LoggedMission
 
 SAME_M, SAME_S = 0.02, 0.05
 """Places in steps of 1e-7 degrees are a centimetre off, times in float32 not at all."""

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.document import Mission
-from mission.geometry import FloatArray, IntArray
-from mission.run.way import legs_of
-from mission.run_log import Track
-from recordings.replay.matching import Match
-from recordings.replay.replayed import Replay
+from stopgo.mission.document import Mission
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.run.way import legs_of
+from stopgo.mission.run_log import Track
+from stopgo.recordings.replay.matching import Match
+from stopgo.recordings.replay.replayed import Replay
 
 SMOOTHED_S = 0.5
 """The way is measured between means over as long as this: noise would lengthen it."""

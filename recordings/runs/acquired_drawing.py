@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from mission.events import Aborted, AnyEvent, Finished, Scanned, Skipped
-from mission.figures import percent
-from mission.geometry import BoolArray, FloatArray
-from mission.seen import runs_of
-from mission.sight import SeenFrom, Sight
-from recordings import entities, palette
-from recordings.canvas import Canvas, on_screen
-from recordings.pens import ORDER, Pen, style
-from recordings.robot import Draw
+from stopgo.mission.events import Aborted, AnyEvent, Finished, Scanned, Skipped
+from stopgo.mission.figures import percent
+from stopgo.mission.geometry import BoolArray, FloatArray
+from stopgo.mission.seen import runs_of
+from stopgo.mission.sight import SeenFrom, Sight
+from stopgo.recordings import entities, palette
+from stopgo.recordings.canvas import Canvas, on_screen
+from stopgo.recordings.pens import ORDER, Pen, style
+from stopgo.recordings.robot import Draw
 
 BOLD_PX, THICK_PX = 2.5, 5.0
 """Radii in points of the screen of what was seen and of what was lost."""

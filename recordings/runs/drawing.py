@@ -10,9 +10,9 @@ import msgspec
 import numpy as np
 import rerun as rr
 
-from mission.comparing.late_beside import LateBeside
-from mission.document import Mission, Stop
-from mission.events import (
+from stopgo.mission.comparing.late_beside import LateBeside
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.events import (
     Aborted,
     AnyEvent,
     Arrived,
@@ -30,19 +30,19 @@ from mission.events import (
     StateReport,
     Unconfirmed,
 )
-from mission.geometry import FloatArray, IntArray
-from mission.run_log import Track
-from mission.sight import Sight
-from mission.tolerance import deviation, scanned_beside
-from recordings import entities, palette, strokes
-from recordings.canvas import Canvas, on_screen
-from recordings.pens import ORDER, Pen, style
-from recordings.robot import Draw, draw_robot, quaternions
-from recordings.runs.acquired_drawing import AcquiredDrawing
-from recordings.runs.report import StopRecord, run_report
-from recordings.runs.revision import change_between, draw_change
-from recordings.runs.trail import Thinner, Trail
-from recordings.stages.mission import ABOVE_FLOOR, state_colours
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.run_log import Track
+from stopgo.mission.sight import Sight
+from stopgo.mission.tolerance import deviation, scanned_beside
+from stopgo.recordings import entities, palette, strokes
+from stopgo.recordings.canvas import Canvas, on_screen
+from stopgo.recordings.pens import ORDER, Pen, style
+from stopgo.recordings.robot import Draw, draw_robot, quaternions
+from stopgo.recordings.runs.acquired_drawing import AcquiredDrawing
+from stopgo.recordings.runs.report import StopRecord, run_report
+from stopgo.recordings.runs.revision import change_between, draw_change
+from stopgo.recordings.runs.trail import Thinner, Trail
+from stopgo.recordings.stages.mission import ABOVE_FLOOR, state_colours
 
 SOLID_S = 0.5
 """How often the robot moves in 3D."""

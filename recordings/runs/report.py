@@ -6,18 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from mission.document import Mission, Stop
-from mission.events import (
-    Aborted,
-    AnyEvent,
-    Arrived,
-    Failed,
-    Finished,
-    Scanned,
-    Skipped,
-    Unconfirmed,
-)
-from mission.tolerance import deviation, scanned_beside
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.events import Aborted, AnyEvent, Arrived, Failed, Finished, Scanned, Skipped, Unconfirmed
+from stopgo.mission.tolerance import deviation, scanned_beside
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import rerun as rr
 
-from mission.document import Mission, Stop
-from recordings import entities, palette
-from recordings.canvas import Canvas
-from recordings.palette import Colour
-from recordings.robot import Draw
-from recordings.stages.mission import Leg, StopMarks, legs_of, route_lines, stop_marks
+from stopgo.mission.document import Mission, Stop
+from stopgo.recordings import entities, palette
+from stopgo.recordings.canvas import Canvas
+from stopgo.recordings.palette import Colour
+from stopgo.recordings.robot import Draw
+from stopgo.recordings.stages.mission import Leg, StopMarks, legs_of, route_lines, stop_marks
 
 STEP = 0.02
 """How far what a revision changes lies above what was drawn before, as a share of a step of ORDER."""

@@ -1,6 +1,6 @@
 """Draws `office.dxf`, the sample floor of the demonstration: an office of 26 by 13 m on one storey.
 
-    python -m recordings.samples.draw_office [office.dxf]
+    python -m stopgo.recordings.samples.draw_office [office.dxf]
 
 The same bytes come out every time, so that a plan of the sample can be repeated.
 """
@@ -17,7 +17,7 @@ from ezdxf.document import Drawing
 from ezdxf.enums import TextEntityAlignment
 from ezdxf.layouts import Modelspace
 
-from mission.files.dxf_bytes import encoded, reproducible
+from stopgo.mission.files.dxf_bytes import encoded, reproducible
 
 Interval = tuple[float, float]
 Box = tuple[float, float, float, float]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from mission.planning import DROP_REASONS, KEPT, Candidates
-from recordings import entities, palette
-from recordings.canvas import Canvas, on_screen
-from recordings.pens import ORDER
-from recordings.stages.story import CANDIDATES, tell_step
+from stopgo.mission.planning import DROP_REASONS, KEPT, Candidates
+from stopgo.recordings import entities, palette
+from stopgo.recordings.canvas import Canvas, on_screen
+from stopgo.recordings.pens import ORDER
+from stopgo.recordings.stages.story import CANDIDATES, tell_step
 
 
 def draw_candidates(canvas: Canvas, candidates: Candidates) -> None:

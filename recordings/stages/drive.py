@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from mission.document import Mission, Point
-from mission.geometry import FloatArray
-from mission.page import route_length
-from mission.schedule import straight_time, turn_time
+from stopgo.mission.document import Mission, Point
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.page import route_length
+from stopgo.mission.schedule import straight_time, turn_time
 
 STEP_M = 0.25
 """Greatest distance between two poses of the planned drive …"""
@@ -30,7 +30,7 @@ class Drive:
 
 
 def planned_drive(mission: Mission) -> Drive:
-    """The drive that `mission.schedule.schedule` times: turn in place, straight on, settle, scan."""
+    """The drive that `stopgo.mission.schedule.schedule` times: turn in place, straight on, settle, scan."""
     walk = _Walk(mission)
     leaving = []
     for stop in mission.stops:

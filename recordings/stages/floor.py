@@ -7,13 +7,13 @@ from collections.abc import Iterable
 import numpy as np
 import rerun as rr
 
-from mission.floor import Element, Finding, FloorPlan, Room
-from mission.geometry import FloatArray, Polygon
-from recordings import entities, palette, strokes
-from recordings.canvas import Canvas, on_screen
-from recordings.pens import ORDER, THICK, THIN, Pen, draw
-from recordings.stages import story
-from recordings.stages.story import tell_step
+from stopgo.mission.floor import Element, Finding, FloorPlan, Room
+from stopgo.mission.geometry import FloatArray, Polygon
+from stopgo.recordings import entities, palette, strokes
+from stopgo.recordings.canvas import Canvas, on_screen
+from stopgo.recordings.pens import ORDER, THICK, THIN, Pen, draw
+from stopgo.recordings.stages import story
+from stopgo.recordings.stages.story import tell_step
 
 MOST_NAMES = 30
 """With more rooms than these their names hide one another, and are shown where the mouse points."""

@@ -14,16 +14,16 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from mission.document import Mission, Point, Stop
-from mission.geometry import FloatArray, bounds
-from mission.network import network_of, pair_in_words
-from recordings import entities, palette, strokes
-from recordings.canvas import Canvas, on_screen
-from recordings.layout import Bounds
-from recordings.palette import Colour
-from recordings.pens import ORDER
-from recordings.robot import draw_robot, quaternions
-from recordings.stages.drive import Drive
+from stopgo.mission.document import Mission, Point, Stop
+from stopgo.mission.geometry import FloatArray, bounds
+from stopgo.mission.network import network_of, pair_in_words
+from stopgo.recordings import entities, palette, strokes
+from stopgo.recordings.canvas import Canvas, on_screen
+from stopgo.recordings.layout import Bounds
+from stopgo.recordings.palette import Colour
+from stopgo.recordings.pens import ORDER
+from stopgo.recordings.robot import draw_robot, quaternions
+from stopgo.recordings.stages.drive import Drive
 
 ABOVE_FLOOR = 0.05
 """How high above the floor 3D lines lie, in metres, so that the floor does not hide them."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from mission.figures import percent
-from mission.geometry import FloatArray, IntArray
-from mission.planning import Selection, Visibility
-from recordings import entities, palette, strokes
-from recordings.canvas import Canvas, on_screen
-from recordings.pens import BOLD, ORDER, THICK, Pen, style
-from recordings.stages.floor import CUT
-from recordings.stages.mission import MOST_NAMES
-from recordings.stages.story import FIRST_CHOICE, step_of_choice
+from stopgo.mission.figures import percent
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.planning import Selection, Visibility
+from stopgo.recordings import entities, palette, strokes
+from stopgo.recordings.canvas import Canvas, on_screen
+from stopgo.recordings.pens import BOLD, ORDER, THICK, Pen, style
+from stopgo.recordings.stages.floor import CUT
+from stopgo.recordings.stages.mission import MOST_NAMES
+from stopgo.recordings.stages.story import FIRST_CHOICE, step_of_choice
 
 SKIN = 0.01
 """How far the painted targets stand clear of the cut walls, so that both are seen."""

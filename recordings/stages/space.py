@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from mission.floor import FloorPlan
-from mission.geometry import bounds
-from mission.planning import NavigableSpace, OpeningState
-from recordings import entities, palette, strokes
-from recordings.canvas import Canvas
-from recordings.pens import ORDER, THICK, THIN, Pen, draw
-from recordings.stages.floor import say_findings
-from recordings.stages.story import SPACE, tell_step
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import bounds
+from stopgo.mission.planning import NavigableSpace, OpeningState
+from stopgo.recordings import entities, palette, strokes
+from stopgo.recordings.canvas import Canvas
+from stopgo.recordings.pens import ORDER, THICK, THIN, Pen, draw
+from stopgo.recordings.stages.floor import say_findings
+from stopgo.recordings.stages.story import SPACE, tell_step
 
 
 def draw_space(canvas: Canvas, space: NavigableSpace) -> None:

@@ -7,19 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from mission.document import Mission
-from mission.geometry import BoolArray, FloatArray, IntArray
-from mission.planning import Route, Visibility
-from mission.stop_reasons import StopReason
-from recordings import entities, palette, strokes
-from recordings.canvas import Canvas, on_screen
-from recordings.fans import sight_outline
-from recordings.pens import BOLD, ORDER, THICK, THIN, Pen, style
-from recordings.report import plain
-from recordings.stages.drive import Drive
-from recordings.stages.mission import legs_of, route_lines
-from recordings.stages.selection import sight_of_row
-from recordings.stages.story import FIRST_CHOICE, step_of_choice, tell_step
+from stopgo.mission.document import Mission
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.planning import Route, Visibility
+from stopgo.mission.stop_reasons import StopReason
+from stopgo.recordings import entities, palette, strokes
+from stopgo.recordings.canvas import Canvas, on_screen
+from stopgo.recordings.fans import sight_outline
+from stopgo.recordings.pens import BOLD, ORDER, THICK, THIN, Pen, style
+from stopgo.recordings.report import plain
+from stopgo.recordings.stages.drive import Drive
+from stopgo.recordings.stages.mission import legs_of, route_lines
+from stopgo.recordings.stages.selection import sight_of_row
+from stopgo.recordings.stages.story import FIRST_CHOICE, step_of_choice, tell_step
 
 GUIDE = (
     "Choose the timeline `stage_step` at the bottom of the window and drag: floor, navigable space, "

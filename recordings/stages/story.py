@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import rerun as rr
 
-from recordings import entities
-from recordings.canvas import Canvas
-from recordings.report import plain
+from stopgo.recordings import entities
+from stopgo.recordings.canvas import Canvas
+from stopgo.recordings.report import plain
 
 FLOOR, SPACE, CANDIDATES = 0, 1, 2
 FIRST_CHOICE = 3

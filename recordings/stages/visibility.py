@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from mission.geometry import FloatArray, IntArray
-from mission.planning import Visibility
-from recordings import entities, palette, strokes
-from recordings.canvas import Canvas, on_screen
-from recordings.pens import BOLD, HAIR, ORDER, Pen, style
-from recordings.stages.story import CANDIDATES
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.planning import Visibility
+from stopgo.recordings import entities, palette, strokes
+from stopgo.recordings.canvas import Canvas, on_screen
+from stopgo.recordings.pens import BOLD, HAIR, ORDER, Pen, style
+from stopgo.recordings.stages.story import CANDIDATES
 
 MOST_FANS = 5000
 """With more candidates than these their rays, most of a large floor's recording, are left out."""

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from bridge.link.authority import init_site, issue
-from bridge.link.keys import HolderRole, now_utc, read_keys
-from bridge.link.memory_link import SealedMessage, Switchboard
-from bridge.link.seals import KeySeals
-from bridge.station.station import Station
-from mission.events import StateReport
+from stopgo.bridge.link.authority import init_site, issue
+from stopgo.bridge.link.keys import HolderRole, now_utc, read_keys
+from stopgo.bridge.link.memory_link import SealedMessage, Switchboard
+from stopgo.bridge.link.seals import KeySeals
+from stopgo.bridge.station.station import Station
+from stopgo.mission.events import StateReport
 from tests.bridge.world import Field
 
 HOLDERS: tuple[tuple[HolderRole, str], ...] = (

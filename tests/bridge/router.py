@@ -11,8 +11,8 @@ import sys
 import threading
 from pathlib import Path
 
-from bridge.link.keys import now_utc, read_keys
-from bridge.link.zenoh_link import Guard, listening
+from stopgo.bridge.link.keys import now_utc, read_keys
+from stopgo.bridge.link.zenoh_link import Guard, listening
 
 
 def leave(signum: int, frame: object) -> None:

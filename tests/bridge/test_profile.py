@@ -8,11 +8,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.commands.connection import with_presets
-from bridge.commands.doctor import robot_checks
-from bridge.profile import NAMES, read_profile
-from mission.__main__ import main
-from mission.errors import InputError
+from stopgo.bridge.commands.connection import with_presets
+from stopgo.bridge.commands.doctor import robot_checks
+from stopgo.bridge.profile import NAMES, read_profile
+from stopgo.command_line import main
+from stopgo.mission.errors import InputError
 from tests.bridge.world import Field
 
 NOTHING = {

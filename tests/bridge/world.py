@@ -11,19 +11,19 @@ from typing import Any
 
 import msgspec
 
-from bridge.link.clock import SimulatedClock
-from bridge.link.memory_link import Switchboard
-from bridge.link.protocol import Commit, KeyExpressions, Manifest
-from bridge.link.seals import NO_SEALS, Seals
-from bridge.robot.agent import Agent
-from bridge.robot.bodies import pose_of
-from bridge.robot.controller import Controller
-from bridge.robot.inbox import Inbox
-from bridge.robot.journal import Journal, memory_journal
-from bridge.robot.runner import state_report
-from bridge.robot.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
-from bridge.station.station import Station
-from mission.document import (
+from stopgo.bridge.link.clock import SimulatedClock
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.link.protocol import Commit, KeyExpressions, Manifest
+from stopgo.bridge.link.seals import NO_SEALS, Seals
+from stopgo.bridge.robot.agent import Agent
+from stopgo.bridge.robot.bodies import pose_of
+from stopgo.bridge.robot.controller import Controller
+from stopgo.bridge.robot.inbox import Inbox
+from stopgo.bridge.robot.journal import Journal, memory_journal
+from stopgo.bridge.robot.runner import state_report
+from stopgo.bridge.robot.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
+from stopgo.bridge.station.station import Station
+from stopgo.mission.document import (
     Frame,
     Mission,
     Origin,
@@ -37,10 +37,10 @@ from mission.document import (
     Stop,
     sealed,
 )
-from mission.events import StateReport
-from mission.run.orders import Answer, Order, Verb
-from mission.run.revision import RevisionPolicy
-from mission.run.states import Run
+from stopgo.mission.events import StateReport
+from stopgo.mission.run.orders import Answer, Order, Verb
+from stopgo.mission.run.revision import RevisionPolicy
+from stopgo.mission.run.states import Run
 
 EXACT = Wear(noise_m=0.0, noise_rad=0.0, battery_per_s=0.0)
 WALKING = RobotSpec(radius=0.35, speed=0.5, turn_rate=math.radians(45), acceleration=0.5)

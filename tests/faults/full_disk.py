@@ -9,11 +9,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from bridge.commands.spawn import robot_process
-from bridge.robot.journal import open_journal
-from bridge.station.station import Station, connect
-from mission.document import Mission
-from mission.errors import AnswerIsNo
+from stopgo.bridge.commands.spawn import robot_process
+from stopgo.bridge.robot.journal import open_journal
+from stopgo.bridge.station.station import Station, connect
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo
 from tests.bridge.world import Field, corridor
 
 LAST_NET_S = 60.0

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from bridge.robot.journal import open_journal
-from mission.errors import InputError
+from stopgo.bridge.robot.journal import open_journal
+from stopgo.mission.errors import InputError
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
 

@@ -14,25 +14,25 @@ from pathlib import Path
 
 import pytest
 
-from bridge.link import keys as site_keys
-from bridge.link.clock import WallClock
-from bridge.link.keys import now_utc, read_keys
-from bridge.link.memory_link import Switchboard
-from bridge.link.protocol import KeyExpressions, Rejected
-from bridge.link.seals import KeySeals
-from bridge.robot import agent as agents
-from bridge.robot.agent import Agent
-from bridge.robot.bodies import pose_of
-from bridge.robot.controller import Controller
-from bridge.robot.inbox import Inbox
-from bridge.robot.journal import memory_journal
-from bridge.robot.simulator import SimulatedBase, SimulatedScanner
-from bridge.station.station import Station
-from mission.document import Mission
-from mission.errors import AnswerIsNo, InputError
-from mission.events import AnyEvent, Finished, PoseReport, Scanned, StateReport
-from mission.run.lease import lasting_ns
-from mission.run.orders import Answer, Verb
+from stopgo.bridge.link import keys as site_keys
+from stopgo.bridge.link.clock import WallClock
+from stopgo.bridge.link.keys import now_utc, read_keys
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.link.protocol import KeyExpressions, Rejected
+from stopgo.bridge.link.seals import KeySeals
+from stopgo.bridge.robot import agent as agents
+from stopgo.bridge.robot.agent import Agent
+from stopgo.bridge.robot.bodies import pose_of
+from stopgo.bridge.robot.controller import Controller
+from stopgo.bridge.robot.inbox import Inbox
+from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
+from stopgo.bridge.station.station import Station
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.events import AnyEvent, Finished, PoseReport, Scanned, StateReport
+from stopgo.mission.run.lease import lasting_ns
+from stopgo.mission.run.orders import Answer, Verb
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.robot.test_push import manifest_of
 from tests.bridge.world import Field, corridor

@@ -14,12 +14,12 @@ from typing import TypeVar
 
 import pytest
 
-from bridge.link.link import Request
-from bridge.link.protocol import encode
-from mission.document import Mission
-from mission.events import Event, Finished, Scanned, Started
-from mission.run.orders import Answer, Order, Verb
-from mission.run.states import Run
+from stopgo.bridge.link.link import Request
+from stopgo.bridge.link.protocol import encode
+from stopgo.mission.document import Mission
+from stopgo.mission.events import Event, Finished, Scanned, Started
+from stopgo.mission.run.orders import Answer, Order, Verb
+from stopgo.mission.run.states import Run
 from tests.bridge.robot.test_push import manifest_of
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size

@@ -9,8 +9,8 @@ import msgspec
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bridge.link.protocol import Malformed, Reply, encode
-from mission.run.orders import Order
+from stopgo.bridge.link.protocol import Malformed, Reply, encode
+from stopgo.mission.run.orders import Order
 from tests.bridge.robot.test_push import manifest_of
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size

@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.simulated.vehicle_scanner import ScanEnd, VehicleScanner
-from bridge.station.station import Station
-from mission.document import Mission
-from mission.errors import AnswerIsNo
-from mission.events import Pose, PoseReport, Scanned, StateReport
-from mission.run.way import foot
+from stopgo.bridge.mavlink.simulated.vehicle_scanner import ScanEnd, VehicleScanner
+from stopgo.bridge.station.station import Station
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.events import Pose, PoseReport, Scanned, StateReport
+from stopgo.mission.run.way import foot
 from tests.bridge.mavlink.driving.world import (
     Operator,
     Rover,

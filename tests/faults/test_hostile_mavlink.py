@@ -7,13 +7,13 @@ import socket
 
 import pytest
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import Wire, wire
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_process import vehicle_on
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.line.wire import Wire, wire
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.simulated.bench import ACCEPTED, ORIGIN, Bench, delay, waypoint
 from tests.faults.sizes import size

@@ -22,16 +22,16 @@ from typing import TypeVar
 
 import pytest
 
-from bridge.commands.spawn import end_robot, start_robot
-from bridge.link.authority import init_site, issue
-from bridge.link.keys import now_utc
-from bridge.link.protocol import encode
-from bridge.robot.journal import open_journal
-from bridge.station.station import Station, connect
-from mission.document import Mission, Scan
-from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
-from mission.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started
-from mission.run.orders import Order
+from stopgo.bridge.commands.spawn import end_robot, start_robot
+from stopgo.bridge.link.authority import init_site, issue
+from stopgo.bridge.link.keys import now_utc
+from stopgo.bridge.link.protocol import encode
+from stopgo.bridge.robot.journal import open_journal
+from stopgo.bridge.station.station import Station, connect
+from stopgo.mission.document import Mission, Scan
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started
+from stopgo.mission.run.orders import Order
 from tests.bridge.world import corridor
 from tests.faults.sizes import size
 from tests.ports import free_port
@@ -294,7 +294,7 @@ def test_a_killed_station_leaves_a_robot_that_the_next_one_commands(tmp_path: Pa
     large = tmp_path / "mission.json"
     large.write_bytes(encode(corridor(stops=4000)))
     with Supervisor(tmp_path / "state", []) as supervisor:
-        command = [sys.executable, "-m", "mission", "push", str(large), "--robot", "r1", "--as", "trial"]
+        command = [sys.executable, "-m", "stopgo", "push", str(large), "--robot", "r1", "--as", "trial"]
         push = subprocess.Popen([*command, "--connect", supervisor.endpoint], stdout=subprocess.DEVNULL)
         time.sleep(chance.uniform(0.2, 0.9))
         push.kill()

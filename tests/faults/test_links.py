@@ -11,12 +11,12 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.commands.spawn import end_robot, start_robot
-from bridge.link.protocol import KeyExpressions, encode
-from bridge.station.follow import Report
-from bridge.station.station import Station, connect
-from mission.errors import AnswerIsNo, OutcomeUnknown
-from mission.events import Finished, PoseReport, Scanned, StateReport
+from stopgo.bridge.commands.spawn import end_robot, start_robot
+from stopgo.bridge.link.protocol import KeyExpressions, encode
+from stopgo.bridge.station.follow import Report
+from stopgo.bridge.station.station import Station, connect
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.events import Finished, PoseReport, Scanned, StateReport
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor
 from tests.ports import free_port

@@ -16,15 +16,15 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.link.link import Request
-from bridge.link.memory_link import SealedMessage
-from bridge.link.protocol import encode
-from bridge.link.seals import OLDEST_S
-from bridge.station import station as stations
-from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
-from mission.events import Scanned, Started, StateReport
-from mission.run.decision import STATES
-from mission.run.orders import FREE_VERBS, Answer, Order, Verb
+from stopgo.bridge.link.link import Request
+from stopgo.bridge.link.memory_link import SealedMessage
+from stopgo.bridge.link.protocol import encode
+from stopgo.bridge.link.seals import OLDEST_S
+from stopgo.bridge.station import station as stations
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.events import Scanned, Started, StateReport
+from stopgo.mission.run.decision import STATES
+from stopgo.mission.run.orders import FREE_VERBS, Answer, Order, Verb
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import corridor
 from tests.faults.sizes import size

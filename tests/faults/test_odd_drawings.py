@@ -9,10 +9,10 @@ import ezdxf
 import pytest
 from ezdxf.document import Drawing
 
-from mission.errors import StopgoError
-from mission.settings import Settings
-from planner import plan
-from planner.floors.dxf import floor_in
+from stopgo.mission.errors import StopgoError
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.floors.dxf import floor_in
 from tests.faults.sizes import size
 
 LAYERS = ("FLOOR", "FLOOR", "ROOMS", "WALLS", "WALLS", "COLUMNS", "BEAMS", "STAIRS", "DOORS", "PASSAGES", "X")

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.document import Mission
-from mission.errors import AnswerIsNo
-from recordings.replay.fitting import fitted
-from recordings.replay.matching import Match, long_enough, matched
-from recordings.replay.standing import standings
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.recordings.replay.fitting import fitted
+from stopgo.recordings.replay.matching import Match, long_enough, matched
+from stopgo.recordings.replay.standing import standings
 from tests.faults.sizes import size
 from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from mission.comparing.compare import arriving
-from mission.comparison import StopComparison
-from mission.document import Stop
-from recordings.logs import read_log
-from recordings.replay.log_placing import Placing
-from recordings.replay.replayed import Replay
-from recordings.replay.replaying import replay
-from recordings.replay.way_and_time import way_of
+from stopgo.mission.comparing.compare import arriving
+from stopgo.mission.comparison import StopComparison
+from stopgo.mission.document import Stop
+from stopgo.recordings.logs import read_log
+from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.replay.replaying import replay
+from stopgo.recordings.replay.way_and_time import way_of
 from tests.faults.sizes import size
 from tests.recordings.replay.driving import wandering
 from tests.recordings.replay.witnessed import Witness, run_of, troubles_of

@@ -18,19 +18,19 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from mission.__main__ import main
-from mission.comparing.compare import arriving
-from mission.comparing.telling import HEADER, comparison_json, comparison_text
-from mission.document import Mission, Stop, sealed
-from mission.events import Held, RevisionTaken
-from mission.figures import percent
-from mission.geometry import frozen
-from mission.heard_run import HeardRun
-from mission.schedule import schedule
-from mission.sight import SeenFrom, Sight
-from mission.table import duration
-from recordings.carried import reading
-from recordings.plan import PlanRecording
+from stopgo.command_line import main
+from stopgo.mission.comparing.compare import arriving
+from stopgo.mission.comparing.telling import HEADER, comparison_json, comparison_text
+from stopgo.mission.document import Mission, Stop, sealed
+from stopgo.mission.events import Held, RevisionTaken
+from stopgo.mission.figures import percent
+from stopgo.mission.geometry import frozen
+from stopgo.mission.heard_run import HeardRun
+from stopgo.mission.schedule import schedule
+from stopgo.mission.sight import SeenFrom, Sight
+from stopgo.mission.table import duration
+from stopgo.recordings.carried import reading
+from stopgo.recordings.plan import PlanRecording
 from tests.faults.sizes import size
 from tests.mission.comparing.test_compare import planned
 from tests.recordings.replay.driving import wandering

@@ -14,12 +14,12 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.link.clock import SimulatedClock
-from bridge.robot.bodies import pose_of
-from bridge.robot.journal import Journal, open_journal
-from bridge.robot.program import clocks
-from bridge.robot.simulator import Fault, Faults
-from mission.events import Aborted, Finished, Scanned, Skipped, Started
+from stopgo.bridge.link.clock import SimulatedClock
+from stopgo.bridge.robot.bodies import pose_of
+from stopgo.bridge.robot.journal import Journal, open_journal
+from stopgo.bridge.robot.program import clocks
+from stopgo.bridge.robot.simulator import Fault, Faults
+from stopgo.mission.events import Aborted, Finished, Scanned, Skipped, Started
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
 

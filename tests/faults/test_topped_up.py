@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mission.__main__ import main
-from mission.document import Mission
-from mission.files.mission_json import read
-from planner.further import as_driven, planned_floor
+from stopgo.command_line import main
+from stopgo.mission.document import Mission
+from stopgo.mission.files.mission_json import read
+from stopgo.planner.further import as_driven, planned_floor
 from tests.planner.test_command import drawn
 from tests.recordings.replay.witnessed import Troubles, Witness, run_of
 

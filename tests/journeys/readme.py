@@ -45,7 +45,7 @@ def arguments(command: str, endpoint: str) -> list[str]:
     """The command with this interpreter's stopgo, and another endpoint than the README's."""
     words = [endpoint if word == ENDPOINT else word for word in shlex.split(command)]
     assert words[0] == "stopgo", command
-    return [sys.executable, "-m", "mission", *words[1:]]
+    return [sys.executable, "-m", "stopgo", *words[1:]]
 
 
 def run(command: str, folder: Path, endpoint: str = ENDPOINT) -> subprocess.CompletedProcess[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mission.__main__ import EXTRAS
+from stopgo.command_line import EXTRAS
 from tests.journeys.readme import ROOT
 
 WITHOUT_EXTRAS = f"""
@@ -35,7 +35,8 @@ def without_extras(code: str, *arguments: str) -> subprocess.CompletedProcess[st
 
 def test_the_nouns_and_the_bridge_import() -> None:
     done = without_extras(
-        "import mission, bridge, bridge.robot.program, bridge.station.station, mission.files.mission_json"
+        "import stopgo.mission, stopgo.bridge, stopgo.mission.files.mission_json\n"
+        "import stopgo.bridge.robot.program, stopgo.bridge.station.station"
     )
     assert done.returncode == 0, done.stderr
 
@@ -49,7 +50,7 @@ def test_the_nouns_and_the_bridge_import() -> None:
     ],
 )
 def test_a_command_names_the_extra_it_needs(arguments: tuple[str, ...], extra: str, tmp_path: Path) -> None:
-    front_door = "from mission.__main__ import main\nsys.exit(main(sys.argv[1:]))"
+    front_door = "from stopgo.command_line import main\nsys.exit(main(sys.argv[1:]))"
     output = ["-o", str(tmp_path)] if arguments[0] != "review" else []
     done = without_extras(front_door, *arguments, *output)
     assert done.returncode == 2
@@ -58,6 +59,6 @@ def test_a_command_names_the_extra_it_needs(arguments: tuple[str, ...], extra: s
 
 
 def test_every_command_has_its_help() -> None:
-    done = without_extras("from mission.__main__ import main\nsys.exit(main(['--help']))")
+    done = without_extras("from stopgo.command_line import main\nsys.exit(main(['--help']))")
     assert done.returncode == 0
     assert {"plan", "robot", "push", "watch"} <= set(done.stdout.split())

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from mission.__main__ import front_door, main
-from mission.files.mission_json import write
+from stopgo.command_line import front_door, main
+from stopgo.mission.files.mission_json import write
 from tests.mission.worlds import square_tour
 
 NOWHERE = "udpout:127.0.0.1:19"

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from mission.files import mission_json
-from recordings.read import check
+from stopgo.mission.files import mission_json
+from stopgo.recordings.read import check
 from tests.journeys.readme import PRINTED, blocks, commands, robot, run, with_output, workplace
 from tests.ports import free_port
 

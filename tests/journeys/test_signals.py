@@ -10,13 +10,13 @@ from collections.abc import Callable
 
 import pytest
 
-import mission.__main__ as front
+import stopgo.command_line as front
 from tests.journeys.readme import ROOT
 
 RUN = """
 import os, signal, sys
 from contextlib import contextmanager
-import mission.__main__ as front
+import stopgo.command_line as front
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background process inherits that it is ignored
 

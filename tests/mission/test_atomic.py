@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from mission.__main__ import main
-from mission.errors import InputError
-from mission.files import atomic
-from mission.files.atomic import replacing, write_atomic
+from stopgo.command_line import main
+from stopgo.mission.errors import InputError
+from stopgo.mission.files import atomic
+from stopgo.mission.files.atomic import replacing, write_atomic
 from tests.disk import small_disk
 
 

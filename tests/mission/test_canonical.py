@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mission.document import Mission, canonical, digest_of
-from mission.files.mission_json import parse
+from stopgo.mission.document import Mission, canonical, digest_of
+from stopgo.mission.files.mission_json import parse
 
-VECTORS: dict[str, Any] = json.loads(files("mission").joinpath("canonical.vectors.json").read_bytes())
+VECTORS: dict[str, Any] = json.loads(files("stopgo.mission").joinpath("canonical.vectors.json").read_bytes())
 SHORT = {8: "\\b", 9: "\\t", 10: "\\n", 12: "\\f", 13: "\\r", 34: '\\"', 92: "\\\\"}
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)

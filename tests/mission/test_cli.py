@@ -11,10 +11,10 @@ import ezdxf
 import msgspec
 import pytest
 
-from mission.__main__ import main
-from mission.document import Mission, Sees
-from mission.files.mission_json import write
-from mission.table import duration, table
+from stopgo.command_line import main
+from stopgo.mission.document import Mission, Sees
+from stopgo.mission.files.mission_json import write
+from stopgo.mission.table import duration, table
 from tests.mission.worlds import square_tour
 
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mission.files.coverage_json import coverage_json, write_coverage
-from mission.geometry import frozen
-from mission.seen import runs_of
+from stopgo.mission.files.coverage_json import coverage_json, write_coverage
+from stopgo.mission.geometry import frozen
+from stopgo.mission.seen import runs_of
 from tests.mission.worlds import room_floor, room_mission, room_route, room_targets
 
 

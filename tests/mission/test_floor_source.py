@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from mission.document import mission_id
-from mission.floor_source import FloorSource
-from mission.settings import Settings
+from stopgo.mission.document import mission_id
+from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.settings import Settings
 
 DIGEST = "0" * 64
 PLAIN = "8d85a27ce11cecad5f72b0c87779343a"

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from mission.document import SiteOrigin
-from mission.geodesy import (
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.geodesy import (
     RULES,
     STEPS_PER_DEGREE,
     Geodetic,

@@ -10,17 +10,19 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator, ValidationError
 
-from mission.files.mission_json import encode
-from mission.files.mission_schema import mission_schema
+from stopgo.mission.files.mission_json import encode
+from stopgo.mission.files.mission_schema import mission_schema
 from tests.mission.worlds import mission_of, square_tour
 
-SHIPPED = files("mission").joinpath("mission.schema.json").read_bytes()
+SHIPPED = files("stopgo.mission").joinpath("mission.schema.json").read_bytes()
 VALIDATOR = Draft202012Validator(json.loads(SHIPPED))
 DOCUMENT: dict[str, Any] = json.loads(encode(square_tour()))
 
 
 def test_the_shipped_schema_is_the_generated_one() -> None:
-    assert mission_schema() == SHIPPED, "python -m mission.files.mission_schema > mission/mission.schema.json"
+    assert mission_schema() == SHIPPED, (
+        "python -m stopgo.mission.files.mission_schema > mission/mission.schema.json"
+    )
 
 
 def test_the_schema_is_a_schema() -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from mission.document import Overlap, digest_of, sealed, stop_names
-from mission.files.mission_json import encode, parse
-from mission.network import Network, apart_in_words, network_lines, network_of, network_table
-from mission.problems import problems_of
+from stopgo.mission.document import Overlap, digest_of, sealed, stop_names
+from stopgo.mission.files.mission_json import encode, parse
+from stopgo.mission.network import Network, apart_in_words, network_lines, network_of, network_table
+from stopgo.mission.problems import problems_of
 from tests.mission.worlds import square_tour as a_mission
 
 

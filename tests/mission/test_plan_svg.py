@@ -13,15 +13,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mission.errors import InputError
-from mission.files.plan_panel import coordinate_ticks
-from mission.files.plan_svg import plan_svg
-from mission.files.room_labels import Busy, inside, room_labels, wrapped
-from mission.files.sheet import MARGIN, PAPERS, PaperBox, PaperSheet, SheetContents, fit
-from mission.files.svg import SMALLEST_TEXT, shortened, text_width
-from mission.floor import Room
-from mission.geometry import Polygon
-from mission.planning import Route
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.plan_panel import coordinate_ticks
+from stopgo.mission.files.plan_svg import plan_svg
+from stopgo.mission.files.room_labels import Busy, inside, room_labels, wrapped
+from stopgo.mission.files.sheet import MARGIN, PAPERS, PaperBox, PaperSheet, SheetContents, fit
+from stopgo.mission.files.svg import SMALLEST_TEXT, shortened, text_width
+from stopgo.mission.floor import Room
+from stopgo.mission.geometry import Polygon
+from stopgo.mission.planning import Route
 from tests.mission.worlds import box, mission_of, room_mission, room_route, stop
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from mission.ports import free_port
+from stopgo.mission.ports import free_port
 from tests import ports
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import msgspec
 import pytest
 
-from mission.document import Mission, SiteOrigin
-from mission.problems import problems_of
+from stopgo.mission.document import Mission, SiteOrigin
+from stopgo.mission.problems import problems_of
 from tests.mission.worlds import room_mission, square_tour, stop
 
 change = msgspec.structs.replace

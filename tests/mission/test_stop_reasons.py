@@ -7,9 +7,9 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from mission.geometry import frozen
-from mission.planning import Route, Visibility
-from mission.stop_reasons import StopReason, driven_coverage, stop_reasons
+from stopgo.mission.geometry import frozen
+from stopgo.mission.planning import Route, Visibility
+from stopgo.mission.stop_reasons import StopReason, driven_coverage, stop_reasons
 from tests.recordings import world
 
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from mission.document import (
+from stopgo.mission.document import (
     Frame,
     Mission,
     Origin,
@@ -20,11 +20,11 @@ from mission.document import (
     Stop,
     sealed,
 )
-from mission.floor import Element, FloorPlan, Opening, Room
-from mission.floor_source import FloorSource
-from mission.geometry import Polygon, frozen
-from mission.kinds import KINDS
-from mission.planning import (
+from stopgo.mission.floor import Element, FloorPlan, Opening, Room
+from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.geometry import Polygon, frozen
+from stopgo.mission.kinds import KINDS
+from stopgo.mission.planning import (
     Candidates,
     NavigableSpace,
     OpeningState,
@@ -34,7 +34,7 @@ from mission.planning import (
     Targets,
     Visibility,
 )
-from mission.settings import Settings
+from stopgo.mission.settings import Settings
 
 
 def stop(name: str, *approach: tuple[float, float], heading: float = 0.0, units: int = 10) -> Stop:

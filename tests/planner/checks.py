@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import shapely
 
-from mission.document import Mission, digest_of
-from mission.files.mission_json import encode, parse
-from mission.floor import FloorPlan
-from mission.geometry import Polygon
-from mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
-from mission.problems import problems_of
-from mission.settings import Settings
-from planner.routing.roadmap import ways_between
-from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
-from planner.space.targets import face_segments
+from stopgo.mission.document import Mission, digest_of
+from stopgo.mission.files.mission_json import encode, parse
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import Polygon
+from stopgo.mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
+from stopgo.mission.problems import problems_of
+from stopgo.mission.settings import Settings
+from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.shapes import GRID, local_origin, to_grid, whole_steps_of
+from stopgo.planner.space.targets import face_segments
 from tests.faults.sizes import FULL
 from tests.planner.oracle import visible_pairs
 

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mission.document import Mission
-from mission.errors import AnswerIsNo, InputError, StopgoError
-from mission.floor import Element, FloorPlan, Opening
-from mission.geometry import Polygon, frozen
-from mission.settings import Settings
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo, InputError, StopgoError
+from stopgo.mission.floor import Element, FloorPlan, Opening
+from stopgo.mission.geometry import Polygon, frozen
+from stopgo.mission.settings import Settings
 from tests.faults.sizes import size
 from tests.planner.checks import check_plan
 from tests.planner.worlds import (

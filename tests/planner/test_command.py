@@ -12,11 +12,11 @@ from pathlib import Path
 import ezdxf
 import pytest
 
-from mission.__main__ import main
-from mission.files.mission_json import read
-from mission.files.plan_toml import read_settings
-from mission.settings import Settings
-from planner.cli import plan_files
+from stopgo.command_line import main
+from stopgo.mission.files.mission_json import read
+from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.settings import Settings
+from stopgo.planner.cli import plan_files
 from tests.disk import small_disk
 from tests.planner.worlds import FLOORS, SHARED
 
@@ -539,7 +539,7 @@ def test_a_full_disk_is_2_and_changes_nothing(
 
 
 @pytest.mark.parametrize("fault", [RuntimeError, KeyboardInterrupt])
-@pytest.mark.parametrize("stage", ["planner.routing.route", "mission.files.plan_svg.plan_svg"])
+@pytest.mark.parametrize("stage", ["stopgo.planner.routing.route", "stopgo.mission.files.plan_svg.plan_svg"])
 def test_a_plan_that_ends_in_the_middle_changes_nothing(
     floor: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: type[BaseException], stage: str
 ) -> None:
@@ -561,15 +561,15 @@ def test_a_plan_that_ends_in_the_middle_changes_nothing(
 
 INTERRUPTED = """
 import os, signal, sys
-import planner.assemble
-from mission.__main__ import main
+import stopgo.planner.assemble
+from stopgo.command_line import main
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background process inherits that it is ignored
 
 def interrupt(*_, **__):
     os.kill(os.getpid(), signal.SIGINT)
 
-planner.assemble.assemble = interrupt
+stopgo.planner.assemble.assemble = interrupt
 sys.exit(main(sys.argv[1:]))
 """
 
@@ -591,7 +591,7 @@ SAMPLE = Path(__file__).parents[2] / "recordings" / "samples" / "office.dxf"
 def test_a_plan_is_made_where_recordings_are_not_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name in [name for name in sys.modules if name.partition(".")[0] in ("rerun", "recordings")]:
+    for name in [name for name in sys.modules if f"{name}.".startswith(("rerun.", "stopgo.recordings."))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "rerun", None)
     assert main(["plan", str(SAMPLE), "-o", str(tmp_path)]) == 0

@@ -11,14 +11,14 @@ from pickle import UnpicklingError
 
 import pytest
 
-from planner.compiling import anew_if_not_kept
+from stopgo.planner.compiling import anew_if_not_kept
 
 ROOT = Path(__file__).parents[2]
 NO_FILE_GROWS = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
 CALL = """
-import planner.compiling, planner.sight.kernel as kernel
-tell = planner.compiling.compiled(kernel.within_reach)
-print(planner.compiling.__file__, tell(3, 4, 3, 4, 1, 2, 5), tell(3, 4, 3, 4, 1, 2, 4))
+import stopgo.planner.compiling, stopgo.planner.sight.kernel as kernel
+tell = stopgo.planner.compiling.compiled(kernel.within_reach)
+print(stopgo.planner.compiling.__file__, tell(3, 4, 3, 4, 1, 2, 5), tell(3, 4, 3, 4, 1, 2, 4))
 """
 
 
@@ -37,8 +37,8 @@ def called(folder: Path, code: str = CALL, **environment: str) -> None:
 
 
 def test_a_read_only_install_and_a_user_without_a_home(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "planner", tmp_path / "planner", ignore=shutil.ignore_patterns("__pycache__"))
-    (tmp_path / "planner" / "__pycache__").write_text("where nothing can be written")
+    shutil.copytree(ROOT / "stopgo", tmp_path / "stopgo", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "stopgo" / "planner" / "__pycache__").write_text("where nothing can be written")
     called(tmp_path, HOME="/dev/null", XDG_CACHE_HOME="/dev/null", NUMBA_CACHE_DIR="/dev/null/cache")
 
 

@@ -6,10 +6,10 @@ import gc
 import weakref
 from dataclasses import replace
 
-from mission.settings import Settings
-from planner.shapes import local_origin
-from planner.space.navigable import navigable
-from planner.space.reach import reach_of
+from stopgo.mission.settings import Settings
+from stopgo.planner.shapes import local_origin
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.space.reach import reach_of
 from tests.planner.worlds import two_rooms
 from tests.test_house import MODULES
 
@@ -32,6 +32,6 @@ def test_it_goes_with_the_noun() -> None:
 
 
 def test_no_module_keeps_nouns_alive() -> None:
-    nouns = [name for name in MODULES if name.partition(".")[0] != "bridge"]
+    nouns = [name for name in MODULES if not name.startswith("stopgo.bridge.")]
     keeping = [name for name in nouns if "lru_cache" in MODULES[name].read_text(encoding="utf-8")]
     assert not keeping

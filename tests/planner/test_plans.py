@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mission.document import Mission
-from mission.files.mission_json import encode
-from mission.floor import FloorPlan
-from mission.geometry import polyline_length
-from mission.planning import Candidates, NavigableSpace, Selection
-from mission.settings import Settings
-from planner import plan
-from planner.appraisal.unreached import unreached
-from planner.candidates import candidates
-from planner.floors import read_floor
-from planner.space.navigable import navigable
+from stopgo.mission.document import Mission
+from stopgo.mission.files.mission_json import encode
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import polyline_length
+from stopgo.mission.planning import Candidates, NavigableSpace, Selection
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.appraisal.unreached import unreached
+from stopgo.planner.candidates import candidates
+from stopgo.planner.floors import read_floor
+from stopgo.planner.space.navigable import navigable
 from tests.faults.sizes import FULL, some
 from tests.planner.checking.test_claims import counted
 from tests.planner.checks import check_plan, check_rooms_are_joined

@@ -12,12 +12,12 @@ import msgspec
 import pytest
 
 import stopgo
-from mission.__main__ import main
-from mission.errors import InputError
-from mission.files.plan_toml import read_settings, settings_toml
-from mission.scanners import SCANNERS, ScannerName
-from mission.settings import PARAMETERS, Settings, check_settings, told_of
-from mission.specs import robot_of
+from stopgo.command_line import main
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.plan_toml import read_settings, settings_toml
+from stopgo.mission.scanners import SCANNERS, ScannerName
+from stopgo.mission.settings import PARAMETERS, Settings, check_settings, told_of
+from stopgo.mission.specs import robot_of
 
 OTHER: dict[str, Any] = {
     "overlap": 0.25,

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mission.errors import AnswerIsNo
-from mission.floor import Element, FloorPlan
-from mission.geometry import Polygon
-from mission.planning import DROP_REASONS, KEPT, Candidates
-from mission.settings import Settings
-from planner.appraisal.unreached import unreached
-from planner.candidates import STRATEGIES, candidates
-from planner.candidates.place import Place
-from planner.routing.roadmap import ways_between
-from planner.space.navigable import navigable
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.floor import Element, FloorPlan
+from stopgo.mission.geometry import Polygon
+from stopgo.mission.planning import DROP_REASONS, KEPT, Candidates
+from stopgo.mission.settings import Settings
+from stopgo.planner.appraisal.unreached import unreached
+from stopgo.planner.candidates import STRATEGIES, candidates
+from stopgo.planner.candidates.place import Place
+from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import (
     box,
     column,

@@ -13,17 +13,17 @@ import numpy as np
 import shapely
 from ezdxf.math import Matrix44
 
-from mission.floor import FloorPlan
-from mission.geometry import BoolArray, FloatArray, frozen
-from mission.planning import KEPT, Candidates, NavigableSpace
-from mission.settings import Settings
-from planner.candidates import candidates
-from planner.floors.dxf import floor_in
-from planner.shapes import GRID, local_origin, to_grid, to_shape
-from planner.sight.sight import Scene, scene_of, sight
-from planner.space.connected import parts_of
-from planner.space.navigable import navigable
-from planner.visibility.exact_sight import open_space
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import BoolArray, FloatArray, frozen
+from stopgo.mission.planning import KEPT, Candidates, NavigableSpace
+from stopgo.mission.settings import Settings
+from stopgo.planner.candidates import candidates
+from stopgo.planner.floors.dxf import floor_in
+from stopgo.planner.shapes import GRID, local_origin, to_grid, to_shape
+from stopgo.planner.sight.sight import Scene, scene_of, sight
+from stopgo.planner.space.connected import parts_of
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.visibility.exact_sight import open_space
 
 POSITIONS = 24
 """Scan positions that look on every floor."""

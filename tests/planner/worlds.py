@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mission.document import Mission
-from mission.floor import Element, FloorPlan, Opening, Room
-from mission.floor_source import FloorSource
-from mission.geometry import FloatArray, Polygon, frozen
-from mission.kinds import KINDS
-from mission.settings import PARAMETERS, Settings
-from planner import plan
-from planner.floors import read_floor
+from stopgo.mission.document import Mission
+from stopgo.mission.floor import Element, FloorPlan, Opening, Room
+from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.geometry import FloatArray, Polygon, frozen
+from stopgo.mission.kinds import KINDS
+from stopgo.mission.settings import PARAMETERS, Settings
+from stopgo.planner import plan
+from stopgo.planner.floors import read_floor
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 """Real floors that are not part of the project; tests that use them skip where they are absent."""

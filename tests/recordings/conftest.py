@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from mission.document import Mission
-from mission.events import PoseReport, StateReport
-from recordings.carried import reading
-from recordings.field import FieldRecording
-from recordings.plan import PlanRecording
+from stopgo.mission.document import Mission
+from stopgo.mission.events import PoseReport, StateReport
+from stopgo.recordings.carried import reading
+from stopgo.recordings.field import FieldRecording
+from stopgo.recordings.plan import PlanRecording
 from tests.faults.sizes import FULL
 from tests.mission.comparing.test_compare import planned
 from tests.recordings import run, world

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import msgspec
 
-from mission.document import Mission
-from mission.events import (
+from stopgo.mission.document import Mission
+from stopgo.mission.events import (
     AnyEvent,
     Arrived,
     Event,
@@ -24,7 +24,7 @@ from mission.events import (
     StateReport,
     StopState,
 )
-from recordings.stages.drive import planned_drive
+from stopgo.recordings.stages.drive import planned_drive
 
 BEGAN_NS = 1_795_000_000_000_000_000
 RUN = "run-1"

@@ -6,16 +6,16 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from mission.plan import PartPlan
-from mission.planning import Selection
-from planner.appraisal.figures_of_route import figures_of
-from planner.report import PlanReport
-from recordings.carried.reading import read_recording
-from recordings.page import report_html
-from recordings.page.from_recordings import subject_of
-from recordings.plan import PlanRecording
-from recordings.read import check
-from recordings.review import reviewed
+from stopgo.mission.plan import PartPlan
+from stopgo.mission.planning import Selection
+from stopgo.planner.appraisal.figures_of_route import figures_of
+from stopgo.planner.report import PlanReport
+from stopgo.recordings.carried.reading import read_recording
+from stopgo.recordings.page import report_html
+from stopgo.recordings.page.from_recordings import subject_of
+from stopgo.recordings.plan import PlanRecording
+from stopgo.recordings.read import check
+from stopgo.recordings.review import reviewed
 from tests.mission.comparing.test_compare import planned
 from tests.recordings import world
 from tests.recordings.reading import cells, static

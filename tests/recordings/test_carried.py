@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from mission.document import Mission
-from mission.errors import InputError
-from mission.events import PoseReport, StateReport
-from mission.sight import Sight
-from recordings.canvas import Sheet, open_canvas
-from recordings.carried.reading import Recording, read_recording
-from recordings.carried.sight import carry_sight, sights_in
-from recordings.carried.values import Values
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import PoseReport, StateReport
+from stopgo.mission.sight import Sight
+from stopgo.recordings.canvas import Sheet, open_canvas
+from stopgo.recordings.carried.reading import Recording, read_recording
+from stopgo.recordings.carried.sight import carry_sight, sights_in
+from stopgo.recordings.carried.values import Values
 from tests.mission.comparing.test_compare import planned
 from tests.recordings import run, world
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mission.__main__ import main
-from mission.errors import InputError
-from mission.files.mission_json import write
-from recordings.clouds import CLOUD_READERS, clouds_in, levels
+from stopgo.command_line import main
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.mission_json import write
+from stopgo.recordings.clouds import CLOUD_READERS, clouds_in, levels
 from tests.recordings.replay.driving import wandering
 
 POINTS = np.array([(x, 2.0, z) for x in np.arange(0, 5, 0.05) for z in np.arange(0, 2.6, 0.1)])

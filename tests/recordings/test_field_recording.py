@@ -13,17 +13,17 @@ import msgspec
 import numpy as np
 import pytest
 
-from mission.__main__ import main
-from mission.document import Mission
-from mission.errors import InputError
-from mission.events import Pose, PoseReport, Scanned, StateReport
-from mission.run_log import Track
-from recordings import entities, pieces
-from recordings.compact import compact
-from recordings.field import FieldRecording
-from recordings.read import check
-from recordings.runs.report import run_report
-from recordings.runs.trail import Trail
+from stopgo.command_line import main
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import Pose, PoseReport, Scanned, StateReport
+from stopgo.mission.run_log import Track
+from stopgo.recordings import entities, pieces
+from stopgo.recordings.compact import compact
+from stopgo.recordings.field import FieldRecording
+from stopgo.recordings.read import check
+from stopgo.recordings.runs.report import run_report
+from stopgo.recordings.runs.trail import Trail
 from tests.disk import ROOMY, small_disk
 from tests.recordings import run, world
 from tests.recordings.conftest import tell, write_field, write_plan
@@ -326,7 +326,7 @@ def test_a_recording_that_was_cut_is_left_under_its_partial_name(tmp_path: Path,
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from recordings.field import FieldRecording
+from stopgo.recordings.field import FieldRecording
 from tests.recordings import run, world
 from tests.recordings.conftest import tell
 mission = world.nouns_at()[-1]

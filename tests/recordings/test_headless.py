@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from recordings import headless, palette
-from recordings.headless import has_vulkan
+from stopgo.recordings import headless, palette
+from stopgo.recordings.headless import has_vulkan
 from tests.called import stopgo
 from tests.recordings import world
 from tests.recordings.conftest import write_plan

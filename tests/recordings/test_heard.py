@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from bridge.commands.watch_commands import tell_compared
-from bridge.station.watch import hand_over
-from mission.document import Mission
-from mission.events import StateReport
-from mission.heard_run import HeardRun
-from mission.sight import Sight
-from recordings import entities
-from recordings.carried.reading import read_recording
-from recordings.field import FieldRecording
-from recordings.read import check
+from stopgo.bridge.commands.watch_commands import tell_compared
+from stopgo.bridge.station.watch import hand_over
+from stopgo.mission.document import Mission
+from stopgo.mission.events import StateReport
+from stopgo.mission.heard_run import HeardRun
+from stopgo.mission.sight import Sight
+from stopgo.recordings import entities
+from stopgo.recordings.carried.reading import read_recording
+from stopgo.recordings.field import FieldRecording
+from stopgo.recordings.read import check
 from tests.mission.comparing.test_compare import planned
 from tests.recordings import run
 

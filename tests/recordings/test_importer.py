@@ -12,11 +12,11 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 import stopgo
-from mission.document import Mission
-from mission.files.mission_json import write
-from recordings import entities
-from recordings.importer import NOT_OURS
-from recordings.read import MARK, Contents, check
+from stopgo.mission.document import Mission
+from stopgo.mission.files.mission_json import write
+from stopgo.recordings import entities
+from stopgo.recordings.importer import NOT_OURS
+from stopgo.recordings.read import MARK, Contents, check
 from tests.recordings import world
 
 ROOT = Path(__file__).parents[2]

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from mission.__main__ import main
-from mission.document import Mission
-from recordings import entities
-from recordings.carried.checking import problems_of
-from recordings.carried.reading import read_recording
+from stopgo.command_line import main
+from stopgo.mission.document import Mission
+from stopgo.recordings import entities
+from stopgo.recordings.carried.checking import problems_of
+from stopgo.recordings.carried.reading import read_recording
 from tests.recordings import run
 from tests.recordings.conftest import write_field
 from tests.recordings.test_views import assert_shown

@@ -6,9 +6,9 @@ from itertools import combinations
 
 import pytest
 
-from recordings import palette
-from recordings.layout import BACKGROUND
-from recordings.page import style
+from stopgo.recordings import palette
+from stopgo.recordings.layout import BACKGROUND
+from stopgo.recordings.page import style
 from tests.recordings.colours import EYES, contrast, distance
 
 APART = 15.0

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mission.geometry import frozen
-from mission.kinds import KINDS
-from mission.planning import DROP_REASONS
-from recordings import entities, palette
-from recordings.plan import PlanRecording
-from recordings.read import check
+from stopgo.mission.geometry import frozen
+from stopgo.mission.kinds import KINDS
+from stopgo.mission.planning import DROP_REASONS
+from stopgo.recordings import entities, palette
+from stopgo.recordings.plan import PlanRecording
+from stopgo.recordings.read import check
 from tests.recordings import world
 from tests.recordings.conftest import write_plan
 from tests.recordings.reading import cells, components, everything, on, static

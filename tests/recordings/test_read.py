@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 import rerun as rr
 
-from mission.errors import InputError
-from recordings import read_apart
-from recordings.carried import reading
-from recordings.carried.reading import read_each, read_recording
-from recordings.read import check
+from stopgo.mission.errors import InputError
+from stopgo.recordings import read_apart
+from stopgo.recordings.carried import reading
+from stopgo.recordings.carried.reading import read_each, read_recording
+from stopgo.recordings.read import check
 
 BROKEN = {
     "empty": lambda data: b"",

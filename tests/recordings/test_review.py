@@ -11,11 +11,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from mission.__main__ import main
-from mission.document import Mission, sealed
-from recordings.carried.checking import problems_of
-from recordings.carried.reading import read_recording
-from recordings.compact import VIEWER
+from stopgo.command_line import main
+from stopgo.mission.document import Mission, sealed
+from stopgo.recordings.carried.checking import problems_of
+from stopgo.recordings.carried.reading import read_recording
+from stopgo.recordings.compact import VIEWER
 from tests.recordings import run, world
 
 

@@ -10,16 +10,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from mission.__main__ import main
-from mission.comparing.compare import compare
-from mission.comparing.telling import comparison_table
-from mission.document import Mission, sealed
-from mission.events import AnyEvent, Arrived, PoseReport, StateReport
-from mission.heard_run import SOURCE
-from mission.run_log import RunLog
-from recordings import entities, palette
-from recordings.field import FieldRecording
-from recordings.read import check
+from stopgo.command_line import main
+from stopgo.mission.comparing.compare import compare
+from stopgo.mission.comparing.telling import comparison_table
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.events import AnyEvent, Arrived, PoseReport, StateReport
+from stopgo.mission.heard_run import SOURCE
+from stopgo.mission.run_log import RunLog
+from stopgo.recordings import entities, palette
+from stopgo.recordings.field import FieldRecording
+from stopgo.recordings.read import check
 from tests.recordings import run, world
 from tests.recordings.conftest import tell
 from tests.recordings.reading import cells, on, static

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from mission.__main__ import main
-from recordings import run_index
-from recordings.run_index import INDEX, index_of, index_text
+from stopgo.command_line import main
+from stopgo.recordings import run_index
+from stopgo.recordings.run_index import INDEX, index_of, index_text
 from tests.recordings import run, world
 
 

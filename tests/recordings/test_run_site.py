@@ -15,10 +15,10 @@ import msgspec
 import pytest
 from rerun.chunk import RrdReader
 
-from mission.__main__ import main
-from recordings.read import check
-from recordings.run_index import INDEX, VERSION, IndexedFile, IndexedPlan, RunIndex, stamp_of
-from recordings.run_site import RunSite, listening, name_of
+from stopgo.command_line import main
+from stopgo.recordings.read import check
+from stopgo.recordings.run_index import INDEX, VERSION, IndexedFile, IndexedPlan, RunIndex, stamp_of
+from stopgo.recordings.run_site import RunSite, listening, name_of
 from tests.ports import free_port
 from tests.recordings import run, world
 

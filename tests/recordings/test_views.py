@@ -14,12 +14,12 @@ import pytest
 from PIL import Image
 from rerun.experimental import View, ViewerClient
 
-from bridge.station.watch import hand_over
-from mission.document import Mission
-from recordings import palette
-from recordings.carried.reading import read_recording
-from recordings.field import FieldRecording
-from recordings.viewer import Viewed
+from stopgo.bridge.station.watch import hand_over
+from stopgo.mission.document import Mission
+from stopgo.recordings import palette
+from stopgo.recordings.carried.reading import read_recording
+from stopgo.recordings.field import FieldRecording
+from stopgo.recordings.viewer import Viewed
 from tests.recordings import run, world
 from tests.recordings.conftest import write_field, write_plan
 from tests.recordings.pictures import LIMIT, WRONG, difference, fields, kept

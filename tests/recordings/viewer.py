@@ -8,7 +8,15 @@ from typing import Any
 
 from rerun.experimental import View, ViewerClient
 
-from recordings.headless import PATIENCE_S, REDRAW_S, container, has_vulkan, outermost, view_name, viewer
+from stopgo.recordings.headless import (
+    PATIENCE_S,
+    REDRAW_S,
+    container,
+    has_vulkan,
+    outermost,
+    view_name,
+    viewer,
+)
 
 __all__ = ["PATIENCE_S", "has_vulkan", "look", "show_tab", "viewer"]
 

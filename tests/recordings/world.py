@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from mission.document import (
+from stopgo.mission.document import (
     Frame,
     Mission,
     Origin,
@@ -18,11 +18,11 @@ from mission.document import (
     Stop,
     sealed,
 )
-from mission.events import Pose
-from mission.floor import Element, Finding, FloorPlan, Opening, Room
-from mission.floor_source import FloorSource
-from mission.geometry import Polygon, frozen
-from mission.planning import (
+from stopgo.mission.events import Pose
+from stopgo.mission.floor import Element, Finding, FloorPlan, Opening, Room
+from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.geometry import Polygon, frozen
+from stopgo.mission.planning import (
     Candidates,
     NavigableSpace,
     OpeningState,
@@ -33,7 +33,7 @@ from mission.planning import (
     Targets,
     Visibility,
 )
-from mission.settings import Settings
+from stopgo.mission.settings import Settings
 
 MISSION_ID = "0123456789abcdef0123456789abcdef"
 FLOOR_DIGEST = "f" * 64

@@ -7,18 +7,18 @@ import uuid
 from contextlib import suppress
 from functools import partial
 
-from bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
-from bridge.mavlink.auto.logbook import Logbook, Ordered, PendingCommand
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.transfer.download import download
-from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
-from mission.events import Arrived
-from mission.mavlink.autopilots.kind import AUTO
-from mission.mavlink.enums import MessageId
-from mission.mavlink.following import steps as progress
-from mission.mavlink.following.listed_mission import ListedMission
-from mission.mavlink.following.observer import CLOCKS, Observer
-from mission.mavlink.following.steps import (
+from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
+from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered, PendingCommand
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.transfer.download import download
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.events import Arrived
+from stopgo.mission.mavlink.autopilots.kind import AUTO
+from stopgo.mission.mavlink.enums import MessageId
+from stopgo.mission.mavlink.following import steps as progress
+from stopgo.mission.mavlink.following.listed_mission import ListedMission
+from stopgo.mission.mavlink.following.observer import CLOCKS, Observer
+from stopgo.mission.mavlink.following.steps import (
     AT_STOP,
     COUNTS_NOT_YET,
     SOMEBODY,
@@ -28,10 +28,10 @@ from mission.mavlink.following.steps import (
     steps,
     tried_again,
 )
-from mission.mavlink.read_back import differences
-from mission.mavlink.telemetry import began_again
-from mission.run import states as runs
-from mission.run.states import Change, Run
+from stopgo.mission.mavlink.read_back import differences
+from stopgo.mission.mavlink.telemetry import began_again
+from stopgo.mission.run import states as runs
+from stopgo.mission.run.states import Change, Run
 
 SETTLED_NS = 1_500_000_000
 """A heartbeat this soon after a change may have been sent before it."""

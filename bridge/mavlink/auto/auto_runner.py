@@ -8,23 +8,23 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from bridge.link.clock import Clock
-from bridge.link.memory_link import Switchboard
-from bridge.mavlink.auto.auto_follower import AutoFollower
-from bridge.mavlink.auto.confirmed_commands import ConfirmedCommands
-from bridge.mavlink.auto.logbook import Logbook
-from bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.wire import MessageQueue
-from bridge.robot.runner import Position
-from mission.document import Mission
-from mission.errors import RobotUnreachable
-from mission.mavlink.enums import MessageId
-from mission.mavlink.following.observer import TOLD, Observer
-from mission.mavlink.following.steps import held_by_vehicle
-from mission.mavlink.telemetry import Message, is_lost
-from mission.run.orders import Answer, Order
-from mission.run.states import Run
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
+from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands
+from stopgo.bridge.mavlink.auto.logbook import Logbook
+from stopgo.bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.line.wire import MessageQueue
+from stopgo.bridge.robot.runner import Position
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import RobotUnreachable
+from stopgo.mission.mavlink.enums import MessageId
+from stopgo.mission.mavlink.following.observer import TOLD, Observer
+from stopgo.mission.mavlink.following.steps import held_by_vehicle
+from stopgo.mission.mavlink.telemetry import Message, is_lost
+from stopgo.mission.run.orders import Answer, Order
+from stopgo.mission.run.states import Run
 
 TICK_S = 0.2
 ASK_AGAIN_S = 2.0

@@ -6,15 +6,15 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from bridge.link.clock import Clock
-from bridge.mavlink.line.messages import interval, set_current
-from bridge.mavlink.line.peer import Ack, Peer
-from mission.errors import OutcomeUnknown
-from mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
-from mission.mavlink.enums import CommandResult, MessageId
-from mission.mavlink.following.observer import Observer
-from mission.mavlink.items import Command
-from mission.run.orders import Refused
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.mavlink.line.messages import interval, set_current
+from stopgo.bridge.mavlink.line.peer import Ack, Peer
+from stopgo.mission.errors import OutcomeUnknown
+from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, Mode
+from stopgo.mission.mavlink.enums import CommandResult, MessageId
+from stopgo.mission.mavlink.following.observer import Observer
+from stopgo.mission.mavlink.items import Command
+from stopgo.mission.run.orders import Refused
 
 SHOWS_S = 5.0
 """A vehicle beats every second; so long it may take until it shows what it was told."""

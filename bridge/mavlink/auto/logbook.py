@@ -19,17 +19,17 @@ from typing import Literal
 
 import msgspec
 
-from bridge.link.clock import Clock, WallClock
-from bridge.link.protocol import CHUNK_BYTES, Manifest
-from bridge.mavlink.line.url import Url
-from bridge.robot.journal import Journal, shared_journal
-from mission.document import Mission
-from mission.events import Aborted
-from mission.mavlink.following.listed_mission import ListedMission, listed_mission
-from mission.mavlink.items import ItemList
-from mission.mavlink.telemetry import BACK_MS
-from mission.run import states as runs
-from mission.run.states import Change, Run
+from stopgo.bridge.link.clock import Clock, WallClock
+from stopgo.bridge.link.protocol import CHUNK_BYTES, Manifest
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.robot.journal import Journal, shared_journal
+from stopgo.mission.document import Mission
+from stopgo.mission.events import Aborted
+from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
+from stopgo.mission.mavlink.items import ItemList
+from stopgo.mission.mavlink.telemetry import BACK_MS
+from stopgo.mission.run import states as runs
+from stopgo.mission.run.states import Change, Run
 
 REBOOT_NS = 5 * 10**9
 """A vehicle whose clock began so much later than it was known to was started anew."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from bridge.mavlink.auto.logbook import Logbook
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.url import Url
-from mission.errors import AnswerIsNo
-from mission.tolerance import told_outside
+from stopgo.bridge.mavlink.auto.logbook import Logbook
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.tolerance import told_outside
 
 
 def check_run_over(peer: Peer, url: Url, book: Logbook, what: str) -> None:

@@ -12,26 +12,26 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from bridge.link.clock import Clock
-from bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
-from bridge.mavlink.auto.logbook import Logbook, Ordered
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.transfer.download import download
-from bridge.robot.answers import answer_to, answered, remember_answer, situation_of
-from mission.events import Pose
-from mission.mavlink.autopilots.kind import AUTO, HOLD, why_no_rover
-from mission.mavlink.following import steps as progress
-from mission.mavlink.following.listed_mission import ListedMission
-from mission.mavlink.following.observer import Observer
-from mission.mavlink.following.resuming import ON_WAY_M, resume_place, way
-from mission.mavlink.following.steps import Observation
-from mission.mavlink.local_frame import apart
-from mission.mavlink.read_back import differences
-from mission.run import states as runs
-from mission.run.decision import Decision, decide, handed_over
-from mission.run.lease import Lease
-from mission.run.orders import DRIVING, FREE_VERBS, Answer, Order, Refused
-from mission.run.states import Change, Run
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Denied
+from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.transfer.download import download
+from stopgo.bridge.robot.answers import answer_to, answered, remember_answer, situation_of
+from stopgo.mission.events import Pose
+from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, why_no_rover
+from stopgo.mission.mavlink.following import steps as progress
+from stopgo.mission.mavlink.following.listed_mission import ListedMission
+from stopgo.mission.mavlink.following.observer import Observer
+from stopgo.mission.mavlink.following.resuming import ON_WAY_M, resume_place, way
+from stopgo.mission.mavlink.following.steps import Observation
+from stopgo.mission.mavlink.local_frame import apart
+from stopgo.mission.mavlink.read_back import differences
+from stopgo.mission.run import states as runs
+from stopgo.mission.run.decision import Decision, decide, handed_over
+from stopgo.mission.run.lease import Lease
+from stopgo.mission.run.orders import DRIVING, FREE_VERBS, Answer, Order, Refused
+from stopgo.mission.run.states import Change, Run
 
 ORDERING_NS = 20 * 10**9
 """One step of an order takes no longer; then what the vehicle does counts as somebody else's again."""

@@ -12,17 +12,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bridge.link.clock import WallClock
-from bridge.link.memory_link import Switchboard
-from bridge.link.protocol import KeyExpressions
-from bridge.mavlink.auto.auto_runner import AutoRunner
-from bridge.mavlink.auto.logbook import logbook
-from bridge.mavlink.auto.vehicle_orders import Consent
-from bridge.mavlink.line.peer import found
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import GROUND_STATION, Who, wire
-from bridge.robot.agent import Agent, on_link
-from bridge.station.station import Station, whoami
+from stopgo.bridge.link.clock import WallClock
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.mavlink.auto.auto_runner import AutoRunner
+from stopgo.bridge.mavlink.auto.logbook import logbook
+from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
+from stopgo.bridge.mavlink.line.peer import found
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.line.wire import GROUND_STATION, Who, wire
+from stopgo.bridge.robot.agent import Agent, on_link
+from stopgo.bridge.station.station import Station, whoami
 
 COMPONENTS = range(25, 100)
 """Free for users (MAV_COMP_ID_USER1 to 75): by them a vehicle tells processes of one station apart."""

@@ -7,13 +7,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridge.link.clock import Clock
-from bridge.mavlink.driving.mavlink_base import MavlinkBase
-from bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, ScanTrigger
-from bridge.mavlink.driving.onboard_autopilot import on_board
-from bridge.mavlink.line.wire import read_line
-from bridge.robot.bodies import Body
-from mission.document import Mission
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.mavlink.driving.mavlink_base import MavlinkBase
+from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, ScanTrigger
+from stopgo.bridge.mavlink.driving.onboard_autopilot import on_board
+from stopgo.bridge.mavlink.line.wire import read_line
+from stopgo.bridge.robot.bodies import Body
+from stopgo.mission.document import Mission
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """A scanner that a MAVLink vehicle triggers: ordered as a camera or by a script, believed only with its file.
 
-A scan is confirmed by CAMERA_IMAGE_CAPTURED (`mission.mavlink.captures`). What comes with a number that was
-told before is an older scan's, told again.
+A scan is confirmed by CAMERA_IMAGE_CAPTURED (`stopgo.mission.mavlink.captures`). What comes with a number
+that was told before is an older scan's, told again.
 """
 
 from __future__ import annotations
@@ -9,20 +9,20 @@ from __future__ import annotations
 from threading import Event
 from typing import Literal
 
-from bridge.link.clock import Clock
-from bridge.mavlink.driving.onboard_autopilot import OnboardAutopilot
-from bridge.mavlink.line.messages import request
-from bridge.mavlink.line.wire import MessageQueue
-from mission.document import Mission, Scan
-from mission.errors import OutcomeUnknown, RobotUnreachable
-from mission.files.file_name import file_name
-from mission.mavlink.captures import Picture, picture_of, result_of
-from mission.mavlink.enums import CommandResult, MessageId
-from mission.mavlink.items import Command
-from mission.mavlink.stop_numbers import numbers_of
-from mission.mavlink.telemetry import Message
-from mission.mavlink.writing import SCAN_MESSAGE
-from mission.run.scans import ScanFailed, ScanResult
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.mavlink.driving.onboard_autopilot import OnboardAutopilot
+from stopgo.bridge.mavlink.line.messages import request
+from stopgo.bridge.mavlink.line.wire import MessageQueue
+from stopgo.mission.document import Mission, Scan
+from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
+from stopgo.mission.files.file_name import file_name
+from stopgo.mission.mavlink.captures import Picture, picture_of, result_of
+from stopgo.mission.mavlink.enums import CommandResult, MessageId
+from stopgo.mission.mavlink.items import Command
+from stopgo.mission.mavlink.stop_numbers import numbers_of
+from stopgo.mission.mavlink.telemetry import Message
+from stopgo.mission.mavlink.writing import SCAN_MESSAGE
+from stopgo.mission.run.scans import ScanFailed, ScanResult
 
 TriggerCommand = tuple[int, tuple[float, ...]]
 """A command and its params."""

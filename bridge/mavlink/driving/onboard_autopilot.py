@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from bridge.mavlink.line.messages import (
+from stopgo.bridge.mavlink.line.messages import (
     aim_at,
     aim_yaw,
     command_long,
@@ -23,18 +23,18 @@ from bridge.mavlink.line.messages import (
     on_board_beat,
     set_origin,
 )
-from bridge.mavlink.line.parameter_reading import read_parameters
-from bridge.mavlink.line.peer import Peer, found
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import MessageQueue, Who, wire
-from mission.document import Point
-from mission.errors import InputError, OutcomeUnknown, RobotUnreachable
-from mission.mavlink.autopilots import AUTOPILOTS
-from mission.mavlink.autopilots.kind import Mode, why_no_rover
-from mission.mavlink.enums import Component, MessageId
-from mission.mavlink.items import Command
-from mission.mavlink.local_frame import VehicleOrigin
-from mission.mavlink.telemetry import (
+from stopgo.bridge.mavlink.line.parameter_reading import read_parameters
+from stopgo.bridge.mavlink.line.peer import Peer, found
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.line.wire import MessageQueue, Who, wire
+from stopgo.mission.document import Point
+from stopgo.mission.errors import InputError, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.mavlink.autopilots import AUTOPILOTS
+from stopgo.mission.mavlink.autopilots.kind import Mode, why_no_rover
+from stopgo.mission.mavlink.enums import Component, MessageId
+from stopgo.mission.mavlink.items import Command
+from stopgo.mission.mavlink.local_frame import VehicleOrigin
+from stopgo.mission.mavlink.telemetry import (
     Message,
     charge_of,
     complains,

@@ -11,8 +11,8 @@ from typing import Any
 os.environ.setdefault("MAVLINK20", "1")
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from bridge.mavlink.line.transport import Address
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.transport import Address
+from stopgo.mission.mavlink.telemetry import Message
 
 MAX_SENDERS = 64
 UNREADABLE = "unreadable"

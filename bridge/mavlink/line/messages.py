@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.wire import Who
-from mission.document import Point
-from mission.geodesy import to_steps
-from mission.mavlink.enums import Firmware, VehicleType
-from mission.mavlink.items import Command, Item
-from mission.mavlink.local_frame import VehicleOrigin
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.wire import Who
+from stopgo.mission.document import Point
+from stopgo.mission.geodesy import to_steps
+from stopgo.mission.mavlink.enums import Firmware, VehicleType
+from stopgo.mission.mavlink.items import Command, Item
+from stopgo.mission.mavlink.local_frame import VehicleOrigin
+from stopgo.mission.mavlink.telemetry import Message
 
 MISSION = dialect.MAV_MISSION_TYPE_MISSION
 """Not the fence and not the rally points, which go by the same protocol."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from bridge.mavlink.line.peer import Peer
-from mission.document import SiteOrigin
-from mission.errors import AnswerIsNo
-from mission.mavlink.local_frame import VehicleOrigin, how_far_off
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.mavlink.local_frame import VehicleOrigin, how_far_off
 
 
 def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> VehicleOrigin:

@@ -6,9 +6,9 @@ import struct
 import time
 from collections.abc import Collection
 
-from bridge.mavlink.line.messages import parameter_request
-from bridge.mavlink.line.peer import Peer
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.messages import parameter_request
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.mission.mavlink.telemetry import Message
 
 ROUNDS = 4
 ROUND_S = 0.7

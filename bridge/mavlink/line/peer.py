@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 
-from bridge.mavlink.line.messages import (
+from stopgo.bridge.mavlink.line.messages import (
     command_int,
     command_long,
     enum_name,
@@ -24,16 +24,16 @@ from bridge.mavlink.line.messages import (
     set_origin,
     station_beat,
 )
-from bridge.mavlink.line.round_trips import RoundTrips
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, sender, wire
-from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
-from mission.mavlink.autopilots import autopilot_of
-from mission.mavlink.autopilots.kind import Autopilot
-from mission.mavlink.enums import CommandResult, Component, Firmware, MessageId, ModeFlag, VehicleType
-from mission.mavlink.items import Command, MavFrame
-from mission.mavlink.local_frame import VehicleOrigin
-from mission.mavlink.telemetry import Message, began_again, origin_of, place_of
+from stopgo.bridge.mavlink.line.round_trips import RoundTrips
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, sender, wire
+from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.mavlink.autopilots import autopilot_of
+from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.enums import CommandResult, Component, Firmware, MessageId, ModeFlag, VehicleType
+from stopgo.mission.mavlink.items import Command, MavFrame
+from stopgo.mission.mavlink.local_frame import VehicleOrigin
+from stopgo.mission.mavlink.telemetry import Message, began_again, origin_of, place_of
 
 PATIENCE_S = 5.0
 """Silence after which a vehicle is given up."""

@@ -17,8 +17,8 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from bridge.mavlink.line.url import Url, UrlKind
-from mission.errors import InputError, RobotUnreachable
+from stopgo.bridge.mavlink.line.url import Url, UrlKind
+from stopgo.mission.errors import InputError, RobotUnreachable
 
 Address = Any
 """Whoever sent something: an IP address and port, or a serial line; hashable."""

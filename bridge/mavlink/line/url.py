@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from mission.errors import InputError
+from stopgo.mission.errors import InputError
 
 UrlKind = Literal["udpin", "udpout", "tcp", "tcpin", "serial"]
 KINDS: tuple[UrlKind, ...] = ("udpin", "udpout", "tcp", "tcpin", "serial")
@@ -35,7 +35,7 @@ class Url:
     @property
     def stays_here(self) -> bool:
         """Whether nothing leaves this machine by way of a network."""
-        from bridge.link.zenoh_link import is_loopback
+        from stopgo.bridge.link.zenoh_link import is_loopback
 
         return self.kind == "serial" or is_loopback(self.host)
 

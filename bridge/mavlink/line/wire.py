@@ -19,13 +19,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from bridge.console import say
-from bridge.mavlink.line.frames import UNREADABLE, Frames, dialect
-from bridge.mavlink.line.transport import Address, Transport, open_transport
-from bridge.mavlink.line.url import Url, check_guarded, read_url
-from mission.errors import InputError
-from mission.mavlink.enums import Component, MessageId
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.console import say
+from stopgo.bridge.mavlink.line.frames import UNREADABLE, Frames, dialect
+from stopgo.bridge.mavlink.line.transport import Address, Transport, open_transport
+from stopgo.bridge.mavlink.line.url import Url, check_guarded, read_url
+from stopgo.mission.errors import InputError
+from stopgo.mission.mavlink.enums import Component, MessageId
+from stopgo.mission.mavlink.telemetry import Message
 
 QUEUE_SIZE = 10_000
 READ_S = 0.1

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bridge.mavlink.simulated.replies import picture
-from bridge.mavlink.simulated.rover import Rover
-from bridge.mavlink.simulated.vehicle_faults import Mishaps
-from bridge.mavlink.simulated.vehicle_scanner import ScanEnd, VehicleScanner
-from bridge.mavlink.simulated.vehicle_store import Store
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.simulated.replies import picture
+from stopgo.bridge.mavlink.simulated.rover import Rover
+from stopgo.bridge.mavlink.simulated.vehicle_faults import Mishaps
+from stopgo.bridge.mavlink.simulated.vehicle_scanner import ScanEnd, VehicleScanner
+from stopgo.bridge.mavlink.simulated.vehicle_store import Store
+from stopgo.mission.mavlink.telemetry import Message
 
 
 class Camera:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from bridge.mavlink.simulated.tuning import Tuning
-from mission.document import Point
-from mission.events import Pose
+from stopgo.bridge.mavlink.simulated.tuning import Tuning
+from stopgo.mission.document import Point
+from stopgo.mission.events import Pose
 
 COASTS_M_S = 0.01
 """Slower than this, wheels that stick stand."""

@@ -6,18 +6,18 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bridge.mavlink.line.wire import Who
-from bridge.mavlink.simulated import replies
-from bridge.mavlink.simulated import vehicle_telemetry as telemetry
-from bridge.mavlink.simulated.rover import FAR_M
-from bridge.mavlink.simulated.steering import Course
-from bridge.mavlink.simulated.vehicle import Handlers, Vehicle
-from mission.document import SiteOrigin
-from mission.geodesy import STEPS_PER_DEGREE
-from mission.mavlink.autopilots.kind import Mode, ModeName
-from mission.mavlink.enums import CommandResult, MessageId, ModeFlag
-from mission.mavlink.items import Command, MavFrame
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.wire import Who
+from stopgo.bridge.mavlink.simulated import replies
+from stopgo.bridge.mavlink.simulated import vehicle_telemetry as telemetry
+from stopgo.bridge.mavlink.simulated.rover import FAR_M
+from stopgo.bridge.mavlink.simulated.steering import Course
+from stopgo.bridge.mavlink.simulated.vehicle import Handlers, Vehicle
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.mavlink.autopilots.kind import Mode, ModeName
+from stopgo.mission.mavlink.enums import CommandResult, MessageId, ModeFlag
+from stopgo.mission.mavlink.items import Command, MavFrame
+from stopgo.mission.mavlink.telemetry import Message
 
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 REJECTED, UNSUPPORTED = CommandResult.TEMPORARILY_REJECTED, CommandResult.UNSUPPORTED

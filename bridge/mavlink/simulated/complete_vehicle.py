@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bridge.link.clock import Clock
-from bridge.mavlink.simulated.command_handlers import handlers
-from bridge.mavlink.simulated.vehicle import Setting, Vehicle
-from bridge.mavlink.simulated.vehicle_telemetry import MAKERS
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.mavlink.simulated.command_handlers import handlers
+from stopgo.bridge.mavlink.simulated.vehicle import Setting, Vehicle
+from stopgo.bridge.mavlink.simulated.vehicle_telemetry import MAKERS
+from stopgo.mission.mavlink.telemetry import Message
 
 
 def complete_vehicle(

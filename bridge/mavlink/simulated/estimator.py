@@ -6,9 +6,9 @@ import math
 import random
 from dataclasses import dataclass
 
-from bridge.mavlink.simulated.chassis import Chassis
-from bridge.mavlink.simulated.tuning import Tuning
-from mission.events import Pose
+from stopgo.bridge.mavlink.simulated.chassis import Chassis
+from stopgo.bridge.mavlink.simulated.tuning import Tuning
+from stopgo.mission.events import Pose
 
 WANDERS_S = 20.0
 """How long an estimate's error stays about the same."""

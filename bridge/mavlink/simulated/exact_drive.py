@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from bridge.mavlink.simulated.estimator import Estimate
-from bridge.mavlink.simulated.steering import Course
-from bridge.robot.motion import Brake, Motion, along
-from mission.document import Point, RobotSpec
-from mission.events import Pose
+from stopgo.bridge.mavlink.simulated.estimator import Estimate
+from stopgo.bridge.mavlink.simulated.steering import Course
+from stopgo.bridge.robot.motion import Brake, Motion, along
+from stopgo.mission.document import Point, RobotSpec
+from stopgo.mission.events import Pose
 
 LIMITS = RobotSpec(radius=0.35, speed=0.5, turn_rate=1.0, acceleration=0.5)
 

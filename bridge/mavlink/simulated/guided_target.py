@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bridge.link.clock import Clock
-from bridge.mavlink.simulated.rover import Rover
-from bridge.mavlink.simulated.steering import Course
-from mission.document import Point
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.mavlink.simulated.rover import Rover
+from stopgo.bridge.mavlink.simulated.steering import Course
+from stopgo.mission.document import Point
 
 LONG_AGO_NS = 10**18
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from bridge.mavlink.simulated.vehicle_store import FENCE, MISSION
-from mission.geodesy import STEPS_PER_DEGREE
-from mission.mavlink.autopilots.kind import Autopilot
-from mission.mavlink.enums import MissionResult
-from mission.mavlink.fields import PLACED
-from mission.mavlink.items import Item, MavFrame
+from stopgo.bridge.mavlink.simulated.vehicle_store import FENCE, MISSION
+from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.enums import MissionResult
+from stopgo.mission.mavlink.fields import PLACED
+from stopgo.mission.mavlink.items import Item, MavFrame
 
 ACCEPTED = MissionResult.ACCEPTED
 FENCE_COMMANDS = range(5000, 5005)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bridge.mavlink.line.wire import Who
-from bridge.mavlink.simulated import replies
-from bridge.mavlink.simulated.tuning import Tuning
-from bridge.mavlink.simulated.vehicle_scanner import DEFAULT_S, LONGEST_S
-from mission.mavlink.autopilots.kind import Habits
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.wire import Who
+from stopgo.bridge.mavlink.simulated import replies
+from stopgo.bridge.mavlink.simulated.tuning import Tuning
+from stopgo.bridge.mavlink.simulated.vehicle_scanner import DEFAULT_S, LONGEST_S
+from stopgo.mission.mavlink.autopilots.kind import Habits
+from stopgo.mission.mavlink.telemetry import Message
 
 SCAN_TIME = "SIM_SCAN_TIME"
 """Seconds that a scan takes if its trigger does not say."""

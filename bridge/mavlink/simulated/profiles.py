@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mission.errors import InputError
-from mission.mavlink.autopilots import AUTOPILOTS
-from mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.errors import InputError
+from stopgo.mission.mavlink.autopilots import AUTOPILOTS
+from stopgo.mission.mavlink.autopilots.kind import Autopilot
 
 PROFILES: dict[str, Autopilot] = {
     "strict": AUTOPILOTS["generic"],

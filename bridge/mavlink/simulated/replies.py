@@ -6,13 +6,13 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.messages import item_of
-from bridge.mavlink.line.wire import Who
-from mission.geodesy import STEPS_PER_DEGREE
-from mission.mavlink.fields import PLACED
-from mission.mavlink.items import Item
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.messages import item_of
+from stopgo.bridge.mavlink.line.wire import Who
+from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.mavlink.fields import PLACED
+from stopgo.mission.mavlink.items import Item
+from stopgo.mission.mavlink.telemetry import Message
 
 STEPPED = PLACED | frozenset(range(5000, 5005)) | {5100}
 """Commands whose x and y are degrees."""

@@ -11,9 +11,9 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from bridge.mavlink.simulated.estimator import Estimate
-from bridge.mavlink.simulated.tuning import Tuning
-from mission.document import Point
+from stopgo.bridge.mavlink.simulated.estimator import Estimate
+from stopgo.bridge.mavlink.simulated.tuning import Tuning
+from stopgo.mission.document import Point
 
 PIVOTED_RAD = math.radians(5.0)
 STEER_SPEED = 1.0

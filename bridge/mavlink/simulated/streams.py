@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 
-from bridge.link.clock import Clock
-from mission.mavlink.enums import MessageId
+from stopgo.bridge.link.clock import Clock
+from stopgo.mission.mavlink.enums import MessageId
 
 LOWEST_INTERVAL_US, HIGHEST_INTERVAL_US = 10_000, 2**31 - 1
 DEFAULT_US: dict[int, int] = {

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from bridge.link.clock import Clock
-from bridge.mavlink.line.wire import Who
-from bridge.mavlink.simulated.item_check import ACCEPTED, verdict
-from bridge.mavlink.simulated.replies import (
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.mavlink.line.wire import Who
+from stopgo.bridge.mavlink.simulated.item_check import ACCEPTED, verdict
+from stopgo.bridge.mavlink.simulated.replies import (
     item_float,
     item_int,
     item_wanted,
@@ -18,12 +18,12 @@ from bridge.mavlink.simulated.replies import (
     mission_count,
     received_item,
 )
-from bridge.mavlink.simulated.vehicle_faults import Mishaps
-from bridge.mavlink.simulated.vehicle_store import ALL, FENCE, MISSION, RALLY, KeptItems, Store
-from mission.mavlink.autopilots.kind import Autopilot
-from mission.mavlink.enums import MissionResult
-from mission.mavlink.items import Item
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.simulated.vehicle_faults import Mishaps
+from stopgo.bridge.mavlink.simulated.vehicle_store import ALL, FENCE, MISSION, RALLY, KeptItems, Store
+from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.enums import MissionResult
+from stopgo.mission.mavlink.items import Item
+from stopgo.mission.mavlink.telemetry import Message
 
 KINDS = (MISSION, FENCE, RALLY)
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from mission.mavlink.autopilots import AUTOPILOTS
-from mission.mavlink.autopilots.ardupilot import ARDUPILOT
+from stopgo.mission.mavlink.autopilots import AUTOPILOTS
+from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
 
 CHASSIS = {
     "SIM_TOP_SPEED": 4.0,  # m/s at full throttle

@@ -6,30 +6,30 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bridge.link.clock import Clock
-from bridge.mavlink.line.wire import Who, sender
-from bridge.mavlink.simulated import parameters, replies
-from bridge.mavlink.simulated.auto_mission import AutoEvents, AutoMission
-from bridge.mavlink.simulated.camera import Camera
-from bridge.mavlink.simulated.estimator import Estimate
-from bridge.mavlink.simulated.exact_drive import ExactDrive
-from bridge.mavlink.simulated.guided_target import GuidedTarget
-from bridge.mavlink.simulated.parameters import Parameters
-from bridge.mavlink.simulated.real_drive import RealDrive
-from bridge.mavlink.simulated.rover import STANDING, Rover
-from bridge.mavlink.simulated.steering import LAWS
-from bridge.mavlink.simulated.streams import Streams
-from bridge.mavlink.simulated.transfers import Transfers
-from bridge.mavlink.simulated.tuning import Tuning
-from bridge.mavlink.simulated.vehicle_faults import NO_FAULTS, Mishaps, VehicleFaults
-from bridge.mavlink.simulated.vehicle_store import MISSION, Store
-from mission.document import SiteOrigin
-from mission.events import Pose
-from mission.mavlink.autopilots.kind import Autopilot, ModeName
-from mission.mavlink.enums import MessageId
-from mission.mavlink.items import Command, Item, MavFrame
-from mission.mavlink.read_back import home_item
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.link.clock import Clock
+from stopgo.bridge.mavlink.line.wire import Who, sender
+from stopgo.bridge.mavlink.simulated import parameters, replies
+from stopgo.bridge.mavlink.simulated.auto_mission import AutoEvents, AutoMission
+from stopgo.bridge.mavlink.simulated.camera import Camera
+from stopgo.bridge.mavlink.simulated.estimator import Estimate
+from stopgo.bridge.mavlink.simulated.exact_drive import ExactDrive
+from stopgo.bridge.mavlink.simulated.guided_target import GuidedTarget
+from stopgo.bridge.mavlink.simulated.parameters import Parameters
+from stopgo.bridge.mavlink.simulated.real_drive import RealDrive
+from stopgo.bridge.mavlink.simulated.rover import STANDING, Rover
+from stopgo.bridge.mavlink.simulated.steering import LAWS
+from stopgo.bridge.mavlink.simulated.streams import Streams
+from stopgo.bridge.mavlink.simulated.transfers import Transfers
+from stopgo.bridge.mavlink.simulated.tuning import Tuning
+from stopgo.bridge.mavlink.simulated.vehicle_faults import NO_FAULTS, Mishaps, VehicleFaults
+from stopgo.bridge.mavlink.simulated.vehicle_store import MISSION, Store
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.events import Pose
+from stopgo.mission.mavlink.autopilots.kind import Autopilot, ModeName
+from stopgo.mission.mavlink.enums import MessageId
+from stopgo.mission.mavlink.items import Command, Item, MavFrame
+from stopgo.mission.mavlink.read_back import home_item
+from stopgo.mission.mavlink.telemetry import Message
 
 BOOT_NS = KEEP_NS = 1_000_000_000
 FOREVER_NS = 2**63

@@ -7,7 +7,7 @@ from typing import Literal
 
 import msgspec
 
-from mission.errors import InputError
+from stopgo.mission.errors import InputError
 
 VehicleFaultKind = Literal[
     "loss", "duplicates", "jitter", "lostack", "nack", "silent", "reboot-upload", "reboot-mission",

@@ -9,23 +9,23 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bridge.link.clock import WallClock
-from bridge.mavlink.line.transport import open_transport
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import Who, Wire, read_line
-from bridge.mavlink.simulated.command_handlers import NORTHMOST
-from bridge.mavlink.simulated.complete_vehicle import complete_vehicle
-from bridge.mavlink.simulated.lossy_line import on_line
-from bridge.mavlink.simulated.profiles import profile_named
-from bridge.mavlink.simulated.rover import to_east
-from bridge.mavlink.simulated.tuning import Tuning
-from bridge.mavlink.simulated.vehicle import Setting, Vehicle
-from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
-from mission.document import SiteOrigin
-from mission.errors import InputError
-from mission.events import Pose
-from mission.mavlink.enums import Component
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.link.clock import WallClock
+from stopgo.bridge.mavlink.line.transport import open_transport
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.line.wire import Who, Wire, read_line
+from stopgo.bridge.mavlink.simulated.command_handlers import NORTHMOST
+from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
+from stopgo.bridge.mavlink.simulated.lossy_line import on_line
+from stopgo.bridge.mavlink.simulated.profiles import profile_named
+from stopgo.bridge.mavlink.simulated.rover import to_east
+from stopgo.bridge.mavlink.simulated.tuning import Tuning
+from stopgo.bridge.mavlink.simulated.vehicle import Setting, Vehicle
+from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import Pose
+from stopgo.mission.mavlink.enums import Component
+from stopgo.mission.mavlink.telemetry import Message
 
 OPTION = "--mavlink"
 VEHICLE = Who(1, 1)

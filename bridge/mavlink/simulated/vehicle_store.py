@@ -7,9 +7,9 @@ from pathlib import Path
 
 import msgspec
 
-from mission.errors import InputError
-from mission.events import Pose
-from mission.mavlink.items import Item
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import Pose
+from stopgo.mission.mavlink.items import Item
 
 KeptItems = tuple[Item, ...]
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255

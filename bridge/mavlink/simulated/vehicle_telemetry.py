@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.simulated.rover import bearing
-from bridge.mavlink.simulated.vehicle import BATTERY_NS, Maker, Vehicle
-from mission.mavlink.enums import MessageId, MissionState, ModeFlag, SystemState, VehicleType
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.simulated.rover import bearing
+from stopgo.bridge.mavlink.simulated.vehicle import BATTERY_NS, Maker, Vehicle
+from stopgo.mission.mavlink.enums import MessageId, MissionState, ModeFlag, SystemState, VehicleType
+from stopgo.mission.mavlink.telemetry import Message
 
 CAPABILITIES = (
     dialect.MAV_PROTOCOL_CAPABILITY_MISSION_INT

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bridge.mavlink.line.messages import ack_message, clear_all
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.flow_control import window_for
-from bridge.mavlink.transfer.sending import send_items
-from mission.errors import AnswerIsNo, RobotUnreachable
-from mission.mavlink.enums import MissionResult
-from mission.mavlink.items import Item
+from stopgo.bridge.mavlink.line.messages import ack_message, clear_all
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.transfer.download import download
+from stopgo.bridge.mavlink.transfer.flow_control import window_for
+from stopgo.bridge.mavlink.transfer.sending import send_items
+from stopgo.mission.errors import AnswerIsNo, RobotUnreachable
+from stopgo.mission.mavlink.enums import MissionResult
+from stopgo.mission.mavlink.items import Item
 
 CANCELS = 3
 """A cancel is not answered, so it is said so often."""

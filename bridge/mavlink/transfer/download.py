@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import time
 
-from bridge.console import Progress
-from bridge.mavlink.line.messages import (
+from stopgo.bridge.console import Progress
+from stopgo.bridge.mavlink.line.messages import (
     ack_message,
     item_of,
     item_request,
@@ -16,12 +16,12 @@ from bridge.mavlink.line.messages import (
     of_mission,
     result_name,
 )
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.transfer.flow_control import Pace, TransferTimeout, window_for
-from mission.errors import AnswerIsNo, RobotUnreachable
-from mission.mavlink.enums import MissionResult
-from mission.mavlink.items import Item
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.transfer.flow_control import Pace, TransferTimeout, window_for
+from stopgo.mission.errors import AnswerIsNo, RobotUnreachable
+from stopgo.mission.mavlink.enums import MissionResult
+from stopgo.mission.mavlink.items import Item
+from stopgo.mission.mavlink.telemetry import Message
 
 STUCK = 12
 """After so many tries without an item others are asked one by one, in order: MAVSDK's vehicle wants it so."""

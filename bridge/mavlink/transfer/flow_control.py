@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.round_trips import RoundTrips
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.line.round_trips import RoundTrips
 
 WINDOW = 8
 """Items under way at once: some 400 bytes, what a telemetry radio takes in one go."""

@@ -12,13 +12,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from bridge.console import Progress
-from bridge.mavlink.line.messages import ack_message, count_message, item_message, list_request, of_mission
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.transfer.flow_control import Pace, TransferTimeout
-from mission.mavlink.enums import MissionResult
-from mission.mavlink.items import Item
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.console import Progress
+from stopgo.bridge.mavlink.line.messages import (
+    ack_message,
+    count_message,
+    item_message,
+    list_request,
+    of_mission,
+)
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.transfer.flow_control import Pace, TransferTimeout
+from stopgo.mission.mavlink.enums import MissionResult
+from stopgo.mission.mavlink.items import Item
+from stopgo.mission.mavlink.telemetry import Message
 
 How = Literal["accepted", "unsure", "refused", "busy", "dropped", "silent", "rebooted"]
 """How a transfer ended, as far as the vehicle says.

@@ -11,18 +11,18 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from bridge.console import Progress
-from bridge.mavlink.line.messages import result_name
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.transfer.after_failure import cancel, emptied, left_on, own_items, unknown
-from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.flow_control import window_for
-from bridge.mavlink.transfer.sending import TransferEnd, send_items
-from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
-from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.enums import MissionResult
-from mission.mavlink.items import Item, ItemList
-from mission.mavlink.read_back import differences, upload_of
+from stopgo.bridge.console import Progress
+from stopgo.bridge.mavlink.line.messages import result_name
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.transfer.after_failure import cancel, emptied, left_on, own_items, unknown
+from stopgo.bridge.mavlink.transfer.download import download
+from stopgo.bridge.mavlink.transfer.flow_control import window_for
+from stopgo.bridge.mavlink.transfer.sending import TransferEnd, send_items
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.enums import MissionResult
+from stopgo.mission.mavlink.items import Item, ItemList
+from stopgo.mission.mavlink.read_back import differences, upload_of
 
 ATTEMPTS = 4
 """Whole transfers, where the vehicle ended one or the read-back was not what was sent."""

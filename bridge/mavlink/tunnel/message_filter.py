@@ -6,12 +6,12 @@ commander's lease would count. To stop a vehicle must always be possible.
 
 from __future__ import annotations
 
-from bridge.mavlink.line.messages import enum_name
-from mission.mavlink.autopilots import autopilot_of
-from mission.mavlink.autopilots.kind import Autopilot, Modes
-from mission.mavlink.enums import Component
-from mission.mavlink.items import Command
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.messages import enum_name
+from stopgo.mission.mavlink.autopilots import autopilot_of
+from stopgo.mission.mavlink.autopilots.kind import Autopilot, Modes
+from stopgo.mission.mavlink.enums import Component
+from stopgo.mission.mavlink.items import Command
+from stopgo.mission.mavlink.telemetry import Message
 
 LOOKS = frozenset({
     "HEARTBEAT", "PING", "TIMESYNC", "SYSTEM_TIME", "COMMAND_CANCEL",

@@ -15,12 +15,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from bridge.link.link import Link, Presence
-from bridge.mavlink.line.frames import Frames, dialect
-from bridge.mavlink.line.messages import on_board_beat
-from bridge.mavlink.line.transport import Transport
-from mission.mavlink.enums import Component
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.link.link import Link, Presence
+from stopgo.bridge.mavlink.line.frames import Frames, dialect
+from stopgo.bridge.mavlink.line.messages import on_board_beat
+from stopgo.bridge.mavlink.line.transport import Transport
+from stopgo.mission.mavlink.enums import Component
+from stopgo.mission.mavlink.telemetry import Message
 
 QUEUE = 500
 """Frames that wait in one direction: some seconds of a talkative vehicle."""

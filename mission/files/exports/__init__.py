@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from mission.document import Mission, Point
-from mission.errors import InputError, StopgoError
-from mission.files.exports import (
+from stopgo.mission.document import Mission, Point
+from stopgo.mission.errors import InputError, StopgoError
+from stopgo.mission.files.exports import (
     geojson,
     nav2_yaml,
     path_mcap,
@@ -19,8 +19,8 @@ from mission.files.exports import (
     stops_dxf,
     vda5050,
 )
-from mission.files.exports.format import Format, Supplements
-from mission.plugins import Variant, variant
+from stopgo.mission.files.exports.format import Format, Supplements
+from stopgo.mission.plugins import Variant, variant
 
 QUANTUM = 0.008
 """Metres by which 1e-7 degrees move a place at most."""

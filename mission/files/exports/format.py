@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, get_args
 
-from mission.document import Mission, Point
-from mission.errors import InputError
-from mission.files.exports.stretches import Stretches
-from mission.mavlink.autopilots import AUTOPILOTS
-from mission.mavlink.translation_options import ScanWait, Settle, Trigger
+from stopgo.mission.document import Mission, Point
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.exports.stretches import Stretches
+from stopgo.mission.mavlink.autopilots import AUTOPILOTS
+from stopgo.mission.mavlink.translation_options import ScanWait, Settle, Trigger
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -35,7 +35,7 @@ class Supplements:
     trigger: Trigger = "auto"
     scan_wait: ScanWait = "delay"
     settle: Settle = "delay"
-    """How the mission is written as items; `mission.mavlink.translate.translate` says what each means."""
+    """How the mission is written as items; `stopgo.mission.mavlink.translate` says what each means."""
     floor: FloorDrawing | None = None
     coverage: Stretches | None = None
     written: datetime = datetime(1970, 1, 1, tzinfo=UTC)

@@ -9,10 +9,10 @@ from typing import Any
 
 import msgspec
 
-from mission.document import Mission, Point, SiteOrigin, Stop
-from mission.files.exports.format import Supplements
-from mission.geodesy import Geodetic, bearing_deg, from_geodetic, to_geodetic
-from mission.geometry import FloatArray, frozen, polyline_length
+from stopgo.mission.document import Mission, Point, SiteOrigin, Stop
+from stopgo.mission.files.exports.format import Supplements
+from stopgo.mission.geodesy import Geodetic, bearing_deg, from_geodetic, to_geodetic
+from stopgo.mission.geometry import FloatArray, frozen, polyline_length
 
 DIGITS = 9
 """Decimals of degrees: 0.1 mm."""

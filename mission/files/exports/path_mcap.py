@@ -11,11 +11,11 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mission.document import Mission, Point
-from mission.files.exports.format import Supplements
-from mission.files.exports.nav2_yaml import unmapped
-from mission.files.exports.waypoints import Waypoint, frame_name, mapped, way
-from mission.turning import SAME, turned_back
+from stopgo.mission.document import Mission, Point
+from stopgo.mission.files.exports.format import Supplements
+from stopgo.mission.files.exports.nav2_yaml import unmapped
+from stopgo.mission.files.exports.waypoints import Waypoint, frame_name, mapped, way
+from stopgo.mission.turning import SAME, turned_back
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore

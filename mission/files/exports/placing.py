@@ -6,12 +6,12 @@ import math
 
 import msgspec
 
-from mission.document import Frame, Mission, SiteOrigin, Transform
-from mission.errors import InputError
-from mission.files.plan_toml import read_settings
-from mission.parameter import numbers
-from mission.problems import FAR
-from mission.settings import PARAMETERS
+from stopgo.mission.document import Frame, Mission, SiteOrigin, Transform
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.parameter import numbers
+from stopgo.mission.problems import FAR
+from stopgo.mission.settings import PARAMETERS
 
 MAP = "write X,Y,HEADING in metres and degrees, such as 1.5,2,90"
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import msgspec
 
-from mission.document import Mission, Point
-from mission.files.exports.format import Supplements
-from mission.files.imports import qgc_plan
-from mission.files.imports.track import ImportOptions
-from mission.geodesy import STEPS_PER_DEGREE
-from mission.mavlink.fields import PLACED
-from mission.mavlink.items import Command, Item, ItemList, MavFrame
-from mission.mavlink.translate import translate
+from stopgo.mission.document import Mission, Point
+from stopgo.mission.files.exports.format import Supplements
+from stopgo.mission.files.imports import qgc_plan
+from stopgo.mission.files.imports.track import ImportOptions
+from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.mavlink.fields import PLACED
+from stopgo.mission.mavlink.items import Command, Item, ItemList, MavFrame
+from stopgo.mission.mavlink.translate import translate
 
 FIRMWARE = {"generic": 0, "ardupilot": 3, "px4": 12}
 """MAV_AUTOPILOT of each autopilot."""

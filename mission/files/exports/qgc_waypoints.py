@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from mission.document import Mission, Point
-from mission.files.exports.format import Supplements
-from mission.files.exports.qgc_plan import FILE_FRAMES, items_of, place
-from mission.files.imports import qgc_waypoints
-from mission.files.imports.qgc_waypoints import HEAD
-from mission.files.imports.track import ImportOptions
-from mission.mavlink.items import Item
-from mission.mavlink.read_back import home_item
+from stopgo.mission.document import Mission, Point
+from stopgo.mission.files.exports.format import Supplements
+from stopgo.mission.files.exports.qgc_plan import FILE_FRAMES, items_of, place
+from stopgo.mission.files.imports import qgc_waypoints
+from stopgo.mission.files.imports.qgc_waypoints import HEAD
+from stopgo.mission.files.imports.track import ImportOptions
+from stopgo.mission.mavlink.items import Item
+from stopgo.mission.mavlink.read_back import home_item
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:

@@ -1,7 +1,7 @@
 """Writes the stops as a table, one row each, that a spreadsheet opens alike in every country.
 
 RFC 4180: commas, full stops in numbers, CRLF, UTF-8. Text that a spreadsheet would take for a formula gets
-an apostrophe in front, which `mission.files.imports.stops_csv` takes off again.
+an apostrophe in front, which `stopgo.mission.files.imports.stops_csv` takes off again.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ import csv
 import io
 import math
 
-from mission.document import Mission, Point, Stop
-from mission.files.exports.format import Supplements
-from mission.geodesy import bearing_deg, to_geodetic
-from mission.geometry import frozen, polyline_length
+from stopgo.mission.document import Mission, Point, Stop
+from stopgo.mission.files.exports.format import Supplements
+from stopgo.mission.geodesy import bearing_deg, to_geodetic
+from stopgo.mission.geometry import frozen, polyline_length
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'")
 """What spreadsheets take for the beginning of a formula, and the apostrophe that guards against it."""

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mission.document import Mission
-from mission.errors import InputError
-from mission.files.coverage_json import CoverageSegment, read_coverage
-from mission.geometry import FloatArray, frozen
-from mission.problems import FAR
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.coverage_json import CoverageSegment, read_coverage
+from stopgo.mission.geometry import FloatArray, frozen
+from stopgo.mission.problems import FAR
 
 Fraction = tuple[float, float]
 

@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import msgspec
 
-from mission.document import Frame, Mission, Point, Stop, Transform
-from mission.turning import turned
+from stopgo.mission.document import Frame, Mission, Point, Stop, Transform
+from stopgo.mission.turning import turned
 
 
 @dataclass(frozen=True)

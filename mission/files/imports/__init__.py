@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from mission.document import Mission
-from mission.errors import InputError
-from mission.files.imports import qgc_plan, qgc_waypoints, stops_csv
-from mission.files.imports.assembling import mission_of
-from mission.files.imports.track import ImportedRoute, ImportOptions, MissionReader
-from mission.settings import Settings
-from mission.specs import site_origin_of
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.imports import qgc_plan, qgc_waypoints, stops_csv
+from stopgo.mission.files.imports.assembling import mission_of
+from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions, MissionReader
+from stopgo.mission.settings import Settings
+from stopgo.mission.specs import site_origin_of
 
 READERS: dict[str, MissionReader] = {
     "plan": qgc_plan.read,

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
-from mission import __version__
-from mission.document import (
+from stopgo.mission import __version__
+from stopgo.mission.document import (
     Frame,
     Mission,
     Point,
@@ -20,12 +20,12 @@ from mission.document import (
     mission_id,
     sealed,
 )
-from mission.errors import InputError
-from mission.files.imports.track import ImportedRoute, Visit
-from mission.floor_source import FloorSource
-from mission.problems import problems_of
-from mission.settings import Settings
-from mission.specs import origin_of, policy_of, robot_of, rounded, scan_of, scanner_of, site_origin_of
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.imports.track import ImportedRoute, Visit
+from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.problems import problems_of
+from stopgo.mission.settings import Settings
+from stopgo.mission.specs import origin_of, policy_of, robot_of, rounded, scan_of, scanner_of, site_origin_of
 
 
 def mission_of(track: ImportedRoute, settings: Settings, *, name: str, file: str, digest: str) -> Mission:

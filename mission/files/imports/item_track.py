@@ -11,16 +11,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
-from mission.document import SiteOrigin
-from mission.errors import InputError
-from mission.files.imports import track
-from mission.files.imports.track import ImportedRoute, ImportOptions
-from mission.geodesy import STEPS_PER_DEGREE
-from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.items import NAMES, Command, Item, Placed
-from mission.mavlink.recognise import GLOBAL_FRAMES, PLACES, TRIGGERS, WAITS, recognise
-from mission.mavlink.recognised_tour import RecognisedStop, RecognisedTour, recognised_tour
-from mission.mavlink.writing import SCAN_MESSAGE
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.imports import track
+from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions
+from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.items import NAMES, Command, Item, Placed
+from stopgo.mission.mavlink.recognise import GLOBAL_FRAMES, PLACES, TRIGGERS, WAITS, recognise
+from stopgo.mission.mavlink.recognised_tour import RecognisedStop, RecognisedTour, recognised_tour
+from stopgo.mission.mavlink.writing import SCAN_MESSAGE
 
 MOST = 65_535
 """Items a mission may have by the protocol."""

@@ -15,11 +15,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, get_args
 
-from mission.document import OnFailure, Point
-from mission.errors import InputError
-from mission.files.imports.track import ImportedRoute, ImportOptions, Visit
-from mission.geodesy import Geodetic, from_geodetic, heading_of
-from mission.problems import JOIN
+from stopgo.mission.document import OnFailure, Point
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions, Visit
+from stopgo.mission.geodesy import Geodetic, from_geodetic, heading_of
+from stopgo.mission.problems import JOIN
 
 METRES = ("x_m", "y_m")
 DEGREES = ("lat_deg", "lon_deg")

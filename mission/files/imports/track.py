@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mission.document import OnFailure, Point, SiteOrigin
+from stopgo.mission.document import OnFailure, Point, SiteOrigin
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class ImportOptions:
 
     origin: SiteOrigin | None = None
     autopilot: str | None = None
-    """By whose rule degrees are metres, one of `mission.mavlink.autopilots.AUTOPILOTS`."""
+    """By whose rule degrees are metres, one of `stopgo.mission.mavlink.autopilots.AUTOPILOTS`."""
 
 
 MissionReader = Callable[[bytes, str, ImportOptions], ImportedRoute]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from mission.errors import InputError
-from mission.mavlink.autopilots.ardupilot import ARDUPILOT
-from mission.mavlink.autopilots.generic import GENERIC
-from mission.mavlink.autopilots.kind import Autopilot
-from mission.mavlink.autopilots.px4 import PX4
+from stopgo.mission.errors import InputError
+from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
+from stopgo.mission.mavlink.autopilots.generic import GENERIC
+from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.autopilots.px4 import PX4
 
 AUTOPILOTS: dict[str, Autopilot] = {kind.name: kind for kind in (ARDUPILOT, PX4, GENERIC)}
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from mission.mavlink.autopilots.kind import (
+from stopgo.mission.mavlink.autopilots.kind import (
     EVERYWHERE,
     ROVERS,
     Autopilot,
@@ -21,8 +21,8 @@ from mission.mavlink.autopilots.kind import (
     ParameterRule,
     Steering,
 )
-from mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag, VehicleType
-from mission.mavlink.fields import (
+from stopgo.mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag, VehicleType
+from stopgo.mission.mavlink.fields import (
     PLACED,
     Field,
     as_sent,
@@ -36,7 +36,7 @@ from mission.mavlink.fields import (
     uint16,
     whole,
 )
-from mission.mavlink.items import Command, Item, MavFrame
+from stopgo.mission.mavlink.items import Command, Item, MavFrame
 
 CUSTOM, MANUAL = ModeFlag.CUSTOM_MODE_ENABLED, ModeFlag.MANUAL_INPUT_ENABLED
 STABILIZE, GUIDED, AUTO = ModeFlag.STABILIZE_ENABLED, ModeFlag.GUIDED_ENABLED, ModeFlag.AUTO_ENABLED

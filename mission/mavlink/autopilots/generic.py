@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 
-from mission.mavlink.autopilots import px4
-from mission.mavlink.autopilots.kind import EVERYWHERE, Autopilot, Driving, Habits, Heartbeat
-from mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag
-from mission.mavlink.fields import as_sent
-from mission.mavlink.items import Command, MavFrame
+from stopgo.mission.mavlink.autopilots import px4
+from stopgo.mission.mavlink.autopilots.kind import EVERYWHERE, Autopilot, Driving, Habits, Heartbeat
+from stopgo.mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag
+from stopgo.mission.mavlink.fields import as_sent
+from stopgo.mission.mavlink.items import Command, MavFrame
 
 UINT16_MAX = 65_535
 

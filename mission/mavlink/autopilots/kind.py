@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from mission.mavlink.enums import CommandResult, MissionResult, ModeFlag, SystemState, VehicleType
-from mission.mavlink.items import Item
+from stopgo.mission.mavlink.enums import CommandResult, MissionResult, ModeFlag, SystemState, VehicleType
+from stopgo.mission.mavlink.items import Item
 
 ROVERS = (VehicleType.GROUND_ROVER, VehicleType.SURFACE_BOAT)
 EVERYWHERE = frozenset({16, 17, 19, 20, 21, 22, 93, 112, 178, 203, 2000, 2001})
@@ -201,7 +201,7 @@ class Autopilot:
     firmware: int
     """MAV_AUTOPILOT."""
     rule: str
-    """How it turns degrees into metres, one of `mission.geodesy.RULES`."""
+    """How it turns degrees into metres, one of `stopgo.mission.geodesy.RULES`."""
 
     # Items
 

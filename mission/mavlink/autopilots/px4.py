@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from mission.mavlink.autopilots.kind import (
+from stopgo.mission.mavlink.autopilots.kind import (
     EVERYWHERE,
     Autopilot,
     Driving,
@@ -21,9 +21,9 @@ from mission.mavlink.autopilots.kind import (
     ParameterRule,
     Steering,
 )
-from mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag
-from mission.mavlink.fields import as_sent, float32
-from mission.mavlink.items import Command, Item, MavFrame
+from stopgo.mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag
+from stopgo.mission.mavlink.fields import as_sent, float32
+from stopgo.mission.mavlink.items import Command, Item, MavFrame
 
 CUSTOM, MANUAL = ModeFlag.CUSTOM_MODE_ENABLED, ModeFlag.MANUAL_INPUT_ENABLED
 STABILIZE, GUIDED, AUTO = ModeFlag.STABILIZE_ENABLED, ModeFlag.GUIDED_ENABLED, ModeFlag.AUTO_ENABLED

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from mission.document import Mission, Stop
-from mission.events import AnyEvent, Arrived
-from mission.mavlink.autopilots.kind import Autopilot
-from mission.mavlink.captures import NEAR_M, Picture
-from mission.mavlink.following.listed_mission import ListedMission
-from mission.mavlink.following.observer import CLOCKS, NONE_YET, Observer
-from mission.mavlink.following.steps import (
+from stopgo.mission.document import Mission, Stop
+from stopgo.mission.events import AnyEvent, Arrived
+from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.captures import NEAR_M, Picture
+from stopgo.mission.mavlink.following.listed_mission import ListedMission
+from stopgo.mission.mavlink.following.observer import CLOCKS, NONE_YET, Observer
+from stopgo.mission.mavlink.following.steps import (
     AT_STOP,
     COUNTS_NOT_YET,
     GRACE_NS,
@@ -25,9 +25,9 @@ from mission.mavlink.following.steps import (
     steps,
     taken_over,
 )
-from mission.mavlink.telemetry import Message, began_again
-from mission.run import states as runs
-from mission.run.states import Change, Run, changed, told_of
+from stopgo.mission.mavlink.telemetry import Message, began_again
+from stopgo.mission.run import states as runs
+from stopgo.mission.run.states import Change, Run, changed, told_of
 
 
 class FollowedRun:

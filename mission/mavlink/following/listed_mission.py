@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from mission.document import Mission
-from mission.errors import InputError
-from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.items import ItemList, Placed
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.items import ItemList, Placed
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,17 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mission.events import Arrived, Pose
-from mission.geodesy import heading_of
-from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.autopilots.kind import Autopilot
-from mission.mavlink.captures import STEPS_M, Capture, Picture, capture_of
-from mission.mavlink.enums import MissionState, ModeFlag
-from mission.mavlink.following.listed_mission import ListedMission
-from mission.mavlink.following.steps import Observation
-from mission.mavlink.local_frame import LocalFrame, VehicleOrigin, is_elsewhere, local_frame
-from mission.mavlink.read_back import point_at
-from mission.mavlink.telemetry import (
+from stopgo.mission.events import Arrived, Pose
+from stopgo.mission.geodesy import heading_of
+from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.autopilots.kind import Autopilot
+from stopgo.mission.mavlink.captures import STEPS_M, Capture, Picture, capture_of
+from stopgo.mission.mavlink.enums import MissionState, ModeFlag
+from stopgo.mission.mavlink.following.listed_mission import ListedMission
+from stopgo.mission.mavlink.following.steps import Observation
+from stopgo.mission.mavlink.local_frame import LocalFrame, VehicleOrigin, is_elsewhere, local_frame
+from stopgo.mission.mavlink.read_back import point_at
+from stopgo.mission.mavlink.telemetry import (
     Message,
     charge_of,
     global_speed,
@@ -27,7 +27,7 @@ from mission.mavlink.telemetry import (
     place_of,
     stands_still,
 )
-from mission.run.states import Run
+from stopgo.mission.run.states import Run
 
 CAPTURES_KEPT = 100
 TOLD = (

@@ -14,13 +14,13 @@ from functools import partial
 
 import msgspec
 
-from mission.document import Stop
-from mission.events import Pose, Settled, Unconfirmed
-from mission.mavlink.following.listed_mission import ListedMission, StopItems
-from mission.run import states as runs
-from mission.run.scans import ScanFailed, ScanResult, turned_away
-from mission.run.states import Change, Run, changed
-from mission.tolerance import deviation, is_outside
+from stopgo.mission.document import Stop
+from stopgo.mission.events import Pose, Settled, Unconfirmed
+from stopgo.mission.mavlink.following.listed_mission import ListedMission, StopItems
+from stopgo.mission.run import states as runs
+from stopgo.mission.run.scans import ScanFailed, ScanResult, turned_away
+from stopgo.mission.run.states import Change, Run, changed
+from stopgo.mission.tolerance import deviation, is_outside
 
 SOMEBODY = "the vehicle's operator"
 """Who gives orders that were not given here."""

@@ -6,17 +6,17 @@ import shlex
 from collections import Counter
 from dataclasses import replace
 
-from mission.errors import InputError
-from mission.floor import FloorPlan
-from mission.geometry import bounds
-from mission.kinds import KINDS
-from planner.floors.ifc.levels import Level, chosen_level, levels_of, standing_at, walked, with_uses
-from planner.floors.ifc.loading import load
-from planner.floors.ifc.model import Model
-from planner.floors.ifc.storey_plan import floor_on, odd_products
-from planner.floors.parts import in_order
-from planner.floors.reader import FloorFile, FloorOptions
-from planner.floors.survey import FloorChoice, LayerUse, Survey
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import bounds
+from stopgo.mission.kinds import KINDS
+from stopgo.planner.floors.ifc.levels import Level, chosen_level, levels_of, standing_at, walked, with_uses
+from stopgo.planner.floors.ifc.loading import load
+from stopgo.planner.floors.ifc.model import Model
+from stopgo.planner.floors.ifc.storey_plan import floor_on, odd_products
+from stopgo.planner.floors.parts import in_order
+from stopgo.planner.floors.reader import FloorFile, FloorOptions
+from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey
 
 WORKED_OUT = (
     *("floor_from_rooms", "floor_from_proxies", "floor_from_walls", "rooms_derived"),

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import shapely
 
-from mission.floor import Finding
-from planner.floors.ifc.doors import Door
-from planner.floors.ifc.levels import Level, walked_on
-from planner.floors.ifc.model import Model, Product, Surface
-from planner.floors.ifc.section import NOTHING, cut, tidy, union_of, upward
-from planner.floors.ifc.solids import OFF_LEVEL, Solid
-from planner.floors.rings import Region
+from stopgo.mission.floor import Finding
+from stopgo.planner.floors.ifc.doors import Door
+from stopgo.planner.floors.ifc.levels import Level, walked_on
+from stopgo.planner.floors.ifc.model import Model, Product, Surface
+from stopgo.planner.floors.ifc.section import NOTHING, cut, tidy, union_of, upward
+from stopgo.planner.floors.ifc.solids import OFF_LEVEL, Solid
+from stopgo.planner.floors.rings import Region
 
 NEAR_LEVEL = 0.05
 """A slab's face belongs to the floor if it lies within this of it, metres."""

@@ -10,7 +10,7 @@ from typing import Any
 import ifcopenshell
 import ifcopenshell.util.element
 
-from planner.floors.ifc.model import Task
+from stopgo.planner.floors.ifc.model import Task
 
 REMOVING = {"DEMOLITION", "DISMANTLE", "REMOVAL"}
 DATES = re.compile(

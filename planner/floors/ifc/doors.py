@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from mission.geometry import FloatArray
-from planner.floors.ifc.levels import Level
-from planner.floors.ifc.model import Model, Product, Surface
-from planner.floors.rings import Region
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors.ifc.levels import Level
+from stopgo.planner.floors.ifc.model import Model, Product, Surface
+from stopgo.planner.floors.rings import Region
 
 SILL = 0.3
 """The bottom of a door lies at most so far above its floor, metres."""

@@ -20,9 +20,9 @@ import ifcopenshell.util.placement
 import ifcopenshell.util.unit
 import numpy as np
 
-from planner.floors.ifc.dated import phases_of, tasks_by_product
-from planner.floors.ifc.model import Described, Model, Placement, Product, Storey, packed
-from planner.floors.ifc.placed import place_of
+from stopgo.planner.floors.ifc.dated import phases_of, tasks_by_product
+from stopgo.planner.floors.ifc.model import Described, Model, Placement, Product, Storey, packed
+from stopgo.planner.floors.ifc.placed import place_of
 
 KERNEL: Final = "hybrid-cgal-simple-opencascade"
 ROLES = {

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import pyproj
 from pyproj.exceptions import CRSError, ProjError
 
-from mission.floor import Finding, Georeference
-from planner.floors.drawing import legible
-from planner.floors.ifc.model import OnEarth, Placement
+from stopgo.mission.floor import Finding, Georeference
+from stopgo.planner.floors.drawing import legible
+from stopgo.planner.floors.ifc.model import OnEarth, Placement
 
 DEFAULTS = {
     "Boston, as Revit sets it": (42.358, -71.06),

@@ -16,10 +16,10 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from mission.errors import InputError, MissingExtra
-from mission.files.atomic import write_atomic
-from planner.floors.ifc.model import Model, unpacked
-from planner.floors.reader import FloorFile
+from stopgo.mission.errors import InputError, MissingExtra
+from stopgo.mission.files.atomic import write_atomic
+from stopgo.planner.floors.ifc.model import Model, unpacked
+from stopgo.planner.floors.reader import FloorFile
 
 FORM = 5
 """Raised whenever what is kept of a model, or how it is read, changes."""
@@ -28,8 +28,8 @@ MOST_KEPT = 2 * 1024**3
 MOST_CRASHES = 20
 """So often the geometry kernel may crash on one model before it is given up."""
 LARGEST_ZIPPED = 4 * 1024**3
-READING = "import stopgo, sys; from planner.floors.ifc.extract import main; sys.exit(main(sys.argv[1:]))"
-"""The other process; `stopgo` finds the folders wherever they are installed."""
+READING = "import sys; from stopgo.planner.floors.ifc.extract import main; sys.exit(main(sys.argv[1:]))"
+"""The other process."""
 SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3")
 MARK = b"ISO-10303-21"
 
@@ -185,7 +185,7 @@ def _why(out: Path, code: int, path: Path) -> str:
 def _with_crashed(packed: bytes, bad: Sequence[str]) -> bytes:
     if not bad:
         return packed
-    from planner.floors.ifc.model import packed as pack
+    from stopgo.planner.floors.ifc.model import packed as pack
 
     model = unpacked(packed)
     named = [f"{model.products[item].ifc_class} {item} '{model.products[item].name}'" for item in bad]

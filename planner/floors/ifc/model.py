@@ -10,7 +10,7 @@ from functools import cached_property
 import msgspec
 import numpy as np
 
-from mission.geometry import FloatArray, IntArray
+from stopgo.mission.geometry import FloatArray, IntArray
 
 Placement = tuple[float, ...]
 """A local placement in the world, metres: 4 × 4 numbers, row by row."""

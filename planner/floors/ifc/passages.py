@@ -8,11 +8,11 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from mission.geometry import FloatArray
-from planner.floors.ifc.areas import Space
-from planner.floors.ifc.doors import Door
-from planner.floors.ifc.solids import Solid
-from planner.floors.rings import Region
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors.ifc.areas import Space
+from stopgo.planner.floors.ifc.doors import Door
+from stopgo.planner.floors.ifc.solids import Solid
+from stopgo.planner.floors.rings import Region
 
 DEEPEST = 0.8
 """The thickest wall that a passage leads through, metres."""

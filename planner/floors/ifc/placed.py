@@ -9,7 +9,7 @@ import ifcopenshell.util.element
 import ifcopenshell.util.placement
 import numpy as np
 
-from planner.floors.ifc.model import OnEarth
+from stopgo.planner.floors.ifc.model import OnEarth
 
 CONVERSIONS = ("ePset_MapConversion", "ePSet_MapConversion")
 PROJECTIONS = ("ePset_ProjectedCRS", "ePSet_ProjectedCRS")

@@ -7,9 +7,9 @@ import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from mission.geometry import FloatArray
-from planner.floors.ifc.model import Surface
-from planner.floors.rings import Region
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors.ifc.model import Surface
+from stopgo.planner.floors.rings import Region
 
 GRID = 1e-4
 """Sections are drawn on a grid of this many metres, so that faces which touch in the model touch."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import shapely
 
-from planner.floors.ifc.levels import Level
-from planner.floors.ifc.model import Model, Product, Surface
-from planner.floors.ifc.section import NOTHING, cut, footprint, same_throughout, tidy
-from planner.floors.rings import Region
+from stopgo.planner.floors.ifc.levels import Level
+from stopgo.planner.floors.ifc.model import Model, Product, Surface
+from stopgo.planner.floors.ifc.section import NOTHING, cut, footprint, same_throughout, tidy
+from stopgo.planner.floors.rings import Region
 
 OFF_LEVEL = 1.37e-3
 """A cut lies this much above a round height: planes on which things were modelled are not cut along."""

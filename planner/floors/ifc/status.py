@@ -9,12 +9,12 @@ from typing import Literal
 
 from msgspec.structs import replace
 
-from mission.errors import InputError
-from mission.floor import Finding
-from planner.floors.drawing import legible
-from planner.floors.ifc.levels import Level
-from planner.floors.ifc.model import Model, Product, Task
-from planner.floors.ifc.solids import AT_SCANNER, KERB
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import Finding
+from stopgo.planner.floors.drawing import legible
+from stopgo.planner.floors.ifc.levels import Level
+from stopgo.planner.floors.ifc.model import Model, Product, Task
+from stopgo.planner.floors.ifc.solids import AT_SCANNER, KERB
 
 Status = Literal["built", "in_progress", "not_started", "removed"]
 THINGS = (*AT_SCANNER, "stairs", "railings", "doors")

@@ -8,23 +8,23 @@ from typing import Any
 import numpy as np
 import shapely
 
-from mission.errors import InputError
-from mission.floor import Element, Finding, FloorPlan
-from mission.geometry import frozen
-from planner.floors.drawing import legible
-from planner.floors.ifc.areas import Space, derived_rooms, floor_area, modelled_rooms
-from planner.floors.ifc.doors import doors_on
-from planner.floors.ifc.georeference import georeference_of
-from planner.floors.ifc.levels import Level
-from planner.floors.ifc.model import Model
-from planner.floors.ifc.passages import passages
-from planner.floors.ifc.solids import Heights, Solid, solids_on
-from planner.floors.ifc.status import Statuses, on_day, statuses
-from planner.floors.ifc.timetable import read_timetable
-from planner.floors.parts import in_order, parts_of
-from planner.floors.reader import FloorFile, FloorOptions
-from planner.floors.rings import Region
-from planner.floors.strokes import Stroke, Word
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import Element, Finding, FloorPlan
+from stopgo.mission.geometry import frozen
+from stopgo.planner.floors.drawing import legible
+from stopgo.planner.floors.ifc.areas import Space, derived_rooms, floor_area, modelled_rooms
+from stopgo.planner.floors.ifc.doors import doors_on
+from stopgo.planner.floors.ifc.georeference import georeference_of
+from stopgo.planner.floors.ifc.levels import Level
+from stopgo.planner.floors.ifc.model import Model
+from stopgo.planner.floors.ifc.passages import passages
+from stopgo.planner.floors.ifc.solids import Heights, Solid, solids_on
+from stopgo.planner.floors.ifc.status import Statuses, on_day, statuses
+from stopgo.planner.floors.ifc.timetable import read_timetable
+from stopgo.planner.floors.parts import in_order, parts_of
+from stopgo.planner.floors.reader import FloorFile, FloorOptions
+from stopgo.planner.floors.rings import Region
+from stopgo.planner.floors.strokes import Stroke, Word
 
 BESIDE = 1.0
 """What stands farther than this from the floor is not part of its plan, metres."""

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 
-from mission.errors import InputError
-from planner.floors.drawing import legible
-from planner.floors.ifc.model import Task
+from stopgo.mission.errors import InputError
+from stopgo.planner.floors.drawing import legible
+from stopgo.planner.floors.ifc.model import Task
 
 KNOWN = {
     "guid": ("guid", "globalid", "global id", "ifcguid", "ifc guid", "element guid", "id"),

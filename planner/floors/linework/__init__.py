@@ -12,17 +12,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import shapely
 
-from mission.floor import Finding
-from mission.geometry import FloatArray, frozen
-from planner.floors.drawn import drawn
-from planner.floors.linework.groups import outlines_of
-from planner.floors.linework.labels import parted_by_labels
-from planner.floors.linework.spaces import Spaces, floor_within, rooms_within, sides_of, tiled_floor
-from planner.floors.linework.wall_gaps import WallGap, gaps_of, passages_of, without_doors
-from planner.floors.linework.walls import SolidWalls, walls_of
-from planner.floors.parts import outline_of
-from planner.floors.rings import GAP, Region, canonical_region, polygons_of
-from planner.floors.strokes import Stroke, Word
+from stopgo.mission.floor import Finding
+from stopgo.mission.geometry import FloatArray, frozen
+from stopgo.planner.floors.drawn import drawn
+from stopgo.planner.floors.linework.groups import outlines_of
+from stopgo.planner.floors.linework.labels import parted_by_labels
+from stopgo.planner.floors.linework.spaces import Spaces, floor_within, rooms_within, sides_of, tiled_floor
+from stopgo.planner.floors.linework.wall_gaps import WallGap, gaps_of, passages_of, without_doors
+from stopgo.planner.floors.linework.walls import SolidWalls, walls_of
+from stopgo.planner.floors.parts import outline_of
+from stopgo.planner.floors.rings import GAP, Region, canonical_region, polygons_of
+from stopgo.planner.floors.strokes import Stroke, Word
 
 _COVERS = 0.6
 """A drawn floor is taken if it covers this share of what the walls enclose."""

@@ -9,8 +9,8 @@ import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from mission.geometry import FloatArray, IntArray
-from planner.floors.rings import Region, polygons_of
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.floors.rings import Region, polygons_of
 
 _FILLED = 0.5
 """Where lines enclose less than this share of their hull, they are taken one by one."""

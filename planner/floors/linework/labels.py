@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import shapely
 
-from mission.geometry import FloatArray
-from planner.floors.rings import polygons_of
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors.rings import polygons_of
 
 WIDEST = 4.0
 """No place wider than this, in metres, parts two rooms."""

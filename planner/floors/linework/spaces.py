@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from mission.geometry import FloatArray
-from planner.floors.linework.wall_gaps import WallGap
-from planner.floors.rings import Region, polygons_of
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors.linework.wall_gaps import WallGap
+from stopgo.planner.floors.rings import Region, polygons_of
 
 _CLOSED_OVER = (0.1, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0)
 """Widths in metres of gaps in the outer walls that are closed, tried in this order."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray
 
 LEAF = (0.5, 1.6)
 """Width of a door's leaf in metres."""

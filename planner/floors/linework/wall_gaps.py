@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from mission.geometry import FloatArray
-from planner.floors.linework.groups import groups_of
-from planner.floors.linework.swings import Leaf, Swing, paired, swings_of
-from planner.floors.linework.walls import SolidWalls, caps_of
-from planner.floors.rings import Region
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors.linework.groups import groups_of
+from stopgo.planner.floors.linework.swings import Leaf, Swing, paired, swings_of
+from stopgo.planner.floors.linework.walls import SolidWalls, caps_of
+from stopgo.planner.floors.rings import Region
 
 PASSAGE = (0.6, 1.6)
 """Ends of walls that face each other this far apart (m) leave a passage."""

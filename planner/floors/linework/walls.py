@@ -11,8 +11,8 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from mission.geometry import BoolArray, FloatArray
-from planner.floors.rings import Region, polygons_of
+from stopgo.mission.geometry import BoolArray, FloatArray
+from stopgo.planner.floors.rings import Region, polygons_of
 
 THICK = 0.6
 """A strip between wall lines that is nowhere wider than this, in metres, is a wall's inside."""

@@ -16,17 +16,23 @@ import shapely
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from mission.errors import InputError
-from mission.floor import Finding, FloorPlan
-from mission.geometry import bounds, frozen
-from planner.floors.linework import completed
-from planner.floors.parts import in_order, parts_of
-from planner.floors.reader import FloorFile, FloorOptions
-from planner.floors.robot_map.cell_regions import placed, polygons_of_cells, smoothed
-from planner.floors.robot_map.description import FREE, OCCUPIED, UNKNOWN, MapDescription, read_description
-from planner.floors.robot_map.grey_picture import read_picture
-from planner.floors.strokes import Stroke
-from planner.floors.survey import FloorChoice, Survey
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import Finding, FloorPlan
+from stopgo.mission.geometry import bounds, frozen
+from stopgo.planner.floors.linework import completed
+from stopgo.planner.floors.parts import in_order, parts_of
+from stopgo.planner.floors.reader import FloorFile, FloorOptions
+from stopgo.planner.floors.robot_map.cell_regions import placed, polygons_of_cells, smoothed
+from stopgo.planner.floors.robot_map.description import (
+    FREE,
+    OCCUPIED,
+    UNKNOWN,
+    MapDescription,
+    read_description,
+)
+from stopgo.planner.floors.robot_map.grey_picture import read_picture
+from stopgo.planner.floors.strokes import Stroke
+from stopgo.planner.floors.survey import FloorChoice, Survey
 
 LEAST_WALL = 0.5
 """Occupied cells that hang together over less than this, in metres, are an obstacle and no wall."""

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from mission.geometry import FloatArray
+from stopgo.mission.geometry import FloatArray
 
 SMOOTHED = 1.01
 """Outlines are straightened by at most so many cells: steps of a slanted wall, and bumps of one cell."""

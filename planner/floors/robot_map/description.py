@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mission.errors import InputError
-from planner.floors.robot_map.grey_picture import GreyPicture
+from stopgo.mission.errors import InputError
+from stopgo.planner.floors.robot_map.grey_picture import GreyPicture
 
 FREE, UNKNOWN, OCCUPIED = 0, 1, 2
 _KNOWN = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode")

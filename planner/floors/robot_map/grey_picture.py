@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mission.errors import InputError
+from stopgo.mission.errors import InputError
 
 GreyBytes = NDArray[np.uint8]
 MOST_PIXELS = 100_000_000

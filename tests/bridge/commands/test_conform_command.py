@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from bridge.commands.spawn import robot_process
-from mission.__main__ import main
-from mission.files.mission_json import write
+from stopgo.bridge.commands.spawn import robot_process
+from stopgo.command_line import main
+from stopgo.mission.files.mission_json import write
 from tests.bridge.guarded import keys_of_site
 from tests.bridge.world import corridor
 from tests.called import stopgo

@@ -10,13 +10,13 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridge.station import station as stations
-from bridge.station.station import Station
-from mission.__main__ import main
-from mission.document import Mission, sealed
-from mission.events import Scanned
-from mission.files.file_name import file_name
-from mission.files.mission_json import write
+from stopgo.bridge.station import station as stations
+from stopgo.bridge.station.station import Station
+from stopgo.command_line import main
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.events import Scanned
+from stopgo.mission.files.file_name import file_name
+from stopgo.mission.files.mission_json import write
 from tests.bridge.world import Field, corridor
 
 FORGED = "r1: FINISHED; forged"

@@ -13,22 +13,22 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.auto.logbook import logbook, remember
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.peer import reached
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
-from bridge.mavlink.simulated.vehicle_process import vehicle_on
-from mission.__main__ import main
-from mission.document import Mission, SiteOrigin, sealed
-from mission.events import Aborted
-from mission.files.imports import qgc_plan, qgc_waypoints
-from mission.files.imports.track import ImportOptions
-from mission.files.mission_json import write
-from mission.mavlink.translate import translate
-from mission.run.states import started
+from stopgo.bridge.mavlink.auto.logbook import logbook, remember
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.peer import reached
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.command_line import main
+from stopgo.mission.document import Mission, SiteOrigin, sealed
+from stopgo.mission.events import Aborted
+from stopgo.mission.files.imports import qgc_plan, qgc_waypoints
+from stopgo.mission.files.imports.track import ImportOptions
+from stopgo.mission.files.mission_json import write
+from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.states import started
 from tests.bridge.mavlink.lists import held, stops
 from tests.bridge.mavlink.scripted import Scripted
 from tests.mission.mavlink.following.worlds import tour
@@ -253,7 +253,7 @@ class Stalls(Scripted):
 def test_ctrl_c_cancels_and_tells_what_is_on_the_vehicle(tmp_path: Path, mission: Mission) -> None:
     write(sealed(mission), tmp_path / "mission.json")
     with Stalls(held(stops(3))) as stalling:
-        command = [sys.executable, "-m", "mission", "push", str(tmp_path / "mission.json"), "--any-origin"]
+        command = [sys.executable, "-m", "stopgo", "push", str(tmp_path / "mission.json"), "--any-origin"]
         command += ["--mavlink", str(stalling.url), "--vehicle", "1", "--state", str(tmp_path / "state")]
         process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
         with stalling.wire.waiting("MISSION_ITEM_INT") as waiting:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mission.__main__ import main
+from stopgo.command_line import main
 
 ROBOT = ["--name", "r1", "--state", "s"]
 DRIVEN = [*ROBOT, "--controller", "mavlink:udpin:127.0.0.1:14550"]

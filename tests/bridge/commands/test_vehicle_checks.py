@@ -9,17 +9,17 @@ from types import SimpleNamespace
 
 import pytest
 
-from bridge.commands.vehicle_checks import knows_its_place, parameter_checks
-from bridge.mavlink.line.parameter_reading import value_of
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
-from bridge.mavlink.simulated.vehicle_process import vehicle_on
-from mission.__main__ import main
-from mission.document import SiteOrigin
-from mission.mavlink.autopilots.ardupilot import ARDUPILOT
-from mission.mavlink.autopilots.px4 import PX4
+from stopgo.bridge.commands.vehicle_checks import knows_its_place, parameter_checks
+from stopgo.bridge.mavlink.line.parameter_reading import value_of
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
+from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.command_line import main
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
+from stopgo.mission.mavlink.autopilots.px4 import PX4
 from tests.ports import free_port
 
 INDOORS = {

@@ -12,16 +12,16 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.mavlink.line.url import Url
-from mission.document import Scan
-from mission.events import Finished, Scanned, Unconfirmed
-from mission.files.mission_json import write
-from recordings.carried.reading import read_recording
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.mission.document import Scan
+from stopgo.mission.events import Finished, Scanned, Unconfirmed
+from stopgo.mission.files.mission_json import write
+from stopgo.recordings.carried.reading import read_recording
 from tests.bridge.mavlink.auto.site import real_tour
 from tests.called import stopgo
 from tests.ports import free_port
 
-STOPGO = (sys.executable, "-m", "mission")
+STOPGO = (sys.executable, "-m", "stopgo")
 KEYS = "robot boot_id state run_id mission_id revision stop done skipped outside battery"
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from bridge.cli import recording
-from mission.errors import InputError
-from recordings import viewer
-from recordings.field import FieldRecording
-from recordings.viewer import Viewed, open_viewer
+from stopgo.bridge.cli import recording
+from stopgo.mission.errors import InputError
+from stopgo.recordings import viewer
+from stopgo.recordings.field import FieldRecording
+from stopgo.recordings.viewer import Viewed, open_viewer
 from tests.bridge.world import corridor
 
 

@@ -7,22 +7,22 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from bridge.conform.conform_robot import robot_verdicts
-from bridge.conform.falsified_seals import FalsifiedSeals
-from bridge.conform.requirements import ConformVerdict
-from bridge.conform.robot_bench import Forger, OtherStation, RobotBench
-from bridge.link.clock import WallClock
-from bridge.link.keys import now_utc, read_keys
-from bridge.link.memory_link import Switchboard
-from bridge.link.protocol import KeyExpressions
-from bridge.link.seals import NO_SEALS, KeySeals, Seals
-from bridge.robot.agent import Agent, on_link
-from bridge.robot.bodies import pose_of
-from bridge.robot.controller import Controller, new_boot_id
-from bridge.robot.inbox import Inbox
-from bridge.robot.journal import Journal, memory_journal
-from bridge.robot.recorder import RunRecorder
-from bridge.robot.simulator import SimulatedBase, SimulatedScanner
+from stopgo.bridge.conform.conform_robot import robot_verdicts
+from stopgo.bridge.conform.falsified_seals import FalsifiedSeals
+from stopgo.bridge.conform.requirements import ConformVerdict
+from stopgo.bridge.conform.robot_bench import Forger, OtherStation, RobotBench
+from stopgo.bridge.link.clock import WallClock
+from stopgo.bridge.link.keys import now_utc, read_keys
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.link.seals import NO_SEALS, KeySeals, Seals
+from stopgo.bridge.robot.agent import Agent, on_link
+from stopgo.bridge.robot.bodies import pose_of
+from stopgo.bridge.robot.controller import Controller, new_boot_id
+from stopgo.bridge.robot.inbox import Inbox
+from stopgo.bridge.robot.journal import Journal, memory_journal
+from stopgo.bridge.robot.recorder import RunRecorder
+from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from tests.bridge.world import EXACT
 
 

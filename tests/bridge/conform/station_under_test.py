@@ -6,19 +6,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from bridge.conform.fake_robot import FakeRobot, ForgedAnswers, MeddledLink, at_work
-from bridge.conform.requirements import ConformVerdict, tried
-from bridge.conform.station_bench import StationBench
-from bridge.conform.station_requirements import STATION_REQUIREMENTS
-from bridge.link.keys import HeldKeys, now_utc, read_keys
-from bridge.link.link import Link
-from bridge.link.memory_link import Switchboard
-from bridge.link.protocol import KeyExpressions
-from bridge.link.seals import NO_SEALS, KeySeals
-from bridge.station.station import Station
-from bridge.station.watch import Lines, watch_showing
-from mission.document import Mission
-from mission.errors import StopgoError
+from stopgo.bridge.conform.fake_robot import FakeRobot, ForgedAnswers, MeddledLink, at_work
+from stopgo.bridge.conform.requirements import ConformVerdict, tried
+from stopgo.bridge.conform.station_bench import StationBench
+from stopgo.bridge.conform.station_requirements import STATION_REQUIREMENTS
+from stopgo.bridge.link.keys import HeldKeys, now_utc, read_keys
+from stopgo.bridge.link.link import Link
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.link.seals import NO_SEALS, KeySeals
+from stopgo.bridge.station.station import Station
+from stopgo.bridge.station.watch import Lines, watch_showing
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import StopgoError
 
 KEYS = KeyExpressions("r1")
 

@@ -8,11 +8,11 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridge.conform.conform_robot import REQUIREMENTS, check_at_rest, robot_verdicts
-from bridge.conform.requirements import ConformVerdict, tried
-from bridge.conform.robot_bench import OVER
-from bridge.link.link import Answering, Request
-from bridge.link.protocol import (
+from stopgo.bridge.conform.conform_robot import REQUIREMENTS, check_at_rest, robot_verdicts
+from stopgo.bridge.conform.requirements import ConformVerdict, tried
+from stopgo.bridge.conform.robot_bench import OVER
+from stopgo.bridge.link.link import Answering, Request
+from stopgo.bridge.link.protocol import (
     POSE_PAGE,
     LogPage,
     Manifest,
@@ -23,16 +23,16 @@ from bridge.link.protocol import (
     decode,
     encode,
 )
-from bridge.link.seals import KeySeals, SealedAnswering, Seals
-from bridge.robot.agent import Agent
-from bridge.robot.controller import Controller
-from bridge.robot.inbox import Inbox
-from bridge.robot.recorder import RunRecorder
-from mission.document import Mission
-from mission.errors import InputError
-from mission.events import StateReport, TakenOver
-from mission.run.lease import Lease
-from mission.run.orders import FREE_VERBS, Answer, Order
+from stopgo.bridge.link.seals import KeySeals, SealedAnswering, Seals
+from stopgo.bridge.robot.agent import Agent
+from stopgo.bridge.robot.controller import Controller
+from stopgo.bridge.robot.inbox import Inbox
+from stopgo.bridge.robot.recorder import RunRecorder
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import StateReport, TakenOver
+from stopgo.mission.run.lease import Lease
+from stopgo.mission.run.orders import FREE_VERBS, Answer, Order
 from tests.bridge.conform.robot_under_test import RobotUnderTest, booted, failed, verdicts
 from tests.bridge.guarded import keys_of_site
 

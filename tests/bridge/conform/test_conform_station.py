@@ -13,18 +13,18 @@ from typing import Any
 
 import pytest
 
-from bridge.conform.conform_station import StationOptions, by_command, by_hand
-from bridge.conform.requirements import NotTried
-from bridge.conform.station_requirements import STATION_REQUIREMENTS
-from bridge.link.link import Link
-from bridge.link.protocol import Info, encode
-from bridge.link.seals import KeySeals, Question
-from bridge.station.follow import Followed
-from bridge.station.station import Station
-from mission.document import Mission
-from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
-from mission.files.mission_json import read
-from mission.run.orders import Answer, Order, Verb
+from stopgo.bridge.conform.conform_station import StationOptions, by_command, by_hand
+from stopgo.bridge.conform.requirements import NotTried
+from stopgo.bridge.conform.station_requirements import STATION_REQUIREMENTS
+from stopgo.bridge.link.link import Link
+from stopgo.bridge.link.protocol import Info, encode
+from stopgo.bridge.link.seals import KeySeals, Question
+from stopgo.bridge.station.follow import Followed
+from stopgo.bridge.station.station import Station
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown
+from stopgo.mission.files.mission_json import read
+from stopgo.mission.run.orders import Answer, Order, Verb
 from tests.bridge.conform.station_under_test import StationUnderTest, verdicts
 from tests.bridge.guarded import keys_of_site
 from tests.bridge.world import corridor

@@ -11,16 +11,16 @@ from typing import Any
 
 import pytest
 
-from bridge.commands.spawn import end_robot, start_robot
-from bridge.link import authority
-from bridge.link.access import router_access_control
-from bridge.link.authority import init_site, issue, listed, revoke, rotate
-from bridge.link.keys import Certificates, Holder, KeyFiles, Untrusted, common_name, now_utc, read_keys
-from bridge.link.protocol import KeyExpressions
-from bridge.link.zenoh_link import Guard, connecting, joining, listening
-from bridge.station.station import connect
-from mission.__main__ import main
-from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from stopgo.bridge.commands.spawn import end_robot, start_robot
+from stopgo.bridge.link import authority
+from stopgo.bridge.link.access import router_access_control
+from stopgo.bridge.link.authority import init_site, issue, listed, revoke, rotate
+from stopgo.bridge.link.keys import Certificates, Holder, KeyFiles, Untrusted, common_name, now_utc, read_keys
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.link.zenoh_link import Guard, connecting, joining, listening
+from stopgo.bridge.station.station import connect
+from stopgo.command_line import main
+from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.station.test_fleet import router
 from tests.bridge.world import corridor

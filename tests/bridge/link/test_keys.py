@@ -13,17 +13,17 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.commands.spawn import end_robot, start_robot
-from bridge.link import keys as site_keys
-from bridge.link.authority import init_site, issue, listed
-from bridge.link.keys import Certificates, Untrusted, now_utc, read_keys
-from bridge.link.link import Link, Request
-from bridge.link.protocol import KeyExpressions, Reply, encode
-from bridge.link.zenoh_link import Guard, check_endpoint, connecting
-from bridge.robot.agent import check_ordering
-from bridge.station.station import Station, connect
-from mission.errors import AnswerIsNo, InputError, RobotUnreachable
-from mission.events import PoseReport, Scanned
+from stopgo.bridge.commands.spawn import end_robot, start_robot
+from stopgo.bridge.link import keys as site_keys
+from stopgo.bridge.link.authority import init_site, issue, listed
+from stopgo.bridge.link.keys import Certificates, Untrusted, now_utc, read_keys
+from stopgo.bridge.link.link import Link, Request
+from stopgo.bridge.link.protocol import KeyExpressions, Reply, encode
+from stopgo.bridge.link.zenoh_link import Guard, check_endpoint, connecting
+from stopgo.bridge.robot.agent import check_ordering
+from stopgo.bridge.station.station import Station, connect
+from stopgo.mission.errors import AnswerIsNo, InputError, RobotUnreachable
+from stopgo.mission.events import PoseReport, Scanned
 from tests.bridge.station.test_fleet import router
 from tests.bridge.world import corridor
 from tests.called import stopgo

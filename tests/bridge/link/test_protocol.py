@@ -10,11 +10,11 @@ from typing import get_args, get_type_hints
 import pytest
 from msgspec import Struct
 
-from bridge.link import protocol
-from bridge.link.protocol import Info, KeyExpressions, Tagged, decode, encode
-from mission.errors import InputError
-from mission.events import AnyEvent, State, StopState, UnknownKind
-from mission.run.orders import Answer, Order, Reason
+from stopgo.bridge.link import protocol
+from stopgo.bridge.link.protocol import Info, KeyExpressions, Tagged, decode, encode
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import AnyEvent, State, StopState, UnknownKind
+from stopgo.mission.run.orders import Answer, Order, Reason
 from tests.bridge.world import Field
 
 TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "protocol.md").read_text(encoding="utf-8")

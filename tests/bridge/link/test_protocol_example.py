@@ -10,9 +10,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridge.link.protocol import Commit, KeyExpressions, Manifest, Reply, encode
-from mission.events import AnyEvent, PoseReport, StateReport
-from mission.run.orders import Order
+from stopgo.bridge.link.protocol import Commit, KeyExpressions, Manifest, Reply, encode
+from stopgo.mission.events import AnyEvent, PoseReport, StateReport
+from stopgo.mission.run.orders import Order
 
 TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "protocol.md").read_text(encoding="utf-8")
 (BLOCK,) = re.findall(r"^## An example\n.*?^```\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)

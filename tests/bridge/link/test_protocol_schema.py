@@ -12,16 +12,16 @@ import msgspec
 import pytest
 from jsonschema import Draft202012Validator
 
-from bridge.link.protocol import Malformed, Reply, Tagged, decode, encode
-from bridge.link.protocol_schema import protocol_schema
-from bridge.link.seals import Seal
-from mission.errors import AnswerIsNo
-from mission.events import KINDS, AnyEvent, Pose, PoseReport, StateReport, UnknownKind, event_of
-from mission.run.orders import Answer, Order
+from stopgo.bridge.link.protocol import Malformed, Reply, Tagged, decode, encode
+from stopgo.bridge.link.protocol_schema import protocol_schema
+from stopgo.bridge.link.seals import Seal
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.events import KINDS, AnyEvent, Pose, PoseReport, StateReport, UnknownKind, event_of
+from stopgo.mission.run.orders import Answer, Order
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import corridor
 
-SHIPPED = files("bridge.link").joinpath("protocol.schema.json").read_bytes()
+SHIPPED = files("stopgo.bridge.link").joinpath("protocol.schema.json").read_bytes()
 SCHEMA: dict[str, Any] = json.loads(SHIPPED)
 MESSAGES = [str(message.__struct_config__.tag) for message in (*Tagged.__subclasses__(), Order, Answer)]
 
@@ -39,7 +39,7 @@ def valid(name: str, message: object) -> bool:
 
 def test_the_shipped_schema_is_the_generated_one() -> None:
     assert protocol_schema() == SHIPPED, (
-        "python -m bridge.link.protocol_schema > bridge/link/protocol.schema.json"
+        "python -m stopgo.bridge.link.protocol_schema > bridge/link/protocol.schema.json"
     )
 
 

@@ -16,11 +16,11 @@ from cryptography import x509
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 
-from bridge.link.keys import HeldKeys, KeyFiles, holder_of
-from bridge.link.link import Request
-from bridge.link.seals import KeySeals
+from stopgo.bridge.link.keys import HeldKeys, KeyFiles, holder_of
+from stopgo.bridge.link.link import Request
+from stopgo.bridge.link.seals import KeySeals
 
-VECTORS: dict[str, Any] = json.loads(files("bridge.link").joinpath("seal.vectors.json").read_bytes())
+VECTORS: dict[str, Any] = json.loads(files("stopgo.bridge.link").joinpath("seal.vectors.json").read_bytes())
 MESSAGES: list[dict[str, Any]] = VECTORS["messages"]
 each_message = pytest.mark.parametrize("message", MESSAGES, ids=lambda message: str(message["shows"]))
 

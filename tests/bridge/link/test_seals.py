@@ -10,9 +10,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.link.memory_link import SealedMessage
-from bridge.link.seals import OLDEST_S, Seal
-from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.bridge.link.memory_link import SealedMessage
+from stopgo.bridge.link.seals import OLDEST_S, Seal
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import corridor
 

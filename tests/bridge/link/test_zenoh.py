@@ -11,14 +11,14 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.commands.spawn import end_robot, robot_process, start_robot
-from bridge.link.protocol import PosePage, decode
-from bridge.link.zenoh_link import Guard, check_endpoint
-from bridge.station.follow import Followed
-from bridge.station.station import connect
-from mission.document import sealed
-from mission.errors import InputError, RobotUnreachable
-from mission.events import Event, Finished, PoseReport, Scanned, StateReport
+from stopgo.bridge.commands.spawn import end_robot, robot_process, start_robot
+from stopgo.bridge.link.protocol import PosePage, decode
+from stopgo.bridge.link.zenoh_link import Guard, check_endpoint
+from stopgo.bridge.station.follow import Followed
+from stopgo.bridge.station.station import connect
+from stopgo.mission.document import sealed
+from stopgo.mission.errors import InputError, RobotUnreachable
+from stopgo.mission.events import Event, Finished, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor
 from tests.called import stopgo
 from tests.ports import free_port
@@ -76,7 +76,7 @@ def test_a_watch_that_comes_first_waits_for_the_run_and_ends_with_1_when_it_is_a
 ) -> None:
     with robot_process("r1", tmp_path, speed_up=10) as endpoint, connect(endpoint, robot="r1") as station:
         station.push(corridor())
-        command = [sys.executable, "-m", "mission", "watch", "--robot", "r1", "--connect", endpoint]
+        command = [sys.executable, "-m", "stopgo", "watch", "--robot", "r1", "--connect", endpoint]
         watch = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         assert watch.stdout is not None
         assert "waiting" in watch.stdout.readline()
@@ -123,7 +123,7 @@ def test_a_robot_that_is_not_there_is_unreachable_and_nothing_is_sent() -> None:
 
 def test_a_session_that_is_open_does_not_keep_the_interpreter() -> None:
     code = (
-        "from bridge.link.zenoh_link import listening\n"
+        "from stopgo.bridge.link.zenoh_link import listening\n"
         f"with listening('tcp/127.0.0.1:{free_port()}') as link:\n"
         "    link.serve('a/b', lambda request: b'')\n"
         "    raise SystemExit(7)\n"

@@ -7,9 +7,9 @@ import random
 from collections.abc import Iterator
 from typing import Any
 
-from bridge.mavlink.line.frames import dialect
-from mission.mavlink.items import Item
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.mission.mavlink.items import Item
+from stopgo.mission.mavlink.telemetry import Message
 
 FLOATS = (
     0.0, -0.0, 1.0, -1.0, 0.5, 90.0, 1e7, 1e38, -1e38, 1e-45, float("inf"), float("-inf"), float("nan"),

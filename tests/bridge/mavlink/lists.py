@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from bridge.mavlink.line.messages import item_message
-from mission.document import SiteOrigin
-from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.items import Command, Item, ItemList, MavFrame, Placed
-from mission.mavlink.read_back import upload_of
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.messages import item_message
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.items import Command, Item, ItemList, MavFrame, Placed
+from stopgo.mission.mavlink.read_back import upload_of
+from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.scripted import VEHICLE
 
 SITE = SiteOrigin(lat=47.0, lon=8.0, alt=0.0, heading_deg=0.0)

@@ -11,10 +11,10 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import Who, Wire, sender, wire
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.line.wire import Who, Wire, sender, wire
+from stopgo.mission.mavlink.telemetry import Message
 from tests.ports import free_port
 
 ASK_AGAIN_S = 0.25

@@ -5,10 +5,10 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from bridge.robot.answers import answer_to, answered, remember_answer
-from bridge.robot.journal import memory_journal
-from mission.run.orders import Order
-from mission.run.states import Run
+from stopgo.bridge.robot.answers import answer_to, answered, remember_answer
+from stopgo.bridge.robot.journal import memory_journal
+from stopgo.mission.run.orders import Order
+from stopgo.mission.run.states import Run
 
 START = Order(cmd_id="once", verb="start", commander="alice", issued_ns=1, valid_for_s=5.0)
 RUN = Run(state="RUNNING", run_id="r")

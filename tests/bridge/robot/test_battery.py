@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from bridge.robot.simulator import Fault, Faults
-from mission.errors import AnswerIsNo
-from mission.run.battery import time_left, what_is_missing
-from mission.schedule import schedule
+from stopgo.bridge.robot.simulator import Fault, Faults
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.run.battery import time_left, what_is_missing
+from stopgo.mission.schedule import schedule
 from tests.bridge.world import EXACT, Field, corridor
 
 TOTAL_S = schedule(corridor()).total_s

@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from bridge.console import carried_out, refusals_in, tell
-from bridge.link.link import Link
-from bridge.link.protocol import encode
-from mission.errors import AnswerIsNo, OutcomeUnknown
-from mission.events import STOPS_LISTED, TakenOver
-from mission.run.lease import LEASE_S, Lease, claimed
-from mission.run.orders import Answer, Refused, Verb
+from stopgo.bridge.console import carried_out, refusals_in, tell
+from stopgo.bridge.link.link import Link
+from stopgo.bridge.link.protocol import encode
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.events import STOPS_LISTED, TakenOver
+from stopgo.mission.run.lease import LEASE_S, Lease, claimed
+from stopgo.mission.run.orders import Answer, Refused, Verb
 from tests.bridge.world import Field, corridor
 
 ALICE = Lease(commander="alice", fence=3, until_ns=10_000_000_000)

@@ -10,13 +10,13 @@ from threading import Event
 import msgspec
 import pytest
 
-from bridge.robot.base import Rest
-from bridge.robot.simulator import Fault, Faults, read_fault
-from mission.document import Mission, sealed
-from mission.errors import AnswerIsNo, InputError
-from mission.events import Pose, Scanned
-from mission.run.orders import Verb
-from mission.run.scans import ScanFailed
+from stopgo.bridge.robot.base import Rest
+from stopgo.bridge.robot.simulator import Fault, Faults, read_fault
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.events import Pose, Scanned
+from stopgo.mission.run.orders import Verb
+from stopgo.mission.run.scans import ScanFailed
 from tests.bridge.world import Field, corridor
 from tests.disk import small_disk
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.link.protocol import Manifest
-from bridge.robot.journal import (
+from stopgo.bridge.link.protocol import Manifest
+from stopgo.bridge.robot.journal import (
     LOCKED_S,
     MISSIONS_KEPT,
     Owner,
@@ -21,13 +21,13 @@ from bridge.robot.journal import (
     open_journal,
     shared_journal,
 )
-from bridge.robot.journal_format import FORMAT, TABLES
-from bridge.robot.reserve import LEAST_FREE_BYTES, RESERVE_BYTES, Reserve
-from bridge.robot.sealed_rows import SEALED, put
-from bridge.station.watch import event_line
-from mission.errors import AnswerIsNo, InputError
-from mission.events import Started, UnknownKind, event_of
-from mission.run.orders import Verb
+from stopgo.bridge.robot.journal_format import FORMAT, TABLES
+from stopgo.bridge.robot.reserve import LEAST_FREE_BYTES, RESERVE_BYTES, Reserve
+from stopgo.bridge.robot.sealed_rows import SEALED, put
+from stopgo.bridge.station.watch import event_line
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.events import Started, UnknownKind, event_of
+from stopgo.mission.run.orders import Verb
 from tests.bridge.world import Field, corridor
 
 

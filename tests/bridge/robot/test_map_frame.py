@@ -9,15 +9,15 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.commands.spawn import robot_process
-from bridge.link.clock import SimulatedClock
-from bridge.robot.controller import Controller
-from bridge.robot.inbox import Inbox
-from bridge.robot.journal import memory_journal
-from bridge.robot.map_frame import OnMap, turned, turned_back, turned_point
-from bridge.robot.simulator import SimulatedBase, SimulatedScanner
-from mission.document import Frame, Transform, sealed
-from mission.events import Pose
+from stopgo.bridge.commands.spawn import robot_process
+from stopgo.bridge.link.clock import SimulatedClock
+from stopgo.bridge.robot.controller import Controller
+from stopgo.bridge.robot.inbox import Inbox
+from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.map_frame import OnMap, turned, turned_back, turned_point
+from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
+from stopgo.mission.document import Frame, Transform, sealed
+from stopgo.mission.events import Pose
 from tests.bridge.world import EXACT, Field, corridor
 from tests.called import stopgo
 

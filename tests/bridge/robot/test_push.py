@@ -10,12 +10,21 @@ import weakref
 import msgspec
 import pytest
 
-from bridge.link.link import Request
-from bridge.link.protocol import CHUNK_BYTES, Accepted, Malformed, Manifest, Ready, Rejected, decode, encode
-from bridge.robot.mission_reading import read_mission
-from mission.document import Mission, canonical, sealed
-from mission.errors import AnswerIsNo, OutcomeUnknown
-from mission.files.mission_json import parse
+from stopgo.bridge.link.link import Request
+from stopgo.bridge.link.protocol import (
+    CHUNK_BYTES,
+    Accepted,
+    Malformed,
+    Manifest,
+    Ready,
+    Rejected,
+    decode,
+    encode,
+)
+from stopgo.bridge.robot.mission_reading import read_mission
+from stopgo.mission.document import Mission, canonical, sealed
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.files.mission_json import parse
 from tests.bridge.world import Field, corridor
 
 LAST_NET_S = 60.0

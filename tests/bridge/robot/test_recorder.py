@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from bridge.link.capabilities import RECORD, WITHOUT
-from bridge.link.protocol import RECORD_PAGE, PoseRow, RecordPage
-from bridge.robot.base import BaseHealth
-from bridge.robot.pages import POSES_KEPT
-from bridge.robot.recorder import RETIRED, RunRecorder
-from bridge.robot.run_record import ANEW, DAMAGED, UNSEEN
-from mission.events import Pose, PoseReport, PosesMissing
+from stopgo.bridge.link.capabilities import RECORD, WITHOUT
+from stopgo.bridge.link.protocol import RECORD_PAGE, PoseRow, RecordPage
+from stopgo.bridge.robot.base import BaseHealth
+from stopgo.bridge.robot.pages import POSES_KEPT
+from stopgo.bridge.robot.recorder import RETIRED, RunRecorder
+from stopgo.bridge.robot.run_record import ANEW, DAMAGED, UNSEEN
+from stopgo.mission.events import Pose, PoseReport, PosesMissing
 from tests.disk import small_disk
 from tests.faults.sizes import some
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from bridge import record_file
-from bridge.link.link import Request
-from bridge.link.protocol import RecordPage, Rejected
-from bridge.record_file import RecordFile, open_record_file, read_record_file
-from bridge.robot import recorder as recorder_module
-from bridge.robot.recorder import RunRecorder
+from stopgo.bridge import record_file
+from stopgo.bridge.link.link import Request
+from stopgo.bridge.link.protocol import RecordPage, Rejected
+from stopgo.bridge.record_file import RecordFile, open_record_file, read_record_file
+from stopgo.bridge.robot import recorder as recorder_module
+from stopgo.bridge.robot.recorder import RunRecorder
 from tests.bridge.robot.test_recorder import BEGAN_NS, drive, idle, pose, seqs
 
 LAST_NET_S = 60.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from datetime import datetime, timedelta
 
-from bridge.link.keys import now_utc
-from bridge.robot.agent import Agent
-from bridge.robot.refusal_log import RefusalLog
-from mission.errors import AnswerIsNo
+from stopgo.bridge.link.keys import now_utc
+from stopgo.bridge.robot.agent import Agent
+from stopgo.bridge.robot.refusal_log import RefusalLog
+from stopgo.mission.errors import AnswerIsNo
 from tests.bridge.world import Field, corridor
 
 

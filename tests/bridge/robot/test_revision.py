@@ -7,9 +7,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from mission.document import Mission, Scan, Transform, sealed
-from mission.errors import AnswerIsNo
-from mission.events import RevisionTaken, Scanned
+from stopgo.mission.document import Mission, Scan, Transform, sealed
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.events import RevisionTaken, Scanned
 from tests.bridge.world import Field, corridor
 from tests.faults.test_crashes import Mains, PowerCut
 

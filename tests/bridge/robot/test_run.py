@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from mission.document import Mission
-from mission.schedule import schedule
+from stopgo.mission.document import Mission
+from stopgo.mission.schedule import schedule
 from tests.bridge.world import Field, corridor
 
 

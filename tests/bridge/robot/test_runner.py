@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.link.memory_link import Switchboard
-from bridge.robot.agent import Agent, on_link
-from bridge.robot.controller import Controller
-from mission.document import Mission
-from mission.run.states import Run
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.robot.agent import Agent, on_link
+from stopgo.bridge.robot.controller import Controller
+from stopgo.mission.document import Mission
+from stopgo.mission.run.states import Run
 from tests.bridge.world import Field, corridor
 
 

@@ -7,11 +7,11 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridge.commands.order_commands import state_line, status_json
-from bridge.commands.watch_commands import tell_compared
-from bridge.station.watch import EventObjects, Lines, event_line, table_lines, watch_showing
-from mission.events import Scanned
-from mission.heard_run import HeardRun
+from stopgo.bridge.commands.order_commands import state_line, status_json
+from stopgo.bridge.commands.watch_commands import tell_compared
+from stopgo.bridge.station.watch import EventObjects, Lines, event_line, table_lines, watch_showing
+from stopgo.mission.events import Scanned
+from stopgo.mission.heard_run import HeardRun
 from tests.bridge.world import Field, corridor
 
 BESIDE = "120 mm beside its place (50 mm are tolerated)"

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from bridge.link.clock import SimulatedClock
-from bridge.link.protocol import Booted, KeyExpressions, encode
-from bridge.link.zenoh_link import listening
-from bridge.robot import program
-from bridge.robot.agent import Agent
-from bridge.robot.program import check_name_is_free
-from bridge.station.station import Station, connect
-from mission.errors import AnswerIsNo
+from stopgo.bridge.link.clock import SimulatedClock
+from stopgo.bridge.link.protocol import Booted, KeyExpressions, encode
+from stopgo.bridge.link.zenoh_link import listening
+from stopgo.bridge.robot import program
+from stopgo.bridge.robot.agent import Agent
+from stopgo.bridge.robot.program import check_name_is_free
+from stopgo.bridge.station.station import Station, connect
+from stopgo.mission.errors import AnswerIsNo
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import Field, corridor
 from tests.ports import free_port

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import msgspec
 
-from bridge.link.link import Request
-from bridge.link.memory_link import Switchboard
-from bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, encode
-from bridge.station.follow import PoseHistory, RunFollower
-from bridge.station.record import Past
-from mission.events import Health, Pose, PoseReport
+from stopgo.bridge.link.link import Request
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, encode
+from stopgo.bridge.station.follow import PoseHistory, RunFollower
+from stopgo.bridge.station.record import Past
+from stopgo.mission.events import Health, Pose, PoseReport
 from tests.bridge.world import Field, corridor
 
 

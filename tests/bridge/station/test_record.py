@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from bridge.link.link import Request, Unanswered
-from bridge.link.memory_link import Switchboard
-from bridge.link.protocol import RECORD_PAGE, KeyExpressions, encode
-from bridge.robot.base import BaseHealth
-from bridge.robot.recorder import RunRecorder
-from bridge.robot.run_record import ANEW
-from bridge.station import record
-from bridge.station.record import Past, Recorded, RecordHistory, past_run
-from mission.events import Health, PoseReport, PosesMissing
+from stopgo.bridge.link.link import Request, Unanswered
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.link.protocol import RECORD_PAGE, KeyExpressions, encode
+from stopgo.bridge.robot.base import BaseHealth
+from stopgo.bridge.robot.recorder import RunRecorder
+from stopgo.bridge.robot.run_record import ANEW
+from stopgo.bridge.station import record
+from stopgo.bridge.station.record import Past, Recorded, RecordHistory, past_run
+from stopgo.mission.events import Health, PoseReport, PosesMissing
 from tests.bridge.robot.test_recorder import BEGAN_NS, idle, ns, pose
 
 FAR = 5000

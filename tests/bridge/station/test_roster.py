@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
-from bridge.link import zenoh_link
-from bridge.link.memory_link import MemoryLink
-from bridge.station import fleet as fleets
-from bridge.station.roster import read_roster
-from mission.__main__ import main
-from mission.errors import InputError
+from stopgo.bridge.link import zenoh_link
+from stopgo.bridge.link.memory_link import MemoryLink
+from stopgo.bridge.station import fleet as fleets
+from stopgo.bridge.station.roster import read_roster
+from stopgo.command_line import main
+from stopgo.mission.errors import InputError
 from tests.bridge.world import Field
 
 

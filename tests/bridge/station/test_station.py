@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from bridge.link.memory_link import MemoryLink, Switchboard
-from bridge.link.protocol import KeyExpressions, encode
-from bridge.station import station as stations
-from bridge.station.follow import PoseHistory
-from bridge.station.station import LEAST_S, PATIENCE_S, Station
-from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.bridge.link.memory_link import MemoryLink, Switchboard
+from stopgo.bridge.link.protocol import KeyExpressions, encode
+from stopgo.bridge.station import station as stations
+from stopgo.bridge.station.follow import PoseHistory
+from stopgo.bridge.station.station import LEAST_S, PATIENCE_S, Station
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from tests.bridge.world import Field, corridor
 
 

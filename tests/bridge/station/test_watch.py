@@ -11,23 +11,23 @@ from pathlib import Path
 
 import pytest
 
-from bridge.commands import watch_commands
-from bridge.console import say, tell
-from bridge.link.clock import WallClock
-from bridge.link.memory_link import Switchboard
-from bridge.link.protocol import KeyExpressions
-from bridge.robot import agent as agents
-from bridge.robot.agent import Agent
-from bridge.robot.bodies import pose_of
-from bridge.robot.controller import Controller
-from bridge.robot.inbox import Inbox
-from bridge.robot.journal import memory_journal
-from bridge.robot.recorder import RunRecorder
-from bridge.robot.simulator import SimulatedBase, SimulatedScanner
-from bridge.station.follow import Report, Silence
-from bridge.station.past import past_reports
-from bridge.station.station import Station
-from bridge.station.watch import (
+from stopgo.bridge.commands import watch_commands
+from stopgo.bridge.console import say, tell
+from stopgo.bridge.link.clock import WallClock
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.robot import agent as agents
+from stopgo.bridge.robot.agent import Agent
+from stopgo.bridge.robot.bodies import pose_of
+from stopgo.bridge.robot.controller import Controller
+from stopgo.bridge.robot.inbox import Inbox
+from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.recorder import RunRecorder
+from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
+from stopgo.bridge.station.follow import Report, Silence
+from stopgo.bridge.station.past import past_reports
+from stopgo.bridge.station.station import Station
+from stopgo.bridge.station.watch import (
     HINT,
     EventObjects,
     Lines,
@@ -37,11 +37,20 @@ from bridge.station.watch import (
     table_lines,
     watch_showing,
 )
-from mission.__main__ import main
-from mission.document import Mission
-from mission.errors import AnswerIsNo, OutcomeUnknown
-from mission.events import AnyEvent, Event, Health, Held, PoseReport, PosesMissing, Scanned, StateReport
-from mission.schedule import schedule
+from stopgo.command_line import main
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.events import (
+    AnyEvent,
+    Event,
+    Health,
+    Held,
+    PoseReport,
+    PosesMissing,
+    Scanned,
+    StateReport,
+)
+from stopgo.mission.schedule import schedule
 from tests.bridge.world import Field, corridor
 from tests.disk import small_disk
 

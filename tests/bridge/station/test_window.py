@@ -8,7 +8,7 @@ from collections import Counter
 
 import pytest
 
-from bridge.station.window import FIRST, QUICK_S, Window, windowed
+from stopgo.bridge.station.window import FIRST, QUICK_S, Window, windowed
 
 PIECE_BITS = 32 * 1024 * 8
 

@@ -9,13 +9,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from mission.comparing.compare import compare
-from mission.comparing.judging import judge
-from mission.comparing.spans import stood_s
-from mission.comparing.telling import comparison_json, comparison_text
-from mission.comparison import Comparison
-from mission.document import Mission, sealed
-from mission.events import (
+from stopgo.mission.comparing.compare import compare
+from stopgo.mission.comparing.judging import judge
+from stopgo.mission.comparing.spans import stood_s
+from stopgo.mission.comparing.telling import comparison_json, comparison_text
+from stopgo.mission.comparison import Comparison
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.events import (
     Aborted,
     Arrived,
     Failed,
@@ -31,11 +31,11 @@ from mission.events import (
     Started,
     Unconfirmed,
 )
-from mission.figures import Figures, worst_first
-from mission.ledger import ledger_of
-from mission.planning import Route
-from mission.run_log import RunLog
-from mission.sight import Sight, sight_of
+from stopgo.mission.figures import Figures, worst_first
+from stopgo.mission.ledger import ledger_of
+from stopgo.mission.planning import Route
+from stopgo.mission.run_log import RunLog
+from stopgo.mission.sight import Sight, sight_of
 from tests.mission.comparing.told import SCAN, at, told
 from tests.mission.worlds import square_tour
 from tests.recordings import world

@@ -10,7 +10,7 @@ from mavsdk import ComponentType, Configuration, Mavsdk
 from mavsdk.plugins.mission_raw import MissionRaw
 from pymavlink.dialects.v20 import common as mavlink
 
-from mission.document import Mission
+from stopgo.mission.document import Mission
 from tests.mission.exports.worlds import MISSIONS
 
 

@@ -14,12 +14,12 @@ from ezdxf.document import Drawing
 from ezdxf.lldxf.encoding import decode_dxf_unicode
 from ezdxf.lldxf.tagwriter import TagCollector
 
-from mission.document import Mission
-from mission.errors import InputError
-from mission.files.exports import FORMATS, exported
-from mission.files.exports.format import FloorDrawing, Supplements
-from mission.files.exports.stops_dxf import LAYERS
-from mission.files.exports.stretches import Stretches
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.exports import FORMATS, exported
+from stopgo.mission.files.exports.format import FloorDrawing, Supplements
+from stopgo.mission.files.exports.stops_dxf import LAYERS
+from stopgo.mission.files.exports.stretches import Stretches
 from tests.mission.exports.worlds import laboratory, surveyed
 from tests.mission.worlds import square_tour
 

@@ -9,11 +9,11 @@ import ezdxf
 import msgspec
 import pytest
 
-from mission.__main__ import main
-from mission.document import Mission, SiteOrigin
-from mission.files import mission_json
-from mission.files.exports import FORMATS
-from mission.files.mission_json import read
+from stopgo.command_line import main
+from stopgo.mission.document import Mission, SiteOrigin
+from stopgo.mission.files import mission_json
+from stopgo.mission.files.exports import FORMATS
+from stopgo.mission.files.mission_json import read
 from tests.mission.exports.worlds import laboratory
 
 Captured = pytest.CaptureFixture[str]

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from mission.files import mission_json
-from mission.files.exports import FORMATS
+from stopgo.mission.files import mission_json
+from stopgo.mission.files.exports import FORMATS
 from tests.journeys.test_base import without_extras
 from tests.mission.exports.worlds import laboratory
 
 NEEDS = {"dxf": "plan", "mcap": "record"}
-FRONT_DOOR = "from mission.__main__ import main\nsys.exit(main(sys.argv[1:]))"
+FRONT_DOOR = "from stopgo.command_line import main\nsys.exit(main(sys.argv[1:]))"
 
 
 EXPORTING = """
-from mission.__main__ import main
+from stopgo.command_line import main
 print([main(["export", sys.argv[1], "-o", out]) for out in sys.argv[2:]])
 """
 

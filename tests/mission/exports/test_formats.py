@@ -7,13 +7,13 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from mission.cli import FORMAT_NAMES, export
-from mission.document import Frame, Mission, Transform, digest_of
-from mission.errors import InputError, StopgoError
-from mission.files import exports
-from mission.files.exports import FORMATS, exported, format_named
-from mission.files.exports.format import Format, Supplements
-from mission.files.exports.waypoints import mapped
+from stopgo.mission.cli import FORMAT_NAMES, export
+from stopgo.mission.document import Frame, Mission, Transform, digest_of
+from stopgo.mission.errors import InputError, StopgoError
+from stopgo.mission.files import exports
+from stopgo.mission.files.exports import FORMATS, exported, format_named
+from stopgo.mission.files.exports.format import Format, Supplements
+from stopgo.mission.files.exports.waypoints import mapped
 from tests.mission.exports.worlds import surveyed
 from tests.mission.worlds import square_tour
 

@@ -11,15 +11,15 @@ import pytest
 from mavsdk.plugins.mission_raw import MissionRaw
 from pymavlink.mavwp import MAVWPLoader
 
-from mission.document import Mission
-from mission.errors import AnswerIsNo
-from mission.files.exports import exported
-from mission.files.exports.format import Supplements
-from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
-from mission.mavlink.autopilots import AUTOPILOTS
-from mission.mavlink.items import Command
-from mission.mavlink.read_back import home_item
-from mission.mavlink.translate import translate
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.files.exports import exported
+from stopgo.mission.files.exports.format import Supplements
+from stopgo.mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
+from stopgo.mission.mavlink.autopilots import AUTOPILOTS
+from stopgo.mission.mavlink.items import Command
+from stopgo.mission.mavlink.read_back import home_item
+from stopgo.mission.mavlink.translate import translate
 from tests.mission.exports.worlds import laboratory
 
 FileOf = Callable[[bytes, str], str]

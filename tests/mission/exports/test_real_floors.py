@@ -11,21 +11,21 @@ import ezdxf
 import pytest
 import shapely
 
-from mission.document import Mission
-from mission.errors import InputError
-from mission.files.coverage_json import coverage_json
-from mission.files.exports import FORMATS, exported
-from mission.files.exports.format import FloorDrawing, Supplements
-from mission.files.exports.stops_dxf import LAYERS
-from mission.files.exports.stretches import read_stretches
-from mission.files.imports import READERS
-from mission.files.imports.assembling import mission_of
-from mission.files.imports.track import ImportOptions
-from mission.settings import Settings
-from planner import plan
-from planner.floors import read_floor
-from planner.floors.drawing import open_drawing
-from planner.floors.dxf import metres_in
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.coverage_json import coverage_json
+from stopgo.mission.files.exports import FORMATS, exported
+from stopgo.mission.files.exports.format import FloorDrawing, Supplements
+from stopgo.mission.files.exports.stops_dxf import LAYERS
+from stopgo.mission.files.exports.stretches import read_stretches
+from stopgo.mission.files.imports import READERS
+from stopgo.mission.files.imports.assembling import mission_of
+from stopgo.mission.files.imports.track import ImportOptions
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.floors import read_floor
+from stopgo.planner.floors.drawing import open_drawing
+from stopgo.planner.floors.dxf import metres_in
 from tests.faults.sizes import FULL
 from tests.mission.exports.test_dxf import opened, stops_in, unchanged
 from tests.mission.exports.worlds import laboratory

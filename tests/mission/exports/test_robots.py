@@ -17,11 +17,11 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from ruamel.yaml import YAML
 
-from mission.document import Mission, OnFailure, Transform
-from mission.files.exports import FORMATS, exported, format_named
-from mission.files.exports.format import Supplements
-from mission.files.exports.waypoints import mapped, way
-from mission.turning import turned, turned_back
+from stopgo.mission.document import Mission, OnFailure, Transform
+from stopgo.mission.files.exports import FORMATS, exported, format_named
+from stopgo.mission.files.exports.format import Supplements
+from stopgo.mission.files.exports.waypoints import mapped, way
+from stopgo.mission.turning import turned, turned_back
 from tests.mission.exports.vda5050_order import ORDERS
 from tests.mission.exports.worlds import MAP, laboratory, on_a_map
 from tests.mission.worlds import mission_of, square_tour, stop

@@ -10,10 +10,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from mission.document import Mission, sealed
-from mission.errors import InputError
-from mission.files.coverage_json import write_coverage
-from mission.files.exports.stretches import read_stretches
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.coverage_json import write_coverage
+from stopgo.mission.files.exports.stretches import read_stretches
 from tests.mission.worlds import room_mission, room_route, square_tour
 
 

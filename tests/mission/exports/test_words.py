@@ -12,11 +12,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from mission.document import Mission, sealed
-from mission.files.exports import FORMATS, exported
-from mission.files.exports.format import Supplements
-from mission.files.imports import READERS
-from mission.files.imports.track import ImportOptions
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.files.exports import FORMATS, exported
+from stopgo.mission.files.exports.format import Supplements
+from stopgo.mission.files.imports import READERS
+from stopgo.mission.files.imports.track import ImportOptions
 from tests.mission.exports.worlds import laboratory
 
 words = st.text(st.characters(exclude_categories=("Cs",)), min_size=1, max_size=20)

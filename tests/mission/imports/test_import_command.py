@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from mission.__main__ import main
-from mission.files.mission_json import read
+from stopgo.command_line import main
+from stopgo.mission.files.mission_json import read
 from tests.mission.imports.worlds import CAPTURE, command, delay, plan, waypoint, waypoints
 
 Captured = pytest.CaptureFixture[str]

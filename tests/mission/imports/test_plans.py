@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from mission.errors import InputError
-from mission.files.imports import qgc_plan, qgc_waypoints
-from mission.files.imports.track import ImportOptions
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.imports import qgc_plan, qgc_waypoints
+from stopgo.mission.files.imports.track import ImportOptions
 from tests.mission.imports.worlds import HOME, plan, waypoint, waypoints
 
 MISSIONS = Path(__file__).parents[4] / "shared" / "data" / "missions"

@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mission.document import Mission, SiteOrigin, Stop, sealed
-from mission.errors import InputError
-from mission.files.exports import exported
-from mission.files.exports.format import Supplements
-from mission.files.imports import READERS, read_mission
-from mission.files.imports.assembling import mission_of
-from mission.files.imports.track import ImportOptions
-from mission.mavlink.autopilots import AUTOPILOTS
-from mission.problems import problems_of
-from mission.settings import Settings
+from stopgo.mission.document import Mission, SiteOrigin, Stop, sealed
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.exports import exported
+from stopgo.mission.files.exports.format import Supplements
+from stopgo.mission.files.imports import READERS, read_mission
+from stopgo.mission.files.imports.assembling import mission_of
+from stopgo.mission.files.imports.track import ImportOptions
+from stopgo.mission.mavlink.autopilots import AUTOPILOTS
+from stopgo.mission.problems import problems_of
+from stopgo.mission.settings import Settings
 from tests.mission.exports.worlds import laboratory
 from tests.mission.worlds import mission_of as mission_over
 from tests.mission.worlds import stop

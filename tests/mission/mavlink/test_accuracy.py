@@ -5,8 +5,8 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from mission.mavlink.accuracy import stops_within, why_beside
-from mission.mavlink.autopilots import AUTOPILOTS
+from stopgo.mission.mavlink.accuracy import stops_within, why_beside
+from stopgo.mission.mavlink.autopilots import AUTOPILOTS
 from tests.bridge.mavlink.driving.world import cornered_mission
 
 

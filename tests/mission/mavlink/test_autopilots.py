@@ -7,10 +7,10 @@ from enum import IntEnum, IntFlag
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from mission.mavlink import enums
-from mission.mavlink.autopilots import AUTOPILOTS, autopilot_of
-from mission.mavlink.autopilots.kind import Autopilot, Mode
-from mission.mavlink.items import Command
+from stopgo.mission.mavlink import enums
+from stopgo.mission.mavlink.autopilots import AUTOPILOTS, autopilot_of
+from stopgo.mission.mavlink.autopilots.kind import Autopilot, Mode
+from stopgo.mission.mavlink.items import Command
 
 PREFIXES: dict[type[IntEnum] | type[IntFlag], str] = {
     enums.Firmware: "MAV_AUTOPILOT", enums.VehicleType: "MAV_TYPE", enums.ModeFlag: "MAV_MODE_FLAG",

@@ -6,8 +6,8 @@ import hashlib
 
 import pytest
 
-from mission.mavlink.captures import read_file_url
-from mission.run.scans import ScanFailed, ScanResult
+from stopgo.mission.mavlink.captures import read_file_url
+from stopgo.mission.run.scans import ScanFailed, ScanResult
 
 SHA = hashlib.sha256(b"scan").hexdigest()
 URL = f"scan-1.e57?size=1600&points=100&sha256={SHA}"

@@ -10,7 +10,7 @@ import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from mission.mavlink.corners import corners
+from stopgo.mission.mavlink.corners import corners
 
 METRES = st.integers(-20_000_000, 20_000_000).map(lambda micrometres: micrometres / 1e6)
 PLACE = st.tuples(METRES, METRES)

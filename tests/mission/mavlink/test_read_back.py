@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mission.mavlink.autopilots import AUTOPILOTS
-from mission.mavlink.autopilots.ardupilot import keeps as ardupilot_keeps
-from mission.mavlink.autopilots.px4 import keeps as px4_keeps
-from mission.mavlink.items import NAN, Command, Item, MavFrame
-from mission.mavlink.read_back import differences, placed_at, upload_of
-from mission.mavlink.translate import translate
+from stopgo.mission.mavlink.autopilots import AUTOPILOTS
+from stopgo.mission.mavlink.autopilots.ardupilot import keeps as ardupilot_keeps
+from stopgo.mission.mavlink.autopilots.px4 import keeps as px4_keeps
+from stopgo.mission.mavlink.items import NAN, Command, Item, MavFrame
+from stopgo.mission.mavlink.read_back import differences, placed_at, upload_of
+from stopgo.mission.mavlink.translate import translate
 from tests.mission.mavlink.worlds import NAMES, corner_tour, first_scan, narrow_view, read_back
 from tests.mission.worlds import square_tour
 

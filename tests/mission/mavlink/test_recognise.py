@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from mission.document import SiteOrigin
-from mission.errors import InputError
-from mission.mavlink.items import Command, Item, MavFrame
-from mission.mavlink.recognise import recognise, stop_of_trigger, stops_of
-from mission.mavlink.recognised_tour import RecognisedTour, recognised_tour
-from mission.mavlink.translate import translate
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.errors import InputError
+from stopgo.mission.mavlink.items import Command, Item, MavFrame
+from stopgo.mission.mavlink.recognise import recognise, stop_of_trigger, stops_of
+from stopgo.mission.mavlink.recognised_tour import RecognisedTour, recognised_tour
+from stopgo.mission.mavlink.translate import translate
 from tests.mission.mavlink.worlds import NAMES, corner_tour, read_back
 from tests.mission.worlds import mission_of, square_tour, stop
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from mission.document import Mission
-from mission.mavlink.stop_numbers import numbers_of, stop_numbered
+from stopgo.mission.document import Mission
+from stopgo.mission.mavlink.stop_numbers import numbers_of, stop_numbered
 from tests.mission.worlds import mission_of, stop
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mission.mavlink.telemetry import began_again, charge_of, is_lost, stands_still
+from stopgo.mission.mavlink.telemetry import began_again, charge_of, is_lost, stands_still
 
 
 @pytest.mark.parametrize(

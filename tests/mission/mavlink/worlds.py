@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import msgspec
 
-from mission.document import Mission, ScannerSpec
-from mission.mavlink.autopilots import AUTOPILOTS
-from mission.mavlink.items import Item, ItemList
-from mission.mavlink.read_back import upload_of
+from stopgo.mission.document import Mission, ScannerSpec
+from stopgo.mission.mavlink.autopilots import AUTOPILOTS
+from stopgo.mission.mavlink.items import Item, ItemList
+from stopgo.mission.mavlink.read_back import upload_of
 from tests.mission.worlds import mission_of, square_tour, stop
 
 NAMES = list(AUTOPILOTS)

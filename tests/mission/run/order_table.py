@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import get_args
 
-from mission.events import Pose
-from mission.run.decision import Decision, Situation, decide
-from mission.run.orders import FREE_VERBS, Order, Verb
-from mission.run.states import DetailedState, Run
+from stopgo.mission.events import Pose
+from stopgo.mission.run.decision import Decision, Situation, decide
+from stopgo.mission.run.orders import FREE_VERBS, Order, Verb
+from stopgo.mission.run.states import DetailedState, Run
 from tests.bridge.world import corridor
 
 VERBS: tuple[Verb, ...] = get_args(Verb)

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from mission.document import ScannerSpec
-from mission.run.scans import turned_away
+from stopgo.mission.document import ScannerSpec
+from stopgo.mission.run.scans import turned_away
 
 AROUND = ScannerSpec(profile="default", range=5.0)
 AHEAD = ScannerSpec(profile="default", range=5.0, fov_deg=90.0)

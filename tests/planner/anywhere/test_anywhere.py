@@ -8,20 +8,20 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from mission.errors import InputError
-from mission.floor import FloorPlan
-from mission.geometry import BoolArray, IntArray
-from mission.planning import Candidates, Visibility
-from mission.settings import Settings
-from planner import plan
-from planner.anywhere.cells import Overlook, PlaceCells
-from planner.candidates import candidates, judged
-from planner.candidates.place import Place
-from planner.selection.cover import cover_of
-from planner.selection.demands import Demands, demands_of
-from planner.shapes import local_origin, to_grid
-from planner.space.navigable import navigable
-from planner.visibility import visibility
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import BoolArray, IntArray
+from stopgo.mission.planning import Candidates, Visibility
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.anywhere.cells import Overlook, PlaceCells
+from stopgo.planner.candidates import candidates, judged
+from stopgo.planner.candidates.place import Place
+from stopgo.planner.selection.cover import cover_of
+from stopgo.planner.selection.demands import Demands, demands_of
+from stopgo.planner.shapes import local_origin, to_grid
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.visibility import visibility
 from tests.faults.sizes import size
 from tests.planner.worlds import column, hall, two_rooms
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import ezdxf
 import pytest
 
-from mission.__main__ import main
-from mission.figures import Figures, percent
-from mission.floor import FloorPlan, IgnoredLine, Rank
-from mission.geometry import frozen
-from mission.settings import Settings
-from planner.appraisal.figures_of_route import ranked
+from stopgo.command_line import main
+from stopgo.mission.figures import Figures, percent
+from stopgo.mission.floor import FloorPlan, IgnoredLine, Rank
+from stopgo.mission.geometry import frozen
+from stopgo.mission.settings import Settings
+from stopgo.planner.appraisal.figures_of_route import ranked
 from tests.planner.worlds import (
     box,
     column,

@@ -10,13 +10,13 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mission.floor import FloorPlan
-from mission.geometry import Polygon
-from mission.planning import DROP_REASONS, KEPT, SLIVER, TOO_SMALL, Candidates
-from mission.settings import Settings
-from planner.candidates import candidates
-from planner.candidates.place import Place
-from planner.candidates.triangulation import (
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import Polygon
+from stopgo.mission.planning import DROP_REASONS, KEPT, SLIVER, TOO_SMALL, Candidates
+from stopgo.mission.settings import Settings
+from stopgo.planner.candidates import candidates
+from stopgo.planner.candidates.place import Place
+from stopgo.planner.candidates.triangulation import (
     LEAST_ANGLE,
     DrawnBoundary,
     delaunay,
@@ -27,8 +27,8 @@ from planner.candidates.triangulation import (
     triangulated,
     voronoi_points,
 )
-from planner.shapes import segments_of
-from planner.space.navigable import navigable
+from stopgo.planner.shapes import segments_of
+from stopgo.planner.space.navigable import navigable
 from tests.faults.sizes import size
 from tests.planner.worlds import (
     SHARED,
@@ -221,7 +221,7 @@ def test_any_seeds_are_triangulated(points: list[tuple[int, int]]) -> None:
 )
 def test_counts_stay_near_the_paper_s(name: str, paper: tuple[int, int], ours: tuple[int, int]) -> None:
     """Table 3, generated and left; ours are recorded so that a change is noticed."""
-    from planner.floors import read_floor
+    from stopgo.planner.floors import read_floor
 
     floor = read_floor(SHARED / "paper" / f"synthetic_{name}.dxf")
     closed = {"doors": "closed", "robot_radius": 0.34} if "rooms" in name else {"edge": 0.0}

@@ -12,16 +12,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from mission.__main__ import main
-from mission.document import Mission
-from mission.figures import percent
-from mission.files.coverage_json import Coverage, coverage_json
-from mission.files.mission_json import read, write
-from mission.floor import FloorPlan
-from mission.planning import NavigableSpace, Route, Selection
-from mission.settings import Settings
-from planner.checking.claims import Recount, overclaims, recount
-from planner.sight.sight import sight
+from stopgo.command_line import main
+from stopgo.mission.document import Mission
+from stopgo.mission.figures import percent
+from stopgo.mission.files.coverage_json import Coverage, coverage_json
+from stopgo.mission.files.mission_json import read, write
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.planning import NavigableSpace, Route, Selection
+from stopgo.mission.settings import Settings
+from stopgo.planner.checking.claims import Recount, overclaims, recount
+from stopgo.planner.sight.sight import sight
 from tests.journeys.test_base import without_extras
 from tests.planner.test_command import drawn
 from tests.planner.worlds import (
@@ -78,7 +78,7 @@ def test_sight_that_reaches_too_far_is_found_out(monkeypatch: pytest.MonkeyPatch
     def far(*given: Any, reach: float, **others: Any) -> Any:
         return sight(*given, reach=1.2 * reach, **others)
 
-    monkeypatch.setattr(sys.modules["planner.visibility.exact_sight"], "sight", far)
+    monkeypatch.setattr(sys.modules["stopgo.planner.visibility.exact_sight"], "sight", far)
     mission, nouns = planned(HALL, Settings(range=2.0))
     found, problems = counted(mission, nouns)
     assert found.share is not None and found.share < 0.9
@@ -194,7 +194,7 @@ def test_coverage_is_checked_on_a_floor_only(made: Path, capsys: pytest.CaptureF
 
 
 def test_without_the_extra_the_digest_is_checked_and_the_rest_is_told(made: Path) -> None:
-    front_door = "from mission.__main__ import main\nsys.exit(main(sys.argv[1:]))"
+    front_door = "from stopgo.command_line import main\nsys.exit(main(sys.argv[1:]))"
     floor = made.with_name("floor.dxf")
     done = without_extras(front_door, "check", str(made), "--floor", str(floor))
     assert done.returncode == 0

@@ -9,12 +9,12 @@ from typing import Any
 import msgspec
 import pytest
 
-from mission.__main__ import main
-from mission.document import Mission, Point, Stop
-from mission.files.mission_json import read, write
-from mission.floor import FloorPlan
-from mission.settings import Settings
-from planner.checking.fit import misfits_on
+from stopgo.command_line import main
+from stopgo.mission.document import Mission, Point, Stop
+from stopgo.mission.files.mission_json import read, write
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.settings import Settings
+from stopgo.planner.checking.fit import misfits_on
 from tests.planner.test_command import drawn
 from tests.planner.worlds import (
     box,

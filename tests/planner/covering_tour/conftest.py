@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import pytest
 
-import planner.covering_tour.search
+import stopgo.planner.covering_tour.search
 from tests.faults.sizes import size
 
 
 @pytest.fixture(scope="package", autouse=True)
 def _few_steps() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(planner.covering_tour.search, "STEPS", size(short=60, full=400))
+        patch.setattr(stopgo.planner.covering_tour.search, "STEPS", size(short=60, full=400))
         yield

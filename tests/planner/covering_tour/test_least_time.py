@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-import planner.covering_tour.problem
-from mission.planning import Route
-from mission.schedule import leg_times, schedule, turn_time
-from mission.settings import Settings
-from mission.specs import robot_of
-from planner.assemble import assemble
-from planner.covering_tour import in_least_time
-from planner.covering_tour.leg_table import MICROSECONDS
-from planner.covering_tour.problem import problem_of
-from planner.overlap import links_of
-from planner.routing import legs_between, points_and_ends, rank_at_door
-from planner.selection import posed
-from planner.selection.separators import pieces_of
+import stopgo.planner.covering_tour.problem
+from stopgo.mission.planning import Route
+from stopgo.mission.schedule import leg_times, schedule, turn_time
+from stopgo.mission.settings import Settings
+from stopgo.mission.specs import robot_of
+from stopgo.planner.assemble import assemble
+from stopgo.planner.covering_tour import in_least_time
+from stopgo.planner.covering_tour.leg_table import MICROSECONDS
+from stopgo.planner.covering_tour.problem import problem_of
+from stopgo.planner.overlap import links_of
+from stopgo.planner.routing import legs_between, points_and_ends, rank_at_door
+from stopgo.planner.selection import posed
+from stopgo.planner.selection.separators import pieces_of
 from tests.faults.sizes import size, some
 from tests.planner.worlds import box, column, door, floor_of, hall, planned, room, shell, two_rooms, wall
 
@@ -280,8 +280,8 @@ def test_of_very_many_candidates_the_nearest_are_tried_and_the_bound_is_lower(
     bounded: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     every = joint("rooms", 2).time
-    monkeypatch.setattr(planner.covering_tour.problem, "MOST_PLACES", 8)
-    monkeypatch.setattr(planner.covering_tour.problem, "MOST_BOUNDED", bounded)
+    monkeypatch.setattr(stopgo.planner.covering_tour.problem, "MOST_PLACES", 8)
+    monkeypatch.setattr(stopgo.planner.covering_tour.problem, "MOST_BOUNDED", bounded)
     some = in_least_time(two_step("rooms", 2)).time
     assert every is not None and some is not None
     assert 0 < some.bound <= every.bound

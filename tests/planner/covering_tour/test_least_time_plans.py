@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mission.__main__ import main
-from mission.document import mission_id
-from mission.errors import InputError
-from mission.files.plan_toml import read_settings
-from mission.plan import Plan
-from mission.planning import Route
-from mission.schedule import schedule
-from mission.settings import Settings, told_of
-from planner import plan
-from planner.further import PlannedFloor, top_up
-from planner.sharing.dividing import taken_by
-from recordings.report import plan_results
+from stopgo.command_line import main
+from stopgo.mission.document import mission_id
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.plan import Plan
+from stopgo.mission.planning import Route
+from stopgo.mission.schedule import schedule
+from stopgo.mission.settings import Settings, told_of
+from stopgo.planner import plan
+from stopgo.planner.further import PlannedFloor, top_up
+from stopgo.planner.sharing.dividing import taken_by
+from stopgo.recordings.report import plan_results
 from tests.planner.worlds import box, column, floor_of, hall, shell
 
 SAMPLE = Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf"
@@ -67,7 +67,7 @@ def test_a_plan_for_the_least_time_passes_its_check(
 
 
 def test_a_person_reads_both_numbers() -> None:
-    from planner.report import time_lines
+    from stopgo.planner.report import time_lines
 
     found = made(minimise="time").route
     assert found.time is not None
@@ -99,7 +99,7 @@ def test_another_word_is_refused(value: str, capsys: pytest.CaptureFixture[str])
 
 
 def test_a_floor_where_nothing_is_to_be_seen_is_told_as_ever(tmp_path: Path) -> None:
-    from mission.errors import AnswerIsNo
+    from stopgo.mission.errors import AnswerIsNo
 
     bare = floor_of(box(0, 0, 6, 4))
     with pytest.raises(AnswerIsNo, match="target"):
@@ -110,7 +110,7 @@ def test_a_floor_where_nothing_is_to_be_seen_is_told_as_ever(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("changes", [{"robots": 2}, {"shift": 300.0}], ids=str)
 def test_shared_out_it_is_never_slower_either(changes: dict[str, Any]) -> None:
-    from mission.division import DividedRoute
+    from stopgo.mission.division import DividedRoute
 
     def worth(found: Plan) -> tuple[float, float]:
         shared = found.divided

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from floor_drawings import Draw, Read, new_drawing, rectangle
 
-from mission.floor import FloorPlan
-from planner.floors import FloorOptions, read_floor
+from stopgo.mission.floor import FloorPlan
+from stopgo.planner.floors import FloorOptions, read_floor
 
 
 @pytest.fixture

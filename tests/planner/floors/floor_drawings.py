@@ -8,7 +8,7 @@ import ezdxf
 from ezdxf.document import Drawing
 from ezdxf.layouts import Modelspace
 
-from mission.floor import FloorPlan
+from stopgo.mission.floor import FloorPlan
 
 Draw = Callable[[Modelspace], object]
 Read = Callable[..., FloorPlan]

@@ -13,11 +13,11 @@ from ezdxf.document import Drawing
 from ezdxf.layouts import Modelspace
 from floor_drawings import codes, new_drawing, rectangle
 
-from mission.errors import InputError
-from mission.floor import FloorPlan
-from mission.layer_kinds import entries_in, kinds_by_name
-from planner.floors import FloorOptions, read_floor, survey_floor
-from planner.floors.layer_map import layer_map
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.layer_kinds import entries_in, kinds_by_name
+from stopgo.planner.floors import FloorOptions, read_floor, survey_floor
+from stopgo.planner.floors.layer_map import layer_map
 
 
 def flat(

@@ -11,8 +11,8 @@ from floor_drawings import codes, new_drawing, rectangle
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mission.errors import InputError
-from planner.floors import read_floor
+from stopgo.mission.errors import InputError
+from stopgo.planner.floors import read_floor
 from tests.faults.sizes import size
 
 

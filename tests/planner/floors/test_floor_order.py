@@ -11,7 +11,7 @@ from floor_drawings import Read, codes, rectangle
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mission.floor import FloorPlan
+from stopgo.mission.floor import FloorPlan
 from tests.faults.sizes import size
 
 Step = Callable[[Modelspace], object]

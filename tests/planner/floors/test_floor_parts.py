@@ -12,8 +12,8 @@ from ezdxf.math import Matrix44
 from ezdxf.xclip import XClip
 from floor_drawings import Read, codes, rectangle
 
-from mission.floor import FloorPlan
-from mission.kinds import KINDS
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.kinds import KINDS
 
 
 def lines_around(model: Modelspace, layer: str, corners: list[tuple[float, float]]) -> None:

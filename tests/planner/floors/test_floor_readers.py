@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-import recordings.samples
-from mission.__main__ import main
-from mission.errors import InputError
-from planner.floors import READERS, FloorOptions, read_floor, survey_floor
+import stopgo.recordings.samples
+from stopgo.command_line import main
+from stopgo.mission.errors import InputError
+from stopgo.planner.floors import READERS, FloorOptions, read_floor, survey_floor
 
-OFFICE = Path(recordings.samples.__file__).with_name("office.dxf")
+OFFICE = Path(stopgo.recordings.samples.__file__).with_name("office.dxf")
 
 
 def test_a_drawing_is_read_whatever_its_file_is_called(tmp_path: Path) -> None:

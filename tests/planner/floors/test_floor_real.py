@@ -13,10 +13,10 @@ from shapely import Polygon, union_all
 from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
-from mission.errors import InputError
-from mission.floor import FloorPlan, Room
-from mission.geometry import FloatArray
-from planner.floors import read_floor
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan, Room
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors import read_floor
 from tests.faults.sizes import FULL
 
 DATA = Path(__file__).parents[4] / "shared" / "data"

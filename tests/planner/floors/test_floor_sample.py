@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 import shapely
 
-import recordings.samples
-from mission.floor import FloorPlan
-from planner.floors import read_floor
-from recordings.samples.draw_office import draw
+import stopgo.recordings.samples
+from stopgo.mission.floor import FloorPlan
+from stopgo.planner.floors import read_floor
+from stopgo.recordings.samples.draw_office import draw
 
-OFFICE = Path(recordings.samples.__file__).with_name("office.dxf")
+OFFICE = Path(stopgo.recordings.samples.__file__).with_name("office.dxf")
 
 
 @pytest.fixture(scope="module")
@@ -29,8 +29,8 @@ def test_the_script_draws_the_file() -> None:
 @pytest.mark.parametrize("seed", ["0", "1", "2"])
 def test_every_run_draws_the_same_bytes(tmp_path: Path, seed: str) -> None:
     path = tmp_path / "office.dxf"
-    command = [sys.executable, "-m", "recordings.samples.draw_office", str(path)]
-    root = Path(recordings.samples.__file__).parents[2]
+    command = [sys.executable, "-m", "stopgo.recordings.samples.draw_office", str(path)]
+    root = Path(stopgo.recordings.samples.__file__).parents[2]
     subprocess.run(command, check=True, cwd=root, env={"PYTHONHASHSEED": seed, "PATH": ""})
     assert path.read_bytes() == OFFICE.read_bytes()
 

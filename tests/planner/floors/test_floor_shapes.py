@@ -12,9 +12,9 @@ from floor_drawings import Read, codes, rectangle
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mission.floor import Element, FloorPlan
-from mission.geometry import FloatArray
-from planner.floors.curves import circle_count
+from stopgo.mission.floor import Element, FloorPlan
+from stopgo.mission.geometry import FloatArray
+from stopgo.planner.floors.curves import circle_count
 from tests.faults.sizes import size
 
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mission.errors import InputError
-from mission.floor import FloorPlan
-from mission.settings import Settings
-from planner import plan
-from planner.floors import read_floor, survey_floor
-from planner.floors.robot_map.cell_regions import polygons_of_cells
-from planner.floors.robot_map.grey_picture import read_picture
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.floors import read_floor, survey_floor
+from stopgo.planner.floors.robot_map.cell_regions import polygons_of_cells
+from stopgo.planner.floors.robot_map.grey_picture import read_picture
 from tests.planner.worlds import box, door, floor_of, room, wall
 
 RESOLUTION = 0.05

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mission.floor import FloorPlan
-from mission.geometry import frozen
-from mission.planning import KEPT, OUTSIDE, Candidates
-from mission.settings import Settings
-from planner.candidates import candidates
-from planner.floors import read_floor
-from planner.overlap import links_of, overlaps_of
-from planner.overlap.pairs import LEVER_M
-from planner.space.navigable import navigable
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import frozen
+from stopgo.mission.planning import KEPT, OUTSIDE, Candidates
+from stopgo.mission.settings import Settings
+from stopgo.planner.candidates import candidates
+from stopgo.planner.floors import read_floor
+from stopgo.planner.overlap import links_of, overlaps_of
+from stopgo.planner.overlap.pairs import LEVER_M
+from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import LAYERED, SHARED, box, column, door, floor_of, shell, wall
 
 SETTINGS = Settings(d_sec=0.5, edge=0.0, overlap=0.1)

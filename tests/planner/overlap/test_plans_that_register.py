@@ -8,19 +8,19 @@ import msgspec
 import numpy as np
 import pytest
 
-from mission.document import stop_names
-from mission.floor import FloorPlan
-from mission.network import Network, network_of
-from mission.settings import Settings
-from planner import plan
-from planner.candidates import candidates
-from planner.checking.network_claims import network_overclaims
-from planner.further import PlannedFloor, top_up
-from planner.overlap import links_of
-from planner.overlap.registered import SCANS_APART, registered_pairs
-from planner.report import PlanReport
-from planner.selection.separators import pieces_of
-from planner.space.navigable import navigable
+from stopgo.mission.document import stop_names
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.network import Network, network_of
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.candidates import candidates
+from stopgo.planner.checking.network_claims import network_overclaims
+from stopgo.planner.further import PlannedFloor, top_up
+from stopgo.planner.overlap import links_of
+from stopgo.planner.overlap.registered import SCANS_APART, registered_pairs
+from stopgo.planner.report import PlanReport
+from stopgo.planner.selection.separators import pieces_of
+from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import box, door, floor_of, room, shell, wall
 
 ASKED = Settings(d_sec=0.4, edge=0.0, overlap=0.1, seed=1)

@@ -9,23 +9,23 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as changed
 
-from mission.document import MissionShare
-from mission.errors import AnswerIsNo
-from mission.files.coverage_json import Coverage, coverage_json
-from mission.floor import FloorPlan
-from mission.geometry import FloatArray, frozen
-from mission.plan_proof import PlanProof, Simulation
-from mission.planning import NavigableSpace
-from mission.proof_text import network_words
-from mission.settings import Settings
-from planner import plan
-from planner.proving.casting import RayFan, SolidScene
-from planner.proving.extrusion import NONE, extruded
-from planner.proving.proving import prove
-from planner.proving.registering import off, registered, surface_of
-from planner.proving.scanning import Stand, scanned
-from planner.proving.strips import strips_of
-from planner.space.navigable import navigable
+from stopgo.mission.document import MissionShare
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.files.coverage_json import Coverage, coverage_json
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import FloatArray, frozen
+from stopgo.mission.plan_proof import PlanProof, Simulation
+from stopgo.mission.planning import NavigableSpace
+from stopgo.mission.proof_text import network_words
+from stopgo.mission.settings import Settings
+from stopgo.planner import plan
+from stopgo.planner.proving.casting import RayFan, SolidScene
+from stopgo.planner.proving.extrusion import NONE, extruded
+from stopgo.planner.proving.proving import prove
+from stopgo.planner.proving.registering import off, registered, surface_of
+from stopgo.planner.proving.scanning import Stand, scanned
+from stopgo.planner.proving.strips import strips_of
+from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import box, column, element, hall, two_rooms
 
 COARSE = Simulation(range_m=10.0, step_deg=0.2)
@@ -240,7 +240,7 @@ def test_limits_are_held_by_what_was_measured() -> None:
 
 
 def test_a_pair_that_is_to_register_and_does_not_is_caught() -> None:
-    from mission.document import Overlap
+    from stopgo.mission.document import Overlap
 
     made = plan(two_rooms(0.9, thick=0.1, at=0.5), Settings(range=3.0))
     names = [stop.id for stop in made.mission.stops]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planner.routing import Ends, tour_matrix
-from planner.routing.colony import ant_colony
-from planner.routing.subsets import best_of_all
-from planner.routing.tour import length_of, nanometres
+from stopgo.planner.routing import Ends, tour_matrix
+from stopgo.planner.routing.colony import ant_colony
+from stopgo.planner.routing.subsets import best_of_all
+from stopgo.planner.routing.tour import length_of, nanometres
 from tests.planner.routing.test_tour import any_lengths, scattered
 
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 import shapely
 
-from mission.errors import AnswerIsNo
-from mission.floor import FloorPlan
-from mission.geometry import Polygon
-from mission.settings import Settings
-from planner.assemble import check_legs
-from planner.routing import route
-from planner.routing.grid_graph import RESOLUTIONS, grid_ways, ways_on_grids
-from planner.routing.roadmap import ways_between
-from planner.space.navigable import navigable
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import Polygon
+from stopgo.mission.settings import Settings
+from stopgo.planner.assemble import check_legs
+from stopgo.planner.routing import route
+from stopgo.planner.routing.grid_graph import RESOLUTIONS, grid_ways, ways_on_grids
+from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.space.navigable import navigable
 from tests.planner.checks import obstacles_of
 from tests.planner.routing.test_routing import floor_with_things, free_points, selection_at, space_with_things
 from tests.planner.worlds import box, column, door, floor_of, hall, room, shell, two_rooms, wall
@@ -112,7 +112,7 @@ def test_the_grid_is_refined_until_it_is_dense_enough() -> None:
 
 def test_where_the_finest_grid_fails_the_message_names_the_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
     # A passage 3 m deep and 0.9 m wide, drawn as one room's: no node of 1 m stands in it.
-    monkeypatch.setattr("planner.routing.grid_graph.RESOLUTIONS", RESOLUTIONS[:1])
+    monkeypatch.setattr("stopgo.planner.routing.grid_graph.RESOLUTIONS", RESOLUTIONS[:1])
     space = navigable(two_rooms(0.9, thick=3.0, at=1.7, with_door=False), GRID)
     points = np.array([(1.0, 1.0), (7.0, 3.0)])
     with pytest.raises(AnswerIsNo, match=r"does not connect the stop at .*--graph exact"):

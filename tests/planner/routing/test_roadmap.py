@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import shapely
 
-from mission.floor import FloorPlan
-from mission.geometry import Polygon
-from mission.planning import NavigableSpace
-from mission.settings import Settings
-from planner.routing import roadmap
-from planner.routing.roadmap import outward_corners, ways_between
-from planner.routing.ways import Ways
-from planner.shapes import local_origin, snapped, to_shape
-from planner.space.navigable import navigable
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import Polygon
+from stopgo.mission.planning import NavigableSpace
+from stopgo.mission.settings import Settings
+from stopgo.planner.routing import roadmap
+from stopgo.planner.routing.roadmap import outward_corners, ways_between
+from stopgo.planner.routing.ways import Ways
+from stopgo.planner.shapes import local_origin, snapped, to_shape
+from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import PAPER, box, column, element, hall, shared, two_rooms, wall
 
 SETTINGS = Settings(robot_radius=0.3, edge=0.3)

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 import shapely
 
-from mission.errors import StopgoError
-from mission.floor import FloorPlan
-from mission.geometry import frozen
-from mission.planning import KEPT, Candidates, NavigableSpace, Route, Selection
-from mission.settings import Settings
-from planner.routing import ROUTERS, route
-from planner.routing.roadmap import ways_between
-from planner.space.navigable import navigable
-from planner.visibility.exact_sight import exact
+from stopgo.mission.errors import StopgoError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import frozen
+from stopgo.mission.planning import KEPT, Candidates, NavigableSpace, Route, Selection
+from stopgo.mission.settings import Settings
+from stopgo.planner.routing import ROUTERS, route
+from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.visibility.exact_sight import exact
 from tests.faults.sizes import some
 from tests.planner.checks import obstacles_of, shape_of
 from tests.planner.worlds import box, column, element, hall, planned, two_rooms, wall

@@ -7,20 +7,13 @@ from itertools import pairwise, permutations
 import numpy as np
 import pytest
 
-from mission.errors import InputError
-from planner.routing import Ends, far_edge, tour_matrix
-from planner.routing.cuts import violated_cuts
-from planner.routing.proof import proved
-from planner.routing.subsets import best_of_all
-from planner.routing.tour import (
-    canonical,
-    length_of,
-    nanometres,
-    searched,
-    shortest_tour,
-    trials,
-)
-from planner.routing.tour_bound import one_tree, one_tree_bound, useful_edges
+from stopgo.mission.errors import InputError
+from stopgo.planner.routing import Ends, far_edge, tour_matrix
+from stopgo.planner.routing.cuts import violated_cuts
+from stopgo.planner.routing.proof import proved
+from stopgo.planner.routing.subsets import best_of_all
+from stopgo.planner.routing.tour import canonical, length_of, nanometres, searched, shortest_tour, trials
+from stopgo.planner.routing.tour_bound import one_tree, one_tree_bound, useful_edges
 from tests.faults.sizes import size
 
 
@@ -137,7 +130,7 @@ def test_branching_proves_what_comparing_all_tours_finds(lengths, monkeypatch: p
             shortest = length_of(cost, best_of_all(cost))
             poor = np.random.default_rng(seed).permutation(n)
             with monkeypatch.context() as patched:
-                patched.setattr("planner.routing.proof.COMPARE_ALL_UP_TO", 3)
+                patched.setattr("stopgo.planner.routing.proof.COMPARE_ALL_UP_TO", 3)
                 proof = proved(cost, poor)
             assert proof.closed
             assert proof.bound <= shortest <= proof.length <= shortest + 1_000
@@ -172,7 +165,7 @@ def test_the_bound_holds_when_the_search_for_a_proof_is_cut_short(monkeypatch: p
     cost = nanometres(any_lengths(30, 1))
     full = proved(cost, np.arange(30))
     for limit in (0, 1, 2, 3, 5, 8):
-        monkeypatch.setattr("planner.routing.proof.SOLVE_LIMIT", limit)
+        monkeypatch.setattr("stopgo.planner.routing.proof.SOLVE_LIMIT", limit)
         assert proved(cost, np.arange(30)).bound <= full.length
 
 

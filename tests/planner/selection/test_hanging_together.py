@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from mission.geometry import IntArray
-from mission.settings import Settings
-from planner.selection import EXACT_ROUNDS, ROUNDS, Searches
-from planner.selection.bound import lower_bound
-from planner.selection.cover import Cover
-from planner.selection.hanging_together import JoinedCover, connected
-from planner.selection.separators import meets, pieces_of
+from stopgo.mission.geometry import IntArray
+from stopgo.mission.settings import Settings
+from stopgo.planner.selection import EXACT_ROUNDS, ROUNDS, Searches
+from stopgo.planner.selection.bound import lower_bound
+from stopgo.planner.selection.cover import Cover
+from stopgo.planner.selection.hanging_together import JoinedCover, connected
+from stopgo.planner.selection.separators import meets, pieces_of
 from tests.faults.sizes import size
 
 EXACT = Settings(selector="exact")

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from mission.planning import Selection, weights_of
-from mission.settings import Settings
-from planner.selection import METHODS
-from planner.selection.bound import counting_bound, multiplier_bound, relaxation_bound
-from planner.selection.cover import Cover, cover_of
-from planner.selection.demands import demands_of, needed_of
-from planner.selection.greedy import greedy
+from stopgo.mission.planning import Selection, weights_of
+from stopgo.mission.settings import Settings
+from stopgo.planner.selection import METHODS
+from stopgo.planner.selection.bound import counting_bound, multiplier_bound, relaxation_bound
+from stopgo.planner.selection.cover import Cover, cover_of
+from stopgo.planner.selection.demands import demands_of, needed_of
+from stopgo.planner.selection.greedy import greedy
 from tests.faults.sizes import size
 from tests.planner.worlds import box, column, element, hall, planned, two_rooms
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mission.errors import InputError
-from mission.files.plan_toml import read_settings
-from mission.floor import Element, FloorPlan
-from mission.geometry import Polygon
-from mission.planning import NavigableSpace, Selection, weights_of
-from mission.settings import Settings
-from planner.space.navigable import navigable
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.floor import Element, FloorPlan
+from stopgo.mission.geometry import Polygon
+from stopgo.mission.planning import NavigableSpace, Selection, weights_of
+from stopgo.mission.settings import Settings
+from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import (
     box,
     column,

@@ -9,14 +9,22 @@ import numpy as np
 import pytest
 import shapely
 
-from mission.errors import StopgoError
-from mission.floor import FloorPlan
-from mission.geometry import Polygon
-from planner.shapes import GRID, local_origin, polygon_parts, segments_of, snapped, snapped_union, whole_steps
-from planner.sight.mesh import mesh_of
-from planner.sight.sight import scene_of
-from planner.space.targets import occluders_of, without_cracks
-from planner.visibility.exact_sight import open_space
+from stopgo.mission.errors import StopgoError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import Polygon
+from stopgo.planner.shapes import (
+    GRID,
+    local_origin,
+    polygon_parts,
+    segments_of,
+    snapped,
+    snapped_union,
+    whole_steps,
+)
+from stopgo.planner.sight.mesh import mesh_of
+from stopgo.planner.sight.sight import scene_of
+from stopgo.planner.space.targets import occluders_of, without_cracks
+from stopgo.planner.visibility.exact_sight import open_space
 from tests.faults.sizes import some
 from tests.planner.visibility.test_visibility import at, by_force, rows_of
 from tests.planner.worlds import LAYERED, PAPER, box, floor_of, moved, shared, turned, wall

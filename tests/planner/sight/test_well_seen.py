@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from mission.limits import ViewLimits
-from planner.shapes import GRID
-from planner.sight.well_seen import SeenSegments, clipped, well_seen
+from stopgo.mission.limits import ViewLimits
+from stopgo.planner.shapes import GRID
+from stopgo.planner.sight.well_seen import SeenSegments, clipped, well_seen
 from tests.faults.sizes import size
 
 STEP = math.radians(0.036)

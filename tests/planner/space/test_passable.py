@@ -9,13 +9,13 @@ from itertools import product
 import numpy as np
 import pytest
 
-from mission.floor import Element, FloorPlan
-from mission.geometry import Polygon
-from mission.planning import NavigableSpace, OpeningState
-from mission.settings import Settings
-from planner.routing.roadmap import ways_between
-from planner.space.gaps import Site
-from planner.space.navigable import navigable
+from stopgo.mission.floor import Element, FloorPlan
+from stopgo.mission.geometry import Polygon
+from stopgo.mission.planning import NavigableSpace, OpeningState
+from stopgo.mission.settings import Settings
+from stopgo.planner.routing.roadmap import ways_between
+from stopgo.planner.space.gaps import Site
+from stopgo.planner.space.navigable import navigable
 from tests.faults.sizes import some
 from tests.planner.worlds import (
     box,

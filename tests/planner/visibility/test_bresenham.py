@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mission.errors import InputError
-from mission.floor import FloorPlan
-from mission.planning import Candidates, Visibility
-from mission.settings import Settings
-from planner.candidates import candidates
-from planner.compiling import compiled
-from planner.space.navigable import navigable
-from planner.visibility import visibility
-from planner.visibility.bresenham import bresenham, clear_line, clear_lines
-from planner.visibility.exact_sight import exact
-from planner.visibility.raster import crossed_by, inside_of, raster_of
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.planning import Candidates, Visibility
+from stopgo.mission.settings import Settings
+from stopgo.planner.candidates import candidates
+from stopgo.planner.compiling import compiled
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.visibility import visibility
+from stopgo.planner.visibility.bresenham import bresenham, clear_line, clear_lines
+from stopgo.planner.visibility.exact_sight import exact
+from stopgo.planner.visibility.raster import crossed_by, inside_of, raster_of
 from tests.planner.worlds import box, column, element, floor_of, hall, moved, shell, turned, two_rooms
 
 

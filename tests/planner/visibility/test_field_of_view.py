@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from mission.errors import InputError
-from mission.floor import FloorPlan
-from mission.planning import KEPT, Candidates, Route, Visibility
-from mission.settings import Settings, check_settings
-from planner.candidates import candidates
-from planner.space.navigable import navigable
-from planner.visibility import visibility
-from planner.visibility.headings import headings_of
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.planning import KEPT, Candidates, Route, Visibility
+from stopgo.mission.settings import Settings, check_settings
+from stopgo.planner.candidates import candidates
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.visibility import visibility
+from stopgo.planner.visibility.headings import headings_of
 from tests.planner.worlds import column, hall, mirrored, moved, planned, turned, two_rooms
 
 

@@ -12,17 +12,17 @@ import msgspec
 import numpy as np
 import pytest
 
-from mission.document import canonical
-from mission.errors import AnswerIsNo
-from mission.files.mission_json import encode, parse
-from mission.planning import NavigableSpace, Selection, Visibility
-from mission.problems import problems_of
-from mission.settings import Settings
-from mission.sight import Sight, sight_of
-from planner import plan
-from planner.floors import read_floor
-from planner.report import PlanReport
-from planner.sight.sightlines import SightLines
+from stopgo.mission.document import canonical
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.files.mission_json import encode, parse
+from stopgo.mission.planning import NavigableSpace, Selection, Visibility
+from stopgo.mission.problems import problems_of
+from stopgo.mission.settings import Settings
+from stopgo.mission.sight import Sight, sight_of
+from stopgo.planner import plan
+from stopgo.planner.floors import read_floor
+from stopgo.planner.report import PlanReport
+from stopgo.planner.sight.sightlines import SightLines
 from tests.faults.sizes import FULL
 from tests.planner.worlds import LAYERED, SHARED, box, column, element, hall, planned, two_rooms
 

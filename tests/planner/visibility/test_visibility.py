@@ -10,17 +10,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from mission.errors import StopgoError
-from mission.floor import FloorPlan
-from mission.geometry import Polygon, frozen
-from mission.planning import KEPT, Candidates, Targets, Visibility
-from mission.settings import Settings
-from planner.candidates import candidates
-from planner.shapes import GRID, local_origin, to_grid, whole_steps_of
-from planner.space.navigable import navigable
-from planner.space.targets import face_segments
-from planner.visibility import visibility
-from planner.visibility.exact_sight import exact
+from stopgo.mission.errors import StopgoError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import Polygon, frozen
+from stopgo.mission.planning import KEPT, Candidates, Targets, Visibility
+from stopgo.mission.settings import Settings
+from stopgo.planner.candidates import candidates
+from stopgo.planner.shapes import GRID, local_origin, to_grid, whole_steps_of
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.space.targets import face_segments
+from stopgo.planner.visibility import visibility
+from stopgo.planner.visibility.exact_sight import exact
 from tests.faults.sizes import some
 from tests.planner.oracle import visible_pairs
 from tests.planner.worlds import (

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from mission.errors import InputError
-from recordings.logs import read_log
+from stopgo.mission.errors import InputError
+from stopgo.recordings.logs import read_log
 from tests.recordings.logs.writing import BEGIN_NS, write_dataflash, write_telemetry_log, write_ulog
 
 KINDS = {

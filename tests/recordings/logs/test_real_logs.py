@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mission.errors import InputError
-from recordings.logs import read_log
+from stopgo.mission.errors import InputError
+from stopgo.recordings.logs import read_log
 
 LOGS = Path(__file__).parents[4] / "shared" / "data" / "logs"
 pytestmark = pytest.mark.skipif(not LOGS.is_dir(), reason="../shared/data/logs is not here")
@@ -38,7 +38,7 @@ def test_every_real_log_is_read_to_its_end(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["turtlebot3.bag", "husky.bag"])
 def test_salvage_finds_in_a_whole_bag_what_rosbags_finds(name: str) -> None:
-    from recordings.logs.ros_bag import salvaged_bag, whole_bag
+    from stopgo.recordings.logs.ros_bag import salvaged_bag, whole_bag
 
     with whole_bag(LOGS / name) as whole, salvaged_bag(LOGS / name, "") as salvaged:
         one, other = (

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mission.errors import InputError
-from recordings.logs import FieldLog, Reading, read_log
+from stopgo.mission.errors import InputError
+from stopgo.recordings.logs import FieldLog, Reading, read_log
 from tests.recordings.logs.writing import BEGIN_NS, ODOMETRY, TF, Messages, odometry_rows, write_bag
 
 POSES = [(0.1 * k, 1.0 - 0.01 * k, 0.002 * k) for k in range(40)]

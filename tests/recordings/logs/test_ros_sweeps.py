@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from recordings.logs.ros_sweeps import SWEEPS
+from stopgo.recordings.logs.ros_sweeps import SWEEPS
 
 POINTS = np.array([(1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0), (np.nan, 0.0, 0.0)])
 

@@ -11,17 +11,17 @@ import msgspec
 import numpy as np
 import pytest
 
-from mission.__main__ import main
-from mission.comparing.compare import compare
-from mission.comparing.judging import judge
-from mission.document import Mission, sealed
-from mission.events import Finished, Paused, Resumed, Skipped
-from mission.run_log import Alignment
-from recordings.carried.floor_lines import FloorLines
-from recordings.page import ReportSubject, report_html
-from recordings.page.from_recordings import subject_of
-from recordings.page.words import number, shown
-from recordings.review import review
+from stopgo.command_line import main
+from stopgo.mission.comparing.compare import compare
+from stopgo.mission.comparing.judging import judge
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.events import Finished, Paused, Resumed, Skipped
+from stopgo.mission.run_log import Alignment
+from stopgo.recordings.carried.floor_lines import FloorLines
+from stopgo.recordings.page import ReportSubject, report_html
+from stopgo.recordings.page.from_recordings import subject_of
+from stopgo.recordings.page.words import number, shown
+from stopgo.recordings.review import review
 from tests.mission.comparing.test_compare import START, planned, run, visit
 from tests.mission.comparing.told import told
 

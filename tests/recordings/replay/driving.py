@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from mission.document import Mission, Point
-from mission.run_log import Track
+from stopgo.mission.document import Mission, Point
+from stopgo.mission.run_log import Track
 from tests.mission.worlds import mission_of, stop
 
 HZ = 10
@@ -161,7 +161,7 @@ def wandering(seed: int, *, stops: int = 9, scan_s: float = 12.0) -> Mission:
         known.append(to)
     from msgspec.structs import replace
 
-    from mission.document import sealed
+    from stopgo.mission.document import sealed
 
     mission = mission_of(*made)
     scan = replace(mission.stops[0].scan, duration_s=scan_s)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from msgspec import UNSET, UnsetType
 
-from mission.__main__ import main
-from mission.errors import InputError
-from mission.files.mission_json import read, write
-from mission.geometry import Polygon
-from planner.further import PlannedFloor, as_driven, planned_floor, top_up
+from stopgo.command_line import main
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.mission_json import read, write
+from stopgo.mission.geometry import Polygon
+from stopgo.planner.further import PlannedFloor, as_driven, planned_floor, top_up
 from tests.planner.test_command import drawn
 from tests.recordings.replay.driving import Odd, driven, logged
 

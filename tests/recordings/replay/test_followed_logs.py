@@ -8,22 +8,22 @@ from typing import Any
 import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from bridge.link.clock import SimulatedClock
-from bridge.mavlink.simulated.complete_vehicle import complete_vehicle
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
-from mission.document import Mission, SiteOrigin
-from mission.events import Pose, Scanned, Unconfirmed
-from mission.mavlink.items import Command
-from mission.mavlink.read_back import upload_of
-from mission.mavlink.translate import translate
-from recordings.logs import read_log
-from recordings.replay.judged import judged
-from recordings.replay.log_placing import Placing
-from recordings.replay.replay_text import as_text
-from recordings.replay.replayed import Replay
-from recordings.replay.replaying import replay
+from stopgo.bridge.link.clock import SimulatedClock
+from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.mission.document import Mission, SiteOrigin
+from stopgo.mission.events import Pose, Scanned, Unconfirmed
+from stopgo.mission.mavlink.items import Command
+from stopgo.mission.mavlink.read_back import upload_of
+from stopgo.mission.mavlink.translate import translate
+from stopgo.recordings.logs import read_log
+from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.replay_text import as_text
+from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.replay.replaying import replay
 from tests.mission.mavlink.following.worlds import told, tour
 from tests.recordings.logs.writing import write_telemetry_log
 

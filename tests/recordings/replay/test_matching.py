@@ -8,12 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from mission.document import Mission
-from mission.errors import AnswerIsNo
-from mission.run_log import Track
-from recordings.replay.fitting import fitted
-from recordings.replay.matching import Match, matched
-from recordings.replay.standing import standings
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.run_log import Track
+from stopgo.recordings.replay.fitting import fitted
+from stopgo.recordings.replay.matching import Match, matched
+from stopgo.recordings.replay.standing import standings
 from tests.mission.worlds import mission_of, stop
 from tests.recordings.replay.driving import BEGIN_NS, Odd, Senses, driven, logged, wandering
 

@@ -8,17 +8,17 @@ from typing import Any
 
 import pytest
 
-from bridge.robot.journal import open_journal
-from mission.document import Mission
-from mission.errors import InputError
-from mission.events import Arrived, Finished, Scanned, Skipped, Started
-from mission.run_log import RunLog
-from recordings.field import FieldRecording
-from recordings.logs import read_log
-from recordings.replay.judged import judged
-from recordings.replay.log_placing import Placing
-from recordings.replay.replayed import Replay
-from recordings.replay.replaying import replay
+from stopgo.bridge.robot.journal import open_journal
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.events import Arrived, Finished, Scanned, Skipped, Started
+from stopgo.mission.run_log import RunLog
+from stopgo.recordings.field import FieldRecording
+from stopgo.recordings.logs import read_log
+from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.replay.replaying import replay
 from tests.mission.comparing.told import SCAN, at, told
 from tests.recordings.replay.driving import wandering
 
@@ -90,7 +90,7 @@ def test_a_run_whose_every_stop_was_skipped_has_no_pose_and_is_told(tmp_path: Pa
 def test_a_run_of_another_mission_is_refused_by_name(tmp_path: Path) -> None:
     from msgspec.structs import replace
 
-    from mission.document import sealed
+    from stopgo.mission.document import sealed
 
     other = sealed(replace(MISSION, id="f" * 32))
     with pytest.raises(InputError, match="no run of mission ffff"):

@@ -14,17 +14,17 @@ import pytest
 from msgspec.structs import replace as changed
 
 import stopgo
-from mission.__main__ import main
-from mission.document import Frame, Mission, SiteOrigin, Transform, sealed
-from mission.errors import InputError
-from mission.files.mission_json import write
-from mission.run_log import Track
-from recordings.logs.field_log import FieldLog, Poses, Remark, poses_of
-from recordings.replay.judged import judged
-from recordings.replay.log_placing import Placing
-from recordings.replay.replay_text import as_csv, as_json, as_text
-from recordings.replay.replaying import replay
-from recordings.replay.way_and_time import lost_times, way_of
+from stopgo.command_line import main
+from stopgo.mission.document import Frame, Mission, SiteOrigin, Transform, sealed
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.mission_json import write
+from stopgo.mission.run_log import Track
+from stopgo.recordings.logs.field_log import FieldLog, Poses, Remark, poses_of
+from stopgo.recordings.replay.judged import judged
+from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.replay_text import as_csv, as_json, as_text
+from stopgo.recordings.replay.replaying import replay
+from stopgo.recordings.replay.way_and_time import lost_times, way_of
 from tests.recordings.logs.writing import Messages, write_bag
 from tests.recordings.replay.driving import Drive, Odd, Senses, driven, logged, wandering
 
@@ -217,7 +217,7 @@ def test_the_command_reads_a_bag_and_writes_table_and_recording(
     assert "scan it again" in page
     assert "coverage acquired" not in page
     assert len((tmp_path / "stops.csv").read_text().splitlines()) == 1 + len(MISSION.stops)
-    from recordings.review import review
+    from stopgo.recordings.review import review
 
     (run,) = review([tmp_path / "replay.rrd"]).comparisons
     assert run.log.ended

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from recordings.logs import read_log
-from recordings.replay.log_placing import Placing
-from recordings.replay.replayed import Replay
-from recordings.replay.replaying import replay
-from recordings.replay.uploaded import mission_in
+from stopgo.recordings.logs import read_log
+from stopgo.recordings.replay.log_placing import Placing
+from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.replay.replaying import replay
+from stopgo.recordings.replay.uploaded import mission_in
 
 LOG = Path(__file__).parents[4] / "shared" / "data" / "logs" / "rover-stop-and-go.BIN"
 pytestmark = pytest.mark.skipif(not LOG.is_file(), reason="../shared/data/logs is not here")

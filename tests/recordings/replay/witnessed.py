@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 import shapely
 
-from bridge.link.clock import SimulatedClock
-from bridge.robot.base import Outcome
-from bridge.robot.journal import open_journal
-from bridge.robot.simulator import SHAKE_M, Fault, Faults, SimulatedBase, Wear
-from mission.document import Mission, Point, Scan, Stop
-from mission.events import AnyEvent, Pose, PoseReport, RevisionTaken
-from mission.heard_run import RunTaker
-from mission.run.scans import ScanFailed, ScanResult
-from recordings.field import FieldRecording
+from stopgo.bridge.link.clock import SimulatedClock
+from stopgo.bridge.robot.base import Outcome
+from stopgo.bridge.robot.journal import open_journal
+from stopgo.bridge.robot.simulator import SHAKE_M, Fault, Faults, SimulatedBase, Wear
+from stopgo.mission.document import Mission, Point, Scan, Stop
+from stopgo.mission.events import AnyEvent, Pose, PoseReport, RevisionTaken
+from stopgo.mission.heard_run import RunTaker
+from stopgo.mission.run.scans import ScanFailed, ScanResult
+from stopgo.recordings.field import FieldRecording
 from tests.bridge.world import Field
 
 GOES_ON = ("resume", "retry", "skip")

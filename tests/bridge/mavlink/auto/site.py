@@ -12,23 +12,23 @@ from typing import Any
 
 import msgspec
 
-from bridge.mavlink.auto.logbook import Logbook, logbook, remember
-from bridge.mavlink.auto.vehicle_orders import Consent
-from bridge.mavlink.auto.vehicle_station import Options, connect
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
-from bridge.mavlink.simulated.vehicle_process import vehicle_on
-from bridge.mavlink.simulated.vehicle_store import Store
-from bridge.station.station import Station
-from mission.document import Mission, SiteOrigin, sealed
-from mission.events import AnyEvent, Pose
-from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.items import ItemList
-from mission.mavlink.read_back import upload_of
-from mission.mavlink.translate import translate
-from mission.run.states import Run
+from stopgo.bridge.mavlink.auto.logbook import Logbook, logbook, remember
+from stopgo.bridge.mavlink.auto.vehicle_orders import Consent
+from stopgo.bridge.mavlink.auto.vehicle_station import Options, connect
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.simulated.vehicle_store import Store
+from stopgo.bridge.station.station import Station
+from stopgo.mission.document import Mission, SiteOrigin, sealed
+from stopgo.mission.events import AnyEvent, Pose
+from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.items import ItemList
+from stopgo.mission.mavlink.read_back import upload_of
+from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.states import Run
 from tests.mission.mavlink.following.worlds import told, tour
 from tests.ports import free_port
 

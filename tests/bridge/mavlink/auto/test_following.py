@@ -7,12 +7,12 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.peer import reached as found_peer
-from mission.document import sealed
-from mission.events import Arrived, Failed, Held, PoseReport, Scanned, StateReport, Unconfirmed
-from recordings.field import FieldRecording
-from recordings.review import review
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.peer import reached as found_peer
+from stopgo.mission.document import sealed
+from stopgo.mission.events import Arrived, Failed, Held, PoseReport, Scanned, StateReport, Unconfirmed
+from stopgo.recordings.field import FieldRecording
+from stopgo.recordings.review import review
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
 from tests.mission.mavlink.following.worlds import told
 
@@ -32,7 +32,7 @@ def test_a_run_is_told_from_start_to_finish(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("profile", ["ardupilot", "px4", "strict"])
 def test_a_recording_of_a_run_is_reviewed_as_any_other(profile: str, tmp_path: Path) -> None:
-    from bridge.station.watch import watch_run
+    from stopgo.bridge.station.watch import watch_run
 
     site = Site(tmp_path, profile)
     with site.up(), FieldRecording(tmp_path / "field.rrd", None) as record, site.reached() as station:

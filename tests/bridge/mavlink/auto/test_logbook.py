@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from bridge.mavlink.auto.logbook import Logbook, forget, logbook, name_of, remember, usual_folder
-from bridge.mavlink.auto.unfinished_run import check_run_over
-from bridge.mavlink.line.url import Url
-from bridge.robot.journal import open_journal
-from mission.errors import AnswerIsNo, InputError
-from mission.events import Aborted, Paused
-from mission.mavlink.translate import translate
-from mission.run.states import Change, Run, changed, started
+from stopgo.bridge.mavlink.auto.logbook import Logbook, forget, logbook, name_of, remember, usual_folder
+from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.robot.journal import open_journal
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.events import Aborted, Paused
+from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.states import Change, Run, changed, started
 from tests.mission.mavlink.following.worlds import tour
 
 URL = Url("udpout", "127.0.0.1", 14550)

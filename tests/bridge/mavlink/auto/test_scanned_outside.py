@@ -8,23 +8,23 @@ from pathlib import Path
 
 import pytest
 
-from bridge.commands.order_commands import state_line
-from bridge.commands.watch_commands import tell_compared
-from bridge.mavlink.auto.unfinished_run import check_run_over
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.peer import reached as found_peer
-from bridge.mavlink.simulated.estimator import Estimator
-from bridge.station.watch import Lines, watch_showing
-from mission.document import Scan
-from mission.errors import AnswerIsNo
-from mission.events import Failed, Scanned, Unconfirmed
-from mission.heard_run import HeardRun
-from mission.tolerance import deviation
-from recordings.field import FieldRecording
-from recordings.page import report_html
-from recordings.page.from_recordings import subject_of
-from recordings.review import review
-from recordings.run_index import index_of, index_text
+from stopgo.bridge.commands.order_commands import state_line
+from stopgo.bridge.commands.watch_commands import tell_compared
+from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.line.peer import reached as found_peer
+from stopgo.bridge.mavlink.simulated.estimator import Estimator
+from stopgo.bridge.station.watch import Lines, watch_showing
+from stopgo.mission.document import Scan
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.events import Failed, Scanned, Unconfirmed
+from stopgo.mission.heard_run import HeardRun
+from stopgo.mission.tolerance import deviation
+from stopgo.recordings.field import FieldRecording
+from stopgo.recordings.page import report_html
+from stopgo.recordings.page.from_recordings import subject_of
+from stopgo.recordings.review import review
+from stopgo.recordings.run_index import index_of, index_text
 from tests.bridge.mavlink.auto.site import PATIENCE_S, Site, real_tour, until, watched
 from tests.mission.mavlink.following.worlds import told
 

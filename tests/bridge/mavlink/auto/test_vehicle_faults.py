@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.auto.logbook import remember
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.peer import reached as found_peer
-from bridge.station.follow import Silence
-from mission.errors import AnswerIsNo, InputError, OutcomeUnknown
-from mission.events import Arrived, Held, Paused, Resumed, Started
-from mission.mavlink.translate import translate
+from stopgo.bridge.mavlink.auto.logbook import remember
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.line.peer import reached as found_peer
+from stopgo.bridge.station.follow import Silence
+from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown
+from stopgo.mission.events import Arrived, Held, Paused, Resumed, Started
+from stopgo.mission.mavlink.translate import translate
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
 from tests.mission.mavlink.following.worlds import told
 
@@ -109,7 +109,7 @@ def test_a_mode_that_somebody_else_chooses_is_told_as_theirs(tmp_path: Path) -> 
 
 
 def test_a_mission_that_somebody_else_changes_holds_the_run(tmp_path: Path) -> None:
-    from bridge.mavlink.transfer.upload import upload
+    from stopgo.bridge.mavlink.transfer.upload import upload
 
     site = Site(tmp_path, "ardupilot")
     short = translate(real_tour(), "ardupilot", trigger="none")
@@ -210,7 +210,7 @@ def test_a_journal_that_cannot_be_written_ends_the_watch_and_says_why(tmp_path: 
 
 
 def test_a_mission_of_as_many_items_is_seen_to_be_another_when_somebody_starts_it(tmp_path: Path) -> None:
-    from bridge.mavlink.transfer.upload import upload
+    from stopgo.bridge.mavlink.transfer.upload import upload
 
     site = Site(tmp_path, "ardupilot")
     other = translate(real_tour(settle_s=3.5), "ardupilot")

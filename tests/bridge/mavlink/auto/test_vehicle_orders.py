@@ -8,17 +8,17 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.peer import Peer
-from bridge.mavlink.line.peer import reached as found_peer
-from bridge.mavlink.simulated.vehicle_store import Store
-from bridge.robot.answers import answer_to, remember_answer
-from mission.document import Scan, SiteOrigin
-from mission.errors import AnswerIsNo, InputError, RobotUnreachable
-from mission.events import Aborted, Pose, Resumed, Started
-from mission.mavlink.translate import translate
-from mission.run.orders import Order
+from stopgo.bridge.mavlink.auto.vehicle_orders import Consent, VehicleOrders
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.peer import Peer
+from stopgo.bridge.mavlink.line.peer import reached as found_peer
+from stopgo.bridge.mavlink.simulated.vehicle_store import Store
+from stopgo.bridge.robot.answers import answer_to, remember_answer
+from stopgo.mission.document import Scan, SiteOrigin
+from stopgo.mission.errors import AnswerIsNo, InputError, RobotUnreachable
+from stopgo.mission.events import Aborted, Pose, Resumed, Started
+from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.orders import Order
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
 from tests.mission.mavlink.following.worlds import told
 
@@ -189,7 +189,7 @@ def test_the_same_order_again_is_not_carried_out_again(tmp_path: Path) -> None:
 
 
 def test_a_folder_belongs_to_one_vehicle(tmp_path: Path) -> None:
-    from bridge.mavlink.auto.logbook import logbook
+    from stopgo.bridge.mavlink.auto.logbook import logbook
 
     site = Site(tmp_path, "ardupilot")
     with (

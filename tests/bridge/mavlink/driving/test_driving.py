@@ -10,17 +10,17 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridge.commands.watch_commands import tell_compared
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import read_signing_key
-from bridge.mavlink.simulated.chassis import Chassis
-from bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
-from bridge.station.watch import Lines, watch_showing
-from mission.document import Scan, sealed
-from mission.errors import AnswerIsNo, InputError, RobotUnreachable
-from mission.events import Arrived, Finished, Held, PoseReport, Scanned
-from mission.heard_run import HeardRun
-from mission.mavlink.telemetry import STILL_M_S
+from stopgo.bridge.commands.watch_commands import tell_compared
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.line.wire import read_signing_key
+from stopgo.bridge.mavlink.simulated.chassis import Chassis
+from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
+from stopgo.bridge.station.watch import Lines, watch_showing
+from stopgo.mission.document import Scan, sealed
+from stopgo.mission.errors import AnswerIsNo, InputError, RobotUnreachable
+from stopgo.mission.events import Arrived, Finished, Held, PoseReport, Scanned
+from stopgo.mission.heard_run import HeardRun
+from stopgo.mission.mavlink.telemetry import STILL_M_S
 from tests.bridge.mavlink.driving.world import (
     SITE,
     bearing_of_corridor,

@@ -13,13 +13,13 @@ from typing import Any
 import msgspec
 import pytest
 
-from bridge.commands.spawn import end_robot, robot_process, start, start_robot
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.peer import reached
-from bridge.mavlink.line.url import Url
-from bridge.station.station import connect
-from mission.document import Mission, Scan, sealed
-from mission.events import Scanned
+from stopgo.bridge.commands.spawn import end_robot, robot_process, start, start_robot
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.peer import reached
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.station.station import connect
+from stopgo.mission.document import Mission, Scan, sealed
+from stopgo.mission.events import Scanned
 from tests.bridge.mavlink.driving.world import Operator, is_state, site_mission, until
 from tests.called import stopgo
 from tests.ports import free_port
@@ -79,7 +79,7 @@ def test_a_mission_over_zenoh_is_driven_by_an_autopilot_and_recorded(tmp_path: P
     ):
         reach = ("--robot", "r1", "--connect", endpoint)
         assert stopgo("push", str(document), *reach).returncode == 0
-        command = [sys.executable, "-m", "mission", "watch", *reach, "--rrd", str(field), "--json"]
+        command = [sys.executable, "-m", "stopgo", "watch", *reach, "--rrd", str(field), "--json"]
         watch = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         started = stopgo("start", *reach)
         assert started.returncode == 0, started.stderr

@@ -8,15 +8,15 @@ from contextlib import contextmanager
 from threading import Event
 from typing import Any
 
-from bridge.link.clock import WallClock
-from bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, stop_of
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.peer import Ack
-from bridge.mavlink.line.wire import MessageQueue, Who
-from mission.document import Scan
-from mission.errors import OutcomeUnknown
-from mission.mavlink.telemetry import Message
-from mission.run.scans import ScanFailed, ScanResult
+from stopgo.bridge.link.clock import WallClock
+from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, stop_of
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.peer import Ack
+from stopgo.bridge.mavlink.line.wire import MessageQueue, Who
+from stopgo.mission.document import Scan
+from stopgo.mission.errors import OutcomeUnknown
+from stopgo.mission.mavlink.telemetry import Message
+from stopgo.mission.run.scans import ScanFailed, ScanResult
 from tests.bridge.mavlink.driving.world import site_mission
 
 SHA = hashlib.sha256(b"scan").hexdigest()

@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaultKind, VehicleFaults
-from mission.events import Arrived, Held, Pose, PoseReport
-from mission.run.way import foot
-from mission.schedule import schedule
+from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaultKind, VehicleFaults
+from stopgo.mission.events import Arrived, Held, Pose, PoseReport
+from stopgo.mission.run.way import foot
+from stopgo.mission.schedule import schedule
 from tests.bridge.mavlink.driving.world import (
     cornered_mission,
     events_of,

@@ -11,22 +11,22 @@ from typing import Any
 
 import msgspec
 
-from bridge.link.memory_link import Switchboard
-from bridge.link.protocol import KeyExpressions
-from bridge.mavlink.driving.autopilot_body import AutopilotBody
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.peer import Peer, reached
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.simulated.profiles import profile_named
-from bridge.mavlink.simulated.rover import to_east
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_faults import NO_FAULTS, VehicleFaults
-from bridge.mavlink.simulated.vehicle_process import vehicle_on
-from bridge.robot.program import RobotOptions, robot_on
-from bridge.station.follow import Report
-from bridge.station.station import Station
-from mission.document import Mission, Scan, SiteOrigin, sealed
-from mission.events import AnyEvent, Pose, PoseReport, Scanned, StateReport
+from stopgo.bridge.link.memory_link import Switchboard
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.mavlink.driving.autopilot_body import AutopilotBody
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.peer import Peer, reached
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.simulated.profiles import profile_named
+from stopgo.bridge.mavlink.simulated.rover import to_east
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_faults import NO_FAULTS, VehicleFaults
+from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.robot.program import RobotOptions, robot_on
+from stopgo.bridge.station.follow import Report
+from stopgo.bridge.station.station import Station
+from stopgo.mission.document import Mission, Scan, SiteOrigin, sealed
+from stopgo.mission.events import AnyEvent, Pose, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor, pose_of
 from tests.ports import free_port
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.messages import station_beat
-from bridge.mavlink.line.peer import found, reached
-from bridge.mavlink.line.url import read_url
-from bridge.mavlink.line.wire import Who, wire
-from mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
-from mission.mavlink.autopilots.generic import GENERIC
-from mission.mavlink.local_frame import VehicleOrigin
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.messages import station_beat
+from stopgo.bridge.mavlink.line.peer import found, reached
+from stopgo.bridge.mavlink.line.url import read_url
+from stopgo.bridge.mavlink.line.wire import Who, wire
+from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.mavlink.autopilots.generic import GENERIC
+from stopgo.mission.mavlink.local_frame import VehicleOrigin
+from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.scripted import Scripted
 from tests.ports import free_port
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.mavlink.line.url import Url, check_guarded, read_url
-from mission.errors import InputError
+from stopgo.bridge.mavlink.line.url import Url, check_guarded, read_url
+from stopgo.mission.errors import InputError
 
 
 @pytest.mark.parametrize(

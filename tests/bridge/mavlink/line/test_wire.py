@@ -18,12 +18,12 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.transport import open_transport
-from bridge.mavlink.line.url import Url, read_url
-from bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, read_signing_key, wire
-from mission.errors import InputError, RobotUnreachable
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.transport import open_transport
+from stopgo.bridge.mavlink.line.url import Url, read_url
+from stopgo.bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, read_signing_key, wire
+from stopgo.mission.errors import InputError, RobotUnreachable
+from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.hostile import Hostile
 from tests.ports import free_port
 

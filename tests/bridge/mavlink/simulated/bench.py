@@ -8,17 +8,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from bridge.link.clock import SimulatedClock
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.wire import Who
-from bridge.mavlink.simulated.complete_vehicle import complete_vehicle
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
-from mission.document import SiteOrigin
-from mission.events import Pose
-from mission.mavlink.items import Command, Item, MavFrame
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.link.clock import SimulatedClock
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.wire import Who
+from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.events import Pose
+from stopgo.mission.mavlink.items import Command, Item, MavFrame
+from stopgo.mission.mavlink.telemetry import Message
 
 ORIGIN = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=0.0)
 STATION, OTHER = Who(254, 190), Who(253, 190)

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from bridge.mavlink.line.frames import dialect
-from mission.events import Pose
-from mission.mavlink.enums import MessageId
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.mission.events import Pose
+from stopgo.mission.mavlink.enums import MessageId
 from tests.bridge.mavlink.simulated.bench import Bench, delay, waypoint
 
 LOG = Path(__file__).parents[4].parent / "shared" / "data" / "logs" / "rover-stop-and-go.BIN"

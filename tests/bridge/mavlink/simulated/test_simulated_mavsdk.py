@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import wire
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
-from bridge.mavlink.simulated.vehicle_process import vehicle_on
-from mission.mavlink.items import Item
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.line.wire import wire
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
+from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.mission.mavlink.items import Item
 from tests.bridge.mavlink.simulated.bench import HOME, ORIGIN, camera, delay, script, waypoint
 from tests.ports import free_port
 

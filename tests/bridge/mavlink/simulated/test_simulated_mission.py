@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
-from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.read_back import differences, upload_of
-from mission.mavlink.stop_numbers import stop_numbered
-from mission.mavlink.translate import translate
+from stopgo.mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
+from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.read_back import differences, upload_of
+from stopgo.mission.mavlink.stop_numbers import stop_numbered
+from stopgo.mission.mavlink.translate import translate
 from tests.bridge.mavlink.simulated.bench import ACCEPTED, Bench, item_of
 from tests.mission.worlds import square_tour
 

@@ -15,24 +15,24 @@ from pathlib import Path
 
 import pytest
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.transport import Address
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.line.wire import SIGNATURE, Who, Wire, wire
-from bridge.mavlink.simulated.lossy_line import on_line
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_faults import (
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.transport import Address
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.line.wire import SIGNATURE, Who, Wire, wire
+from stopgo.bridge.mavlink.simulated.lossy_line import on_line
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_faults import (
     FAULTS,
     VehicleFault,
     VehicleFaults,
     read_vehicle_fault,
 )
-from bridge.mavlink.simulated.vehicle_process import VehicleOptions, setting_of, vehicle_on
-from bridge.mavlink.simulated.vehicle_store import Store
-from mission.errors import InputError
-from mission.mavlink.items import Item
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.simulated.vehicle_process import VehicleOptions, setting_of, vehicle_on
+from stopgo.bridge.mavlink.simulated.vehicle_store import Store
+from stopgo.mission.errors import InputError
+from stopgo.mission.mavlink.items import Item
+from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.simulated.bench import delay, item_message
 from tests.ports import free_port
 
@@ -84,7 +84,7 @@ def count_of(station: Wire) -> int:
 @contextmanager
 def process(*options: str) -> Iterator[subprocess.Popen[str]]:
     """`stopgo simulate vehicle`, ready."""
-    command = [sys.executable, "-m", "mission", "simulate", "vehicle", *options]
+    command = [sys.executable, "-m", "stopgo", "simulate", "vehicle", *options]
     running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     assert running.stderr is not None
     try:
@@ -147,7 +147,7 @@ def test_a_vehicle_that_cannot_keep_its_state_ends_and_says_so(tmp_path: Path) -
 def test_options_that_cannot_be_are_refused_in_one_line(
     options: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from mission.__main__ import main
+    from stopgo.command_line import main
 
     code = main(["simulate", "vehicle", *options])
     out = capsys.readouterr()
@@ -303,7 +303,7 @@ def test_every_fault_can_be_written_and_is_in_the_guide() -> None:
 
 
 def test_a_pose_is_said_in_the_sites_frame() -> None:
-    from mission.events import Pose
+    from stopgo.mission.events import Pose
 
     options = VehicleOptions("udpin:127.0.0.1:1", origin="47,8,0,90", at=Pose(x=1.0, y=2.0, heading=0.0))
     setting = setting_of(options)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.simulated.profiles import PROFILES
-from mission.mavlink.items import Command, Item, MavFrame
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from tests.bridge.mavlink.simulated.bench import (
     ACCEPTED,
     OTHER,

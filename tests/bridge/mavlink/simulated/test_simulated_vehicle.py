@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.rover import to_east
-from bridge.mavlink.simulated.vehicle_process import read_origin
-from bridge.mavlink.simulated.vehicle_telemetry import MAKERS
-from mission.document import SiteOrigin
-from mission.events import Pose
-from mission.mavlink.items import Command, Item, MavFrame
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.rover import to_east
+from stopgo.bridge.mavlink.simulated.vehicle_process import read_origin
+from stopgo.bridge.mavlink.simulated.vehicle_telemetry import MAKERS
+from stopgo.mission.document import SiteOrigin
+from stopgo.mission.events import Pose
+from stopgo.mission.mavlink.items import Command, Item, MavFrame
+from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.simulated.bench import (
     OBEYED,
     OTHER,

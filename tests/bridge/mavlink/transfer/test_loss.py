@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.mavlink.line.peer import reached
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_process import vehicle_on
-from bridge.mavlink.transfer.upload import Uploaded, upload
+from stopgo.bridge.mavlink.line.peer import reached
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.transfer.upload import Uploaded, upload
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.ports import free_port

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.line.peer import reached
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.upload import Uploaded, clear, upload
-from mission.mavlink.items import Item
-from mission.mavlink.read_back import differences
+from stopgo.bridge.mavlink.line.peer import reached
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.transfer.download import download
+from stopgo.bridge.mavlink.transfer.upload import Uploaded, clear, upload
+from stopgo.mission.mavlink.items import Item
+from stopgo.mission.mavlink.read_back import differences
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.ports import free_port

@@ -7,18 +7,18 @@ from typing import Any
 
 import pytest
 
-from bridge.mavlink.line.frames import dialect
-from bridge.mavlink.line.messages import item_message, item_of
-from bridge.mavlink.line.origin import check_origin
-from bridge.mavlink.line.peer import Peer, reached
-from bridge.mavlink.line.wire import Who
-from bridge.mavlink.transfer import upload as uploads
-from bridge.mavlink.transfer.download import download
-from bridge.mavlink.transfer.upload import Uploaded, clear, upload
-from mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
-from mission.mavlink.autopilots import autopilot_named
-from mission.mavlink.items import Item
-from mission.mavlink.telemetry import Message
+from stopgo.bridge.mavlink.line.frames import dialect
+from stopgo.bridge.mavlink.line.messages import item_message, item_of
+from stopgo.bridge.mavlink.line.origin import check_origin
+from stopgo.bridge.mavlink.line.peer import Peer, reached
+from stopgo.bridge.mavlink.line.wire import Who
+from stopgo.bridge.mavlink.transfer import upload as uploads
+from stopgo.bridge.mavlink.transfer.download import download
+from stopgo.bridge.mavlink.transfer.upload import Uploaded, clear, upload
+from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.mavlink.autopilots import autopilot_named
+from stopgo.mission.mavlink.items import Item
+from stopgo.mission.mavlink.telemetry import Message
 from tests.bridge.mavlink.lists import SITE, held, stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 from tests.bridge.mavlink.scripted import Scripted

@@ -13,14 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from bridge.mavlink.line import transport
-from bridge.mavlink.line.peer import reached
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.simulated.profiles import PROFILES
-from bridge.mavlink.simulated.vehicle import Setting
-from bridge.mavlink.simulated.vehicle_process import vehicle_on
-from bridge.mavlink.transfer.upload import Uploaded, upload
-from mission.errors import OutcomeUnknown
+from stopgo.bridge.mavlink.line import transport
+from stopgo.bridge.mavlink.line.peer import reached
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.simulated.profiles import PROFILES
+from stopgo.bridge.mavlink.simulated.vehicle import Setting
+from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
+from stopgo.bridge.mavlink.transfer.upload import Uploaded, upload
+from stopgo.mission.errors import OutcomeUnknown
 from tests.bridge.mavlink.lists import stops
 
 

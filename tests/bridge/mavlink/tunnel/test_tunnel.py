@@ -11,21 +11,21 @@ from typing import Any
 
 import pytest
 
-from bridge.commands.spawn import end_robot, robot_process, start
-from bridge.commands.tunnel_commands import Refusals, RefusalsHeard
-from bridge.link.authority import init_site, issue
-from bridge.link.keys import now_utc, read_keys
-from bridge.link.memory_link import MemoryLink, Switchboard
-from bridge.link.protocol import KeyExpressions
-from bridge.link.zenoh_link import Guard, connecting
-from bridge.mavlink.line.frames import Frames, dialect
-from bridge.mavlink.line.peer import Peer, reached
-from bridge.mavlink.line.transport import Address, open_transport
-from bridge.mavlink.line.url import Url
-from bridge.mavlink.tunnel import tunnel as tunnels
-from bridge.mavlink.tunnel.message_filter import MessageFilter
-from bridge.mavlink.tunnel.tunnel import QUEUE, Tunnel, open_tunnel
-from mission.errors import OutcomeUnknown, RobotUnreachable
+from stopgo.bridge.commands.spawn import end_robot, robot_process, start
+from stopgo.bridge.commands.tunnel_commands import Refusals, RefusalsHeard
+from stopgo.bridge.link.authority import init_site, issue
+from stopgo.bridge.link.keys import now_utc, read_keys
+from stopgo.bridge.link.memory_link import MemoryLink, Switchboard
+from stopgo.bridge.link.protocol import KeyExpressions
+from stopgo.bridge.link.zenoh_link import Guard, connecting
+from stopgo.bridge.mavlink.line.frames import Frames, dialect
+from stopgo.bridge.mavlink.line.peer import Peer, reached
+from stopgo.bridge.mavlink.line.transport import Address, open_transport
+from stopgo.bridge.mavlink.line.url import Url
+from stopgo.bridge.mavlink.tunnel import tunnel as tunnels
+from stopgo.bridge.mavlink.tunnel.message_filter import MessageFilter
+from stopgo.bridge.mavlink.tunnel.tunnel import QUEUE, Tunnel, open_tunnel
+from stopgo.mission.errors import OutcomeUnknown, RobotUnreachable
 from tests.bridge.mavlink.driving.world import rover
 from tests.bridge.mavlink.scripted import Scripted
 from tests.bridge.mavlink.simulated.test_simulated_mavsdk import item_of, raw, station, tour

@@ -7,14 +7,14 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from mission.events import Arrived, Pose
-from mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic
-from mission.mavlink.autopilots.ardupilot import ARDUPILOT
-from mission.mavlink.following.listed_mission import ListedMission, listed_mission
-from mission.mavlink.following.observer import Observer
-from mission.mavlink.translate import translate
-from mission.run.scans import ScanFailed, ScanResult
-from mission.run.states import Run
+from stopgo.mission.events import Arrived, Pose
+from stopgo.mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic
+from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
+from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
+from stopgo.mission.mavlink.following.observer import Observer
+from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.scans import ScanFailed, ScanResult
+from stopgo.mission.run.states import Run
 from tests.mission.mavlink.following.worlds import tour
 
 UNKNOWN, ACTIVE, COMPLETE = 0, dialect.MISSION_STATE_ACTIVE, dialect.MISSION_STATE_COMPLETE

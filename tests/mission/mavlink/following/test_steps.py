@@ -5,14 +5,14 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from mission.document import ScannerSpec
-from mission.events import AnyEvent, Pose
-from mission.mavlink.following.listed_mission import ListedMission, listed_mission
-from mission.mavlink.following.resuming import resume_place
-from mission.mavlink.following.steps import Observation, held_by_vehicle, passed_by, steps, taken_over
-from mission.mavlink.translate import translate
-from mission.run.scans import ScanFailed, ScanResult
-from mission.run.states import Run
+from stopgo.mission.document import ScannerSpec
+from stopgo.mission.events import AnyEvent, Pose
+from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
+from stopgo.mission.mavlink.following.resuming import resume_place
+from stopgo.mission.mavlink.following.steps import Observation, held_by_vehicle, passed_by, steps, taken_over
+from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.scans import ScanFailed, ScanResult
+from stopgo.mission.run.states import Run
 from tests.mission.mavlink.following.worlds import told, tour
 
 SCAN = ScanResult(file="scan-1.e57", size=1600, points=100, sha256="0" * 64)
@@ -149,7 +149,7 @@ def test_a_vehicle_that_has_lost_nothing_keeps_its_item() -> None:
 
 
 def test_a_stop_that_is_not_in_the_list_is_named() -> None:
-    from mission.errors import InputError
+    from stopgo.mission.errors import InputError
 
     whole = tour()
     shorter = msgspec.structs.replace(whole, stops=whole.stops[:2])

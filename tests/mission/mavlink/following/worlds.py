@@ -8,8 +8,8 @@ from typing import Any
 
 import msgspec
 
-from mission.document import Mission, Scan, Stop
-from mission.events import AnyEvent
+from stopgo.mission.document import Mission, Scan, Stop
+from stopgo.mission.events import AnyEvent
 from tests.mission.worlds import mission_of, stop
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from mission.floor import FloorPlan
-from planner.floors import FloorOptions, read_floor
-from planner.floors.ifc import loading
+from stopgo.mission.floor import FloorPlan
+from stopgo.planner.floors import FloorOptions, read_floor
+from stopgo.planner.floors.ifc import loading
 from tests.planner.floors.ifc.house import House
 
 Read = Callable[..., FloorPlan]
@@ -38,6 +38,6 @@ def read(models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Read:
 
 
 def _in_process(source: Path, out: Path, rest: list[str]) -> int:
-    from planner.floors.ifc.extract import main
+    from stopgo.planner.floors.ifc.extract import main
 
     return main([str(source), str(out), *rest])

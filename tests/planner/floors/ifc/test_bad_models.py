@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from mission.__main__ import main
-from mission.errors import InputError
-from planner.floors import FloorOptions, read_floor
-from planner.floors.ifc import loading
+from stopgo.command_line import main
+from stopgo.mission.errors import InputError
+from stopgo.planner.floors import FloorOptions, read_floor
+from stopgo.planner.floors.ifc import loading
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import House, two_rooms
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from planner.floors import FloorOptions, read_floor
-from planner.floors.ifc.georeference import georeference_of
-from planner.floors.ifc.model import OnEarth
+from stopgo.planner.floors import FloorOptions, read_floor
+from stopgo.planner.floors.ifc.georeference import georeference_of
+from stopgo.planner.floors.ifc.model import OnEarth
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import two_rooms
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from mission.floor import FloorPlan
-from planner.floors import FloorOptions, read_floor
-from planner.floors.rings import to_shapely
+from stopgo.mission.floor import FloorPlan
+from stopgo.planner.floors import FloorOptions, read_floor
+from stopgo.planner.floors.rings import to_shapely
 from tests.faults.sizes import FULL
 
 DATA = Path(__file__).parents[5] / "shared" / "data"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planner.floors.ifc.model import Surface
-from planner.floors.ifc.section import cut, footprint, union_of, upward
+from stopgo.planner.floors.ifc.model import Surface
+from stopgo.planner.floors.ifc.section import cut, footprint, union_of, upward
 
 FACES = [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4)]
 FACES += [(2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)]

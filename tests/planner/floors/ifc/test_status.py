@@ -9,10 +9,10 @@ import ifcopenshell.api.pset
 import ifcopenshell.api.sequence
 import pytest
 
-from mission.errors import InputError
-from mission.floor import FloorPlan, Rank
-from planner.floors.ifc.model import Task
-from planner.floors.ifc.status import status_on
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan, Rank
+from stopgo.planner.floors.ifc.model import Task
+from stopgo.planner.floors.ifc.status import status_on
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import House, two_rooms
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mission.errors import InputError
-from mission.floor import FloorPlan
-from mission.geometry import ring_area
-from planner.floors import FloorOptions, read_floor, survey_floor
+from stopgo.mission.errors import InputError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import ring_area
+from stopgo.planner.floors import FloorOptions, read_floor, survey_floor
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import House, two_rooms
 

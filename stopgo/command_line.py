@@ -9,9 +9,9 @@ import sys
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from mission.errors import InputError, MissingExtra, StopgoError
-from mission.json_answer import answering
-from mission.process import PIPE_CLOSED, Signals, drop_output, have_output, reader_is_gone
+from stopgo.mission.errors import InputError, MissingExtra, StopgoError
+from stopgo.mission.json_answer import answering
+from stopgo.mission.process import PIPE_CLOSED, Signals, drop_output, have_output, reader_is_gone
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from typer.exceptions import TyperException
     from typer.models import CommandInfo
 
-FOLDERS = ("planner.cli", "bridge.cli", "recordings.cli", "mission.cli")
+FOLDERS = ("stopgo.planner.cli", "stopgo.bridge.cli", "stopgo.recordings.cli", "stopgo.mission.cli")
 """Each folder's commands; each module has `add_commands(app)` and imports slow libraries where used."""
 
 INTERRUPTED = 130
@@ -89,7 +89,7 @@ def build_app() -> typer.Typer:
         version: bool = typer.Option(False, "--version", help="Print the version and leave."),
     ) -> None:
         if version:
-            from mission import __version__
+            from stopgo.mission import __version__
 
             typer.echo(__version__)
             raise typer.Exit
@@ -135,7 +135,7 @@ def _run(arguments: list[str]) -> int:
 
 def _must_be_text(arguments: list[str]) -> None:
     """Refuse a name of bytes that are not UTF-8 before anything is written: no answer could tell it."""
-    from mission.table import printable
+    from stopgo.mission.table import printable
 
     for argument in arguments:
         if any("\ud800" <= letter <= "\udfff" for letter in argument):
@@ -197,13 +197,9 @@ def _missing(error: ModuleNotFoundError) -> tuple[str, int]:
 
 def _say(message: str) -> None:
     """The line on stderr, if there is one."""
-    from mission.table import printable, shortened
+    from stopgo.mission.table import printable, shortened
 
     if message:
         with contextlib.suppress(OSError):  # nobody reads it
             line = " ".join(shortened(word) for word in message.split())
             print(f"stopgo: {printable(line)}", file=sys.stderr)  # noqa: T201
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -19,27 +19,18 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from contextlib import AbstractContextManager
 
-    from bridge.station.follow import Followed
-    from bridge.station.station import Station
-    from mission.document import Mission
-    from mission.floor import FloorPlan
-    from mission.plan import Plan
-    from mission.problems import Problem
-    from mission.settings import Settings
-    from recordings.replay.replayed import Replay
+    from stopgo.bridge.station.follow import Followed
+    from stopgo.bridge.station.station import Station
+    from stopgo.mission.document import Mission
+    from stopgo.mission.floor import FloorPlan
+    from stopgo.mission.plan import Plan
+    from stopgo.mission.problems import Problem
+    from stopgo.mission.settings import Settings
+    from stopgo.recordings.replay.replayed import Replay
 
 FOLDERS = ("mission", "planner", "bridge", "recordings")
-_HERE = Path(__file__).resolve().parent
-HOME = _HERE / "_stopgo" if (_HERE / "_stopgo").is_dir() else _HERE
-"""Where the four folders are: below `_stopgo` where stopgo is installed, else beside this file."""
-
-
-def _own_folders_first() -> None:
-    """Let our four folders be found before others of the same name, such as those on PYTHONPATH."""
-    sys.path[:] = [str(HOME), *(place for place in sys.path if place != str(HOME))]
-
-
-_own_folders_first()
+"""The folders of the tree that lie below this package."""
+_HERE = Path(__file__).parent
 
 
 def settings(parameters: str | Path | None = None, **changes: Any) -> Settings:
@@ -50,7 +41,7 @@ def settings(parameters: str | Path | None = None, **changes: Any) -> Settings:
     InputError
         Naming the file or parameter, its value and what would be right.
     """
-    from mission.files.plan_toml import read_settings
+    from stopgo.mission.files.plan_toml import read_settings
 
     return read_settings(None if parameters is None else Path(parameters), changes)
 
@@ -59,15 +50,15 @@ def read_floor(path: str | Path, *, layers: Mapping[str, str] | None = None, **o
     """The floor in a file, in metres.
 
     `layers` says what layers of other names stand for, such as `{"A-WALL": "walls", "DIM": "ignore"}`;
-    `options` are the others of planner.floors.FloorOptions, such as `d_dis` for how curves are cut.
+    `options` are the others of stopgo.planner.floors.FloorOptions, such as `d_dis` for how curves are cut.
 
     Raises
     ------
     InputError
         Naming the file, what is wrong with it, and the way out.
     """
-    from planner.floors import FloorOptions
-    from planner.floors import read_floor as read
+    from stopgo.planner.floors import FloorOptions
+    from stopgo.planner.floors import read_floor as read
 
     told = {name.upper(): role for name, role in (layers or {}).items()}
     return read(Path(path), FloorOptions(layers=told, **options))
@@ -101,9 +92,9 @@ def plan(
     InputError
         A file, parameter or place that does not fit.
     """
-    from planner import plan as planned
-    from planner.floors import options_of
-    from planner.floors import read_floor as read
+    from stopgo.planner import plan as planned
+    from stopgo.planner.floors import options_of
+    from stopgo.planner.floors import read_floor as read
 
     if given is not None and changes:
         raise TypeError(f"give settings, or parameters by name, not both: {', '.join(changes)}")
@@ -115,26 +106,26 @@ def plan(
 
 def read_mission(path: str | Path) -> Mission:
     """A mission.json, read strictly: an unknown key, a wrong type or a wrong digest is an InputError."""
-    from mission.files.mission_json import read
+    from stopgo.mission.files.mission_json import read
 
     return read(Path(path))
 
 
 def write_mission(mission: Mission, path: str | Path) -> None:
     """Write a mission.json whole or not at all."""
-    from mission.files.mission_json import write
+    from stopgo.mission.files.mission_json import write
 
     write(mission, Path(path))
 
 
 def check(mission: Mission, floor: str | Path | None = None) -> tuple[Problem, ...]:
     """What of a mission makes no sense; and with a floor's file, what does not fit that floor."""
-    from mission.problems import problems_of
+    from stopgo.mission.problems import problems_of
 
     problems = problems_of(mission)
     if floor is None:
         return problems
-    from planner.checking.verdict import verdict
+    from stopgo.planner.checking.verdict import verdict
 
     return (*problems, *verdict(mission, Path(floor), None).problems)
 
@@ -149,9 +140,9 @@ def export(mission: Mission, path: str | Path, *, to: str | None = None) -> None
     AnswerIsNo
         The format cannot hold what the mission depends on.
     """
-    from mission.files.atomic import write_atomic
-    from mission.files.exports import exported, format_named
-    from mission.files.exports.format import Supplements
+    from stopgo.mission.files.atomic import write_atomic
+    from stopgo.mission.files.exports import exported, format_named
+    from stopgo.mission.files.exports.format import Supplements
 
     write_atomic(Path(path), exported(mission, format_named(to, Path(path)), Supplements()))
 
@@ -159,14 +150,14 @@ def export(mission: Mission, path: str | Path, *, to: str | None = None) -> None
 def connect(endpoint: str, *, robot: str, **options: Any) -> AbstractContextManager[Station]:
     """A robot that has been reached at `endpoint`, such as `tcp/127.0.0.1:7447`, as a context manager.
 
-    Options are those of `bridge.station.station.connect`: site, commander, timeout_s, keys, insecure.
+    Options are those of `stopgo.bridge.station.station.connect`: site, commander, timeout_s, keys, insecure.
 
     Raises
     ------
     RobotUnreachable
         If the robot did not show itself in time; nothing was sent.
     """
-    from bridge.station.station import connect as connected
+    from stopgo.bridge.station.station import connect as connected
 
     return connected(endpoint, robot=robot, **options)
 
@@ -213,10 +204,10 @@ def replay(
     AnswerIsNo
         When its halts fit the stops in no way, or in several.
     """
-    from mission.document import Transform
-    from recordings.logs import read_log
-    from recordings.replay.log_placing import Placing
-    from recordings.replay.replaying import replay as laid
+    from stopgo.mission.document import Transform
+    from stopgo.recordings.logs import read_log
+    from stopgo.recordings.replay.log_placing import Placing
+    from stopgo.recordings.replay.replaying import replay as laid
 
     seen = None if to_map is None else Transform(x=to_map[0], y=to_map[1], heading=to_map[2])
     how = Placing(to_map=seen, align=align, time_offset_s=time_offset_s)
@@ -225,11 +216,11 @@ def replay(
 
 def main() -> int:
     """The `stopgo` command."""
-    trouble = _too_old() or _shadow()
+    trouble = _too_old() or _incomplete()
     if trouble:
         print(f"stopgo: {trouble}", file=sys.stderr)  # noqa: T201
         return 2
-    from mission.__main__ import main as run
+    from stopgo.command_line import main as run
 
     return run()
 
@@ -247,20 +238,22 @@ def _too_old() -> str:
     return f"needs Python 3.11 or newer; this is {sys.version.split()[0]} ({sys.executable})"
 
 
-def _shadow() -> str:
-    """Which of our folders is missing, or was loaded from elsewhere before; else empty."""
+def _incomplete() -> str:
+    """The line that names a missing folder of ours; empty if all are there."""
     from importlib.util import find_spec
 
+    missing = []
     for name in FOLDERS:
-        spec = find_spec(name)
-        found = None if spec is None or spec.origin is None else Path(spec.origin).resolve().parent
-        if found != HOME / name:
-            where = "is missing" if found is None else f"is taken from {found}"
-            return (
-                f"the package '{name}' {where}, not from {HOME / name}: another package has this name; "
-                "take it out of PYTHONPATH, or install stopgo in an environment of its own"
-            )
-    return ""
+        spec = find_spec(f"stopgo.{name}")
+        found = None if spec is None or spec.origin is None else Path(spec.origin).parent
+        if found not in (_HERE / name, _HERE.parent / name):  # the second: a checkout without links
+            missing.append(name)
+    if not missing:
+        return ""
+    return (
+        f"the installation in {_HERE} is incomplete: no {', '.join(missing)}; "
+        "install it again (a checkout on Windows: `git config core.symlinks true`, then check out again)"
+    )
 
 
 __all__ = [
@@ -276,7 +269,3 @@ __all__ = [
     "settings",
     "write_mission",
 ]
-
-
-if __name__ == "__main__":
-    sys.exit(main())
