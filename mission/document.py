@@ -13,11 +13,11 @@ from msgspec import UNSET, UnsetType
 
 from stopgo.mission.floor_source import FloorSource
 from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, told_of
+from stopgo.mission.transform import Point, SiteOrigin, Transform
 
 SCHEMA: Final = "stopgo/mission"
 VERSION: Final = 1
 
-Point = tuple[float, float]
 OnFailure = Literal["retry", "skip", "ask", "abort", "home"]
 
 
@@ -25,26 +25,9 @@ class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Base of every part of the document: frozen, and strict about unknown keys."""
 
 
-class Transform(Document, frozen=True):
-    """Site to map: turn by `heading`, then shift by (x, y)."""
-
-    x: float
-    y: float
-    heading: float
-
-
 class Frame(Document, frozen=True):
     name: str
     to_map: Transform | None = None
-
-
-class SiteOrigin(Document, frozen=True):
-    """WGS84 position of the frame's origin; heading is the bearing of +y clockwise from true north."""
-
-    lat: float
-    lon: float
-    alt: float
-    heading_deg: float
 
 
 class RobotSpec(Document, frozen=True):

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from stopgo.mission.document import Point, SiteOrigin
+from stopgo.mission.transform import Point, SiteOrigin
 
 STEPS_PER_DEGREE = 10_000_000
 """MAVLink and GNSS write places in steps of 1e-7 degrees."""

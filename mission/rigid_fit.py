@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stopgo.mission.document import Transform
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import FloatArray, frozen
+from stopgo.mission.transform import Transform
 
 LEAST_SPREAD_M = 0.5
 """Root mean square distance of the points from their middle, below which the turn is guessed."""

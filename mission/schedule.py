@@ -8,9 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from stopgo.mission.document import Mission, Point, RobotSpec
+from stopgo.mission.document import Mission, RobotSpec
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.planning import Schedule
+from stopgo.mission.transform import Point
 
 
 def schedule(mission: Mission) -> Schedule:

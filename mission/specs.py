@@ -9,9 +9,10 @@ import msgspec
 from msgspec import UNSET, UnsetType
 
 from stopgo.mission import __version__
-from stopgo.mission.document import LimitsSpec, Origin, Policy, RobotSpec, Scan, ScannerSpec, SiteOrigin
+from stopgo.mission.document import LimitsSpec, Origin, Policy, RobotSpec, Scan, ScannerSpec
 from stopgo.mission.limits import blind_range
 from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, told_of
+from stopgo.mission.transform import SiteOrigin
 
 DECIMALS = 6
 """Missions hold micrometres and microradians: finer would be float noise."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from stopgo.mission.document import Point, Transform
+from stopgo.mission.transform import Point, Transform
 
 SAME = Transform(x=0.0, y=0.0, heading=0.0)
 

@@ -14,9 +14,7 @@ from stopgo.mission.document import (
     Frame,
     Mission,
     MissionShare,
-    Point,
     Sees,
-    SiteOrigin,
     Start,
     Stop,
     mission_id,
@@ -38,15 +36,13 @@ from stopgo.mission.specs import (
     scanner_of,
     site_origin_of,
 )
+from stopgo.mission.transform import Point, SiteOrigin
 from stopgo.mission.turning import SAME
 from stopgo.planner.overlap.registered import registered_pairs
 from stopgo.planner.routing import GRAPHS
 from stopgo.planner.shapes import local_origin
-from stopgo.planner.space.gaps import Walls, keeps_clear
+from stopgo.planner.space.gaps import CLEAR_SLACK, Walls, keeps_clear
 from stopgo.planner.space.reach import walls_of
-
-CLEAR_SLACK = 2e-6
-"""What rounding to DECIMALS may cost in clearance."""
 
 
 def assemble(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.planning import Candidates, Selection, Visibility
 from stopgo.planner.candidates import judged
-from stopgo.planner.candidates.grid import main_axes
+from stopgo.planner.room_grid import main_axes
 from stopgo.planner.selection import select
 from stopgo.planner.shapes import local_origin, to_shape
 from stopgo.planner.visibility import visibility

@@ -204,7 +204,7 @@ def replay(
     AnswerIsNo
         When its halts fit the stops in no way, or in several.
     """
-    from stopgo.mission.document import Transform
+    from stopgo.mission.transform import Transform
     from stopgo.recordings.logs import read_log
     from stopgo.recordings.replay.log_placing import Placing
     from stopgo.recordings.replay.replaying import replay as laid

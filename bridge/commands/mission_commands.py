@@ -25,7 +25,8 @@ from stopgo.bridge.console import Bar, carried_out, print_json, refusals_in, say
 
 if TYPE_CHECKING:
     from stopgo.bridge.link.protocol import Accepted
-    from stopgo.mission.document import Mission, Transform
+    from stopgo.mission.document import Mission
+    from stopgo.mission.transform import Transform
 
 PushTimeout = Annotated[
     float | None,

@@ -21,9 +21,9 @@ from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
     from stopgo.bridge.mavlink.driving.mavlink_scanner import ScanTrigger
-    from stopgo.mission.document import Transform
     from stopgo.mission.events import Pose
     from stopgo.mission.run.revision import RevisionPolicy
+    from stopgo.mission.transform import Transform
 
 MAVLINK = "mavlink:"
 """Before the URL of an autopilot that is the controller."""
@@ -153,7 +153,7 @@ def read_map(text: str | None) -> Transform | None:
 
 def read_transform(option: str, text: str) -> Transform:
     """A transform from X,Y,HEADING in metres and degrees."""
-    from stopgo.mission.document import Transform
+    from stopgo.mission.transform import Transform
 
     pose = read_pose(option, text)
     return Transform(x=pose.x, y=pose.y, heading=pose.heading)

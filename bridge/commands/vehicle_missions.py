@@ -28,7 +28,7 @@ from stopgo.bridge.mavlink.transfer.upload import (
     if_stopped,
     upload,
 )
-from stopgo.mission.document import Mission, SiteOrigin
+from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.exports import qgc_plan, qgc_waypoints
@@ -42,6 +42,7 @@ from stopgo.mission.mavlink.read_back import home_item
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.mavlink.translation_options import ScanWait, Settle, Trigger
 from stopgo.mission.table import table
+from stopgo.mission.transform import SiteOrigin
 
 ITEMS = ("items", 1)
 T = TypeVar("T", bound=str)

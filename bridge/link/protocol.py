@@ -13,7 +13,6 @@ from typing import Any, Final, TypeVar
 import msgspec
 
 from stopgo.mission.decoding import one_decode_error
-from stopgo.mission.document import Transform
 from stopgo.mission.errors import InputError
 from stopgo.mission.events import (
     AnyEvent,
@@ -26,6 +25,7 @@ from stopgo.mission.events import (
 )
 from stopgo.mission.run.lease import Lease
 from stopgo.mission.run.orders import Answer, Count, ShortText
+from stopgo.mission.transform import Transform
 
 VERSION: Final = 1
 CHUNK_BYTES: Final = 32 * 1024

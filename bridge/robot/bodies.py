@@ -18,8 +18,9 @@ from stopgo.bridge.robot.simulator import (
     SimulatedScanner,
     Wear,
 )
-from stopgo.mission.document import Mission, Start, Transform
+from stopgo.mission.document import Mission, Start
 from stopgo.mission.events import Pose
+from stopgo.mission.transform import Transform
 
 
 @dataclass(frozen=True)

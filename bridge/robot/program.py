@@ -26,9 +26,9 @@ from stopgo.bridge.robot.journal import Journal, open_journal
 from stopgo.bridge.robot.recorder import LIMIT_BYTES, RunRecorder
 from stopgo.bridge.robot.refusal_log import RefusalLog
 from stopgo.bridge.robot.simulator import NO_FAULTS, Faults
-from stopgo.mission.document import Transform
 from stopgo.mission.errors import AnswerIsNo, InputError
 from stopgo.mission.run.revision import RevisionPolicy
+from stopgo.mission.transform import Transform
 
 LOOK_S = 1.5
 """How long a robot that joins a router waits for what that one knows."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from stopgo.mission.document import Point, SiteOrigin
 from stopgo.mission.events import Pose
 from stopgo.mission.geodesy import Geodetic, bearing_deg, from_geodetic, heading_of
+from stopgo.mission.transform import Point, SiteOrigin
 
 SAME_M = 0.05
 """Origins that are no farther apart are the same: each is written in steps of a centimetre."""

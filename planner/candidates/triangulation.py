@@ -16,8 +16,8 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.planning import KEPT, SLIVER, TOO_SMALL, NavigableSpace
-from stopgo.planner.candidates.grid import main_axes
 from stopgo.planner.candidates.place import Place
+from stopgo.planner.room_grid import main_axes
 from stopgo.planner.shapes import GRID, one_shape, polygon_parts, roughly_widened, segments_of
 
 LEAST_ANGLE = float(np.arcsin(1 / 6))

@@ -27,7 +27,7 @@ from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.planning import NavigableSpace
 from stopgo.mission.settings import Settings
-from stopgo.planner.candidates.grid import main_axes, room_grid
+from stopgo.planner.room_grid import main_axes, room_grid
 from stopgo.planner.routing.roadmap import anchors_of, on_crossings, outward_corners
 from stopgo.planner.routing.ways import Ways, shortest_ways
 from stopgo.planner.shapes import GRID, local_origin, to_shape

@@ -23,6 +23,8 @@ STEPS = 0.02 * 1.4 ** np.arange(15)
 """Distances from a gap's middle, up to about 2 m, at which the drive area is looked for."""
 LONGEST = 10.0
 """Gaps at most this far apart (m) are tried as the two ends of one narrow corridor."""
+CLEAR_SLACK = 2e-6
+"""What rounding a mission to micrometres may cost in clearance."""
 
 
 @dataclass(frozen=True, eq=False)

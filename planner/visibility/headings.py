@@ -16,7 +16,7 @@ import numpy as np
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.planning import Candidates, Visibility
 from stopgo.mission.specs import rounded
-from stopgo.planner.candidates.grid import main_axes
+from stopgo.planner.room_grid import main_axes
 from stopgo.planner.shapes import local_origin, to_shape
 from stopgo.planner.visibility.runs import visibility_of
 

@@ -9,7 +9,7 @@ import numpy as np
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.planning import Candidates
-from stopgo.planner.candidates.grid import main_axes
+from stopgo.planner.room_grid import main_axes
 from stopgo.planner.shapes import local_origin, segments_of, to_shape
 
 MARGIN = 2.25

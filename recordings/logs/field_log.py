@@ -13,11 +13,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stopgo.mission.document import Mission, SiteOrigin
+from stopgo.mission.document import Mission
 from stopgo.mission.events import AnyEvent
 from stopgo.mission.geodesy import Geodetic, from_geodetic
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.mavlink.items import Item
+from stopgo.mission.transform import SiteOrigin
 
 Stamps = Literal["header", "log"]
 RemarkKind = Literal["mode", "command", "trigger", "reached", "text"]

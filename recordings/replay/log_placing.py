@@ -8,12 +8,13 @@ from typing import Literal
 
 import numpy as np
 
-from stopgo.mission.document import Mission, Transform
+from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.geodesy import Geodetic, from_geodetic
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.mavlink.local_frame import is_elsewhere
 from stopgo.mission.run_log import Alignment, Track
+from stopgo.mission.transform import Transform
 from stopgo.recordings.logs.field_log import FieldLog, Poses
 from stopgo.recordings.logs.own import AT_EVENTS, SITE
 from stopgo.recordings.replay.fitting import Fit, fitted, turning

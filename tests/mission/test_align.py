@@ -37,7 +37,7 @@ numbers = st.floats(-1e3, 1e3)
 
 @given(x=numbers, y=numbers, heading=st.floats(-3.1, 3.1), far=numbers)
 def test_any_turn_and_shift_is_found(x: float, y: float, heading: float, far: float) -> None:
-    from stopgo.mission.document import Transform
+    from stopgo.mission.transform import Transform
 
     wanted = Transform(x=x, y=y, heading=heading)
     site = CORNERS + far

@@ -6,7 +6,6 @@ import math
 
 import pytest
 
-from stopgo.mission.document import SiteOrigin
 from stopgo.mission.geodesy import (
     RULES,
     STEPS_PER_DEGREE,
@@ -16,6 +15,7 @@ from stopgo.mission.geodesy import (
     heading_of,
     to_geodetic,
 )
+from stopgo.mission.transform import SiteOrigin
 
 SITES = [
     SiteOrigin(lat=47.3769, lon=8.5417, alt=408.0, heading_deg=30.0),

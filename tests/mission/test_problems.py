@@ -8,8 +8,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from stopgo.mission.document import Mission, SiteOrigin
+from stopgo.mission.document import Mission
 from stopgo.mission.problems import problems_of
+from stopgo.mission.transform import SiteOrigin
 from tests.mission.worlds import room_mission, square_tour, stop
 
 change = msgspec.structs.replace

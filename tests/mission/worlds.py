@@ -15,7 +15,6 @@ from stopgo.mission.document import (
     Scan,
     ScannerSpec,
     Sees,
-    SiteOrigin,
     Start,
     Stop,
     sealed,
@@ -35,6 +34,7 @@ from stopgo.mission.planning import (
     Visibility,
 )
 from stopgo.mission.settings import Settings
+from stopgo.mission.transform import SiteOrigin
 
 
 def stop(name: str, *approach: tuple[float, float], heading: float = 0.0, units: int = 10) -> Stop:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.mission.document import SiteOrigin
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.mavlink.local_frame import VehicleOrigin, how_far_off
+from stopgo.mission.transform import SiteOrigin
 
 
 def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> VehicleOrigin:

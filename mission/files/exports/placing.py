@@ -6,12 +6,13 @@ import math
 
 import msgspec
 
-from stopgo.mission.document import Frame, Mission, SiteOrigin, Transform
+from stopgo.mission.document import Frame, Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.parameter import numbers
 from stopgo.mission.problems import FAR
 from stopgo.mission.settings import PARAMETERS
+from stopgo.mission.transform import SiteOrigin, Transform
 
 MAP = "write X,Y,HEADING in metres and degrees, such as 1.5,2,90"
 

@@ -9,7 +9,8 @@ from itertools import pairwise
 
 import msgspec
 
-from stopgo.mission.document import Frame, Mission, Point, Stop, Transform
+from stopgo.mission.document import Frame, Mission, Stop
+from stopgo.mission.transform import Point, Transform
 from stopgo.mission.turning import turned
 
 

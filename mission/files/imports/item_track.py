@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
-from stopgo.mission.document import SiteOrigin
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports import track
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions
@@ -21,6 +20,7 @@ from stopgo.mission.mavlink.items import NAMES, Command, Item, Placed
 from stopgo.mission.mavlink.recognise import GLOBAL_FRAMES, PLACES, TRIGGERS, WAITS, recognise
 from stopgo.mission.mavlink.recognised_tour import RecognisedStop, RecognisedTour, recognised_tour
 from stopgo.mission.mavlink.writing import SCAN_MESSAGE
+from stopgo.mission.transform import SiteOrigin
 
 MOST = 65_535
 """Items a mission may have by the protocol."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from stopgo.mission.document import SiteOrigin
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports.item_track import Listed, assumptions, autopilot_for, track_of
 from stopgo.mission.files.imports.qgc_plan import LARGEST_CODE
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions
+from stopgo.mission.transform import SiteOrigin
 
 HEAD = "QGC WPL 110"
 COLUMNS = 12

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from stopgo.mission.document import OnFailure, Point, SiteOrigin
+from stopgo.mission.document import OnFailure
+from stopgo.mission.transform import Point, SiteOrigin
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ from typing import Any
 import msgspec
 import pytest
 
-from stopgo.mission.document import Mission, Scan, Transform, sealed
+from stopgo.mission.document import Mission, Scan, sealed
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.events import RevisionTaken, Scanned
+from stopgo.mission.transform import Transform
 from tests.bridge.world import Field, corridor
 from tests.faults.test_crashes import Mains, PowerCut
 

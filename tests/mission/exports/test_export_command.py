@@ -10,10 +10,11 @@ import msgspec
 import pytest
 
 from stopgo.command_line import main
-from stopgo.mission.document import Mission, SiteOrigin
+from stopgo.mission.document import Mission
 from stopgo.mission.files import mission_json
 from stopgo.mission.files.exports import FORMATS
 from stopgo.mission.files.mission_json import read
+from stopgo.mission.transform import SiteOrigin
 from tests.mission.exports.worlds import laboratory
 
 Captured = pytest.CaptureFixture[str]

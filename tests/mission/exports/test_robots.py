@@ -17,10 +17,11 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from ruamel.yaml import YAML
 
-from stopgo.mission.document import Mission, OnFailure, Transform
+from stopgo.mission.document import Mission, OnFailure
 from stopgo.mission.files.exports import FORMATS, exported, format_named
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.waypoints import mapped, way
+from stopgo.mission.transform import Transform
 from stopgo.mission.turning import turned, turned_back
 from tests.mission.exports.vda5050_order import ORDERS
 from tests.mission.exports.worlds import MAP, laboratory, on_a_map

@@ -15,10 +15,11 @@ from msgspec.structs import replace as changed
 
 import stopgo
 from stopgo.command_line import main
-from stopgo.mission.document import Frame, Mission, SiteOrigin, Transform, sealed
+from stopgo.mission.document import Frame, Mission, sealed
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import write
 from stopgo.mission.run_log import Track
+from stopgo.mission.transform import SiteOrigin, Transform
 from stopgo.recordings.logs.field_log import FieldLog, Poses, Remark, poses_of
 from stopgo.recordings.replay.judged import judged
 from stopgo.recordings.replay.log_placing import Placing
