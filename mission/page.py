@@ -10,7 +10,7 @@ import msgspec
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import frozen, polyline_length
 from stopgo.mission.limits import limits_in_words
-from stopgo.mission.planning import Schedule
+from stopgo.mission.schedule import Schedule
 from stopgo.mission.table import duration, printable, table
 
 

@@ -405,22 +405,6 @@ class Route:
 
 
 @dataclass(frozen=True, eq=False)
-class Schedule:
-    """How long the mission is planned to take, in seconds."""
-
-    drive_s: float
-    turn_s: float
-    settle_s: float
-    scan_s: float
-    arrival_s: FloatArray = field(default_factory=lambda: frozen([]))
-    """Planned time of arrival at each stop, from the mission's start (k,)."""
-
-    @property
-    def total_s(self) -> float:
-        return self.drive_s + self.turn_s + self.settle_s + self.scan_s
-
-
-@dataclass(frozen=True, eq=False)
 class Unreached:
     """A room that the plan does not enter, and why."""
 
@@ -448,7 +432,6 @@ __all__ = [
     "Room",
     "RoomSpace",
     "Route",
-    "Schedule",
     "Selection",
     "Targets",
     "Unreached",

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import msgspec
 from msgspec import UNSET
 
-from stopgo.mission.document import Mission, Start, Stop
+from stopgo.mission.document import Mission, Point, Start, Stop
 from stopgo.mission.geodesy import out_of_reach
-from stopgo.mission.transform import Point
 
 JOIN = 1e-3
 """Metres within which the ends of two legs are the same place."""

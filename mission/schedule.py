@@ -4,14 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
-from stopgo.mission.document import Mission, RobotSpec
+from stopgo.mission.document import Mission, Point, RobotSpec
 from stopgo.mission.geometry import FloatArray, frozen
-from stopgo.mission.planning import Schedule
-from stopgo.mission.transform import Point
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """How long the mission is planned to take, in seconds."""
+
+    drive_s: float
+    turn_s: float
+    settle_s: float
+    scan_s: float
+    arrival_s: FloatArray = field(default_factory=lambda: frozen([]))
+    """Planned time of arrival at each stop, from the mission's start (k,)."""
+
+    @property
+    def total_s(self) -> float:
+        return self.drive_s + self.turn_s + self.settle_s + self.scan_s
 
 
 def schedule(mission: Mission) -> Schedule:

@@ -14,6 +14,7 @@ from stopgo.mission.document import (
     Frame,
     Mission,
     MissionShare,
+    Point,
     Sees,
     Start,
     Stop,
@@ -36,7 +37,7 @@ from stopgo.mission.specs import (
     scanner_of,
     site_origin_of,
 )
-from stopgo.mission.transform import Point, SiteOrigin
+from stopgo.mission.transform import SiteOrigin
 from stopgo.mission.turning import SAME
 from stopgo.planner.overlap.registered import registered_pairs
 from stopgo.planner.routing import GRAPHS

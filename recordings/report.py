@@ -9,7 +9,8 @@ import msgspec
 from stopgo.mission.document import Mission
 from stopgo.mission.figures import Figures, percent
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.planning import Candidates, NavigableSpace, Route, Schedule, Selection, Visibility
+from stopgo.mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
+from stopgo.mission.schedule import Schedule
 from stopgo.mission.table import printable
 from stopgo.recordings.canvas import LocalOrigin
 

@@ -8,10 +8,9 @@ from typing import Literal, Protocol
 
 import msgspec
 
-from stopgo.mission.document import Mission, RobotSpec, Scan
+from stopgo.mission.document import Mission, Point, RobotSpec, Scan
 from stopgo.mission.events import Pose
 from stopgo.mission.run.scans import ScanFailed, ScanResult
-from stopgo.mission.transform import Point
 
 Outcome = Literal["arrived", "interrupted", "blocked"]
 

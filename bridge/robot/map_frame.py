@@ -12,9 +12,9 @@ from threading import Event
 
 from stopgo.bridge.robot.base import Base, BaseHealth, Outcome, Rest
 from stopgo.mission import turning
-from stopgo.mission.document import Mission, RobotSpec
+from stopgo.mission.document import Mission, Point, RobotSpec
 from stopgo.mission.events import Pose
-from stopgo.mission.transform import Point, Transform
+from stopgo.mission.transform import Transform
 from stopgo.mission.turning import SAME
 
 

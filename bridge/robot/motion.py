@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from stopgo.mission.document import Point
 from stopgo.mission.events import Pose
-from stopgo.mission.transform import Point
 
 
 class Phase(Protocol):

@@ -14,12 +14,12 @@ from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.base import Base, BaseHealth, Outcome, Rest, Scanner
 from stopgo.bridge.robot.bodies import Body
 from stopgo.bridge.robot.map_frame import OnMap
-from stopgo.mission.document import Mission, RobotSpec, Scan
+from stopgo.mission.document import Mission, Point, RobotSpec, Scan
 from stopgo.mission.errors import InputError
 from stopgo.mission.events import Pose
 from stopgo.mission.plugins import Variant, variant
 from stopgo.mission.run.scans import ScanFailed, ScanResult
-from stopgo.mission.transform import Point, Transform
+from stopgo.mission.transform import Transform
 
 T = TypeVar("T")
 

@@ -18,11 +18,10 @@ import msgspec
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.base import BaseHealth, Outcome, Rest
 from stopgo.bridge.robot.motion import Brake, Motion, along
-from stopgo.mission.document import Mission, RobotSpec, Scan
+from stopgo.mission.document import Mission, Point, RobotSpec, Scan
 from stopgo.mission.errors import InputError
 from stopgo.mission.events import Pose
 from stopgo.mission.run.scans import ScanFailed, ScanResult
-from stopgo.mission.transform import Point
 
 SLICE_S = 0.5
 """How often a moving robot's place is written down: what a crash can cost."""

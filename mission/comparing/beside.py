@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.comparison import Beside
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, Point
 from stopgo.mission.events import (
     AnyEvent,
     Arrived,
@@ -30,7 +30,6 @@ from stopgo.mission.events import (
 )
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.run_log import RunLog
-from stopgo.mission.transform import Point
 
 SKIPPING = 1e-3
 """What it costs to leave out a metre of the way, in m² of squared distance: enough to decide between pieces

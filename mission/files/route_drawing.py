@@ -7,12 +7,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.sheet import PaperSheet
 from stopgo.mission.files.svg import circle, group, line, line_data, path, polygon, rect, text
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.network import network_of
-from stopgo.mission.transform import Point
 
 WAY: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.35}
 """The way to each stop."""

@@ -11,8 +11,8 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from stopgo.mission.document import Point
 from stopgo.mission.run.way import foot
-from stopgo.mission.transform import Point
 
 THIN = 0.05
 """Share of the allowance that is spent on leaving out points of nearly straight pieces, for speed."""

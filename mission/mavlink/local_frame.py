@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from stopgo.mission.document import Point
 from stopgo.mission.events import Pose
 from stopgo.mission.geodesy import Geodetic, bearing_deg, from_geodetic, heading_of
-from stopgo.mission.transform import Point, SiteOrigin
+from stopgo.mission.transform import SiteOrigin
 
 SAME_M = 0.05
 """Origins that are no farther apart are the same: each is written in steps of a centimetre."""

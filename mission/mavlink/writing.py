@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-from stopgo.mission.document import Stop
+from stopgo.mission.document import Point, Stop
 from stopgo.mission.geodesy import bearing_deg, to_geodetic, to_steps
 from stopgo.mission.mavlink.items import NAN, Command, Item, MavFrame
 from stopgo.mission.mavlink.translation_options import TranslationOptions
-from stopgo.mission.transform import Point
 
 SCAN_MESSAGE = 100
 """Message id by which a script on the vehicle knows that a scan is due."""

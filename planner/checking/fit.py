@@ -15,13 +15,12 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.problems import Problem
 from stopgo.mission.settings import Settings
 from stopgo.mission.specs import limits_spec_of
-from stopgo.mission.transform import Point
 from stopgo.planner.appraisal.plausible import over_ignored
 from stopgo.planner.shapes import HAIRLINE, SLACK, holds, segments_of
 from stopgo.planner.space.gaps import CLEAR_SLACK, Walls

@@ -8,11 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, Point
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.page import route_length
 from stopgo.mission.schedule import straight_time, turn_time
-from stopgo.mission.transform import Point
 
 STEP_M = 0.25
 """Greatest distance between two poses of the planned drive …"""

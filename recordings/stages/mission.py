@@ -14,10 +14,9 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.geometry import FloatArray, bounds
 from stopgo.mission.network import network_of, pair_in_words
-from stopgo.mission.transform import Point
 from stopgo.recordings import entities, palette, strokes
 from stopgo.recordings.canvas import Canvas, on_screen
 from stopgo.recordings.layout import Bounds

@@ -27,6 +27,7 @@ from stopgo.mission.document import (
     Frame,
     Mission,
     Origin,
+    Point,
     Policy,
     RobotSpec,
     Scan,
@@ -40,7 +41,6 @@ from stopgo.mission.events import StateReport
 from stopgo.mission.run.orders import Answer, Order, Verb
 from stopgo.mission.run.revision import RevisionPolicy
 from stopgo.mission.run.states import Run
-from stopgo.mission.transform import Point
 
 EXACT = Wear(noise_m=0.0, noise_rad=0.0, battery_per_s=0.0)
 WALKING = RobotSpec(radius=0.35, speed=0.5, turn_rate=math.radians(45), acceleration=0.5)

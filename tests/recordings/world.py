@@ -28,11 +28,11 @@ from stopgo.mission.planning import (
     OpeningState,
     RoomSpace,
     Route,
-    Schedule,
     Selection,
     Targets,
     Visibility,
 )
+from stopgo.mission.schedule import Schedule
 from stopgo.mission.settings import Settings
 
 MISSION_ID = "0123456789abcdef0123456789abcdef"

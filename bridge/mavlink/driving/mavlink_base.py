@@ -16,12 +16,12 @@ from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.driving.onboard_autopilot import ORDER_S, OnboardAutopilot
 from stopgo.bridge.mavlink.driving.straight_drive import NEAR_M, Ability, Patience, StraightDrive
 from stopgo.bridge.robot.base import BaseHealth, Outcome, Rest
-from stopgo.mission.document import Mission, RobotSpec
+from stopgo.mission.document import Mission, Point, RobotSpec
 from stopgo.mission.events import Pose
 from stopgo.mission.mavlink.local_frame import UNPLACED, LocalFrame, VehicleOrigin, apart, local_frame
 from stopgo.mission.run.scans import needs_heading, turned_away
 from stopgo.mission.run.way import foot, legs_of
-from stopgo.mission.transform import Point, SiteOrigin
+from stopgo.mission.transform import SiteOrigin
 
 TICK_S = 0.1
 AGAIN_S = 1.0

@@ -27,6 +27,7 @@ from stopgo.bridge.mavlink.line.parameter_reading import read_parameters
 from stopgo.bridge.mavlink.line.peer import Peer, found
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.line.wire import MessageQueue, Who, wire
+from stopgo.mission.document import Point
 from stopgo.mission.errors import InputError, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import AUTOPILOTS
 from stopgo.mission.mavlink.autopilots.kind import Mode, why_no_rover
@@ -42,7 +43,6 @@ from stopgo.mission.mavlink.telemetry import (
     origin_of,
     stands_still,
 )
-from stopgo.mission.transform import Point
 
 ON_BOARD = Who(253, Component.ONBOARD_COMPUTER)
 """Ourselves: neither QGroundControl (255) nor a station of ours (254)."""

@@ -12,9 +12,9 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from stopgo.mission.document import Point
 from stopgo.mission.events import Pose
 from stopgo.mission.run.way import foot
-from stopgo.mission.transform import Point
 
 DriveVerdict = Literal["going", "arrived", "blocked"]
 DrivePhase = Literal["turning", "driving", "stopping"]

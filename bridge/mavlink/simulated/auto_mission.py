@@ -15,11 +15,11 @@ from stopgo.bridge.mavlink.simulated.camera import Camera
 from stopgo.bridge.mavlink.simulated.rover import Rover
 from stopgo.bridge.mavlink.simulated.vehicle_faults import Mishaps
 from stopgo.bridge.mavlink.simulated.vehicle_store import KeptItems, Store
+from stopgo.mission.document import Point
 from stopgo.mission.mavlink import recognise as recognised
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.items import Command, Item
 from stopgo.mission.mavlink.recognise import TRIGGERS, WAITS
-from stopgo.mission.transform import Point
 
 STAYS, HOMES = 17, 20
 """NAV_LOITER_UNLIM, NAV_RETURN_TO_LAUNCH."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
+from stopgo.mission.document import Point
 from stopgo.mission.events import Pose
-from stopgo.mission.transform import Point
 
 COASTS_M_S = 0.01
 """Slower than this, wheels that stick stand."""

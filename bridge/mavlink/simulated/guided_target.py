@@ -7,7 +7,7 @@ from collections.abc import Callable
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.mavlink.simulated.rover import Rover
 from stopgo.bridge.mavlink.simulated.steering import Course
-from stopgo.mission.transform import Point
+from stopgo.mission.document import Point
 
 LONG_AGO_NS = 10**18
 

@@ -13,7 +13,7 @@ from typing import Protocol
 
 from stopgo.bridge.mavlink.simulated.estimator import Estimate
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
-from stopgo.mission.transform import Point
+from stopgo.mission.document import Point
 
 PIVOTED_RAD = math.radians(5.0)
 STEER_SPEED = 1.0

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, Point
 from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.files.exports import (
     geojson,
@@ -21,7 +21,6 @@ from stopgo.mission.files.exports import (
 )
 from stopgo.mission.files.exports.format import Format, Supplements
 from stopgo.mission.plugins import Variant, variant
-from stopgo.mission.transform import Point
 
 QUANTUM = 0.008
 """Metres by which 1e-7 degrees move a place at most."""

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, get_args
 
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, Point
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.exports.stretches import Stretches
 from stopgo.mission.mavlink.autopilots import AUTOPILOTS
 from stopgo.mission.mavlink.translation_options import ScanWait, Settle, Trigger
-from stopgo.mission.transform import Point
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

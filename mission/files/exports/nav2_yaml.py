@@ -10,11 +10,10 @@ import math
 import re
 from collections.abc import Sequence
 
-from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.waypoints import frame_name, mapped
 from stopgo.mission.table import printable
-from stopgo.mission.transform import Point
 from stopgo.mission.turning import SAME, turned_back
 
 _NUMBER = r"(-?\d+\.\d+)"

@@ -11,11 +11,10 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, Point
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.nav2_yaml import unmapped
 from stopgo.mission.files.exports.waypoints import Waypoint, frame_name, mapped, way
-from stopgo.mission.transform import Point
 from stopgo.mission.turning import SAME, turned_back
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, Point
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.imports import qgc_plan
 from stopgo.mission.files.imports.track import ImportOptions
@@ -16,7 +16,6 @@ from stopgo.mission.geodesy import STEPS_PER_DEGREE
 from stopgo.mission.mavlink.fields import PLACED
 from stopgo.mission.mavlink.items import Command, Item, ItemList, MavFrame
 from stopgo.mission.mavlink.translate import translate
-from stopgo.mission.transform import Point
 
 FIRMWARE = {"generic": 0, "ardupilot": 3, "px4": 12}
 """MAV_AUTOPILOT of each autopilot."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, Point
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.qgc_plan import FILE_FRAMES, items_of, place
 from stopgo.mission.files.imports import qgc_waypoints
@@ -13,7 +13,6 @@ from stopgo.mission.files.imports.qgc_waypoints import HEAD
 from stopgo.mission.files.imports.track import ImportOptions
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.read_back import home_item
-from stopgo.mission.transform import Point
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:

@@ -10,11 +10,10 @@ import csv
 import io
 import math
 
-from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.geodesy import bearing_deg, to_geodetic
 from stopgo.mission.geometry import frozen, polyline_length
-from stopgo.mission.transform import Point
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'")
 """What spreadsheets take for the beginning of a formula, and the apostrophe that guards against it."""

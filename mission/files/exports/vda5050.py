@@ -14,11 +14,10 @@ from typing import Any
 
 import msgspec
 
-from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.nav2_yaml import unmapped
 from stopgo.mission.files.exports.waypoints import Waypoint, frame_name, mapped, way
-from stopgo.mission.transform import Point
 from stopgo.mission.turning import SAME, turned_back
 
 

@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import msgspec
 
-from stopgo.mission.document import Frame, Mission, Stop
-from stopgo.mission.transform import Point, Transform
+from stopgo.mission.document import Frame, Mission, Point, Stop
+from stopgo.mission.transform import Transform
 from stopgo.mission.turning import turned
 
 

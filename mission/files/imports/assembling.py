@@ -8,14 +8,24 @@ from collections.abc import Iterator, Sequence
 import msgspec
 
 from stopgo.mission import __version__
-from stopgo.mission.document import Frame, Mission, RobotSpec, Scan, Sees, Start, Stop, mission_id, sealed
+from stopgo.mission.document import (
+    Frame,
+    Mission,
+    Point,
+    RobotSpec,
+    Scan,
+    Sees,
+    Start,
+    Stop,
+    mission_id,
+    sealed,
+)
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports.track import ImportedRoute, Visit
 from stopgo.mission.floor_source import FloorSource
 from stopgo.mission.problems import problems_of
 from stopgo.mission.settings import Settings
 from stopgo.mission.specs import origin_of, policy_of, robot_of, rounded, scan_of, scanner_of, site_origin_of
-from stopgo.mission.transform import Point
 
 
 def mission_of(track: ImportedRoute, settings: Settings, *, name: str, file: str, digest: str) -> Mission:

@@ -15,12 +15,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, get_args
 
-from stopgo.mission.document import OnFailure
+from stopgo.mission.document import OnFailure, Point
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions, Visit
 from stopgo.mission.geodesy import Geodetic, from_geodetic, heading_of
 from stopgo.mission.problems import JOIN
-from stopgo.mission.transform import Point
 
 METRES = ("x_m", "y_m")
 DEGREES = ("lat_deg", "lon_deg")

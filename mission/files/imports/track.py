@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from stopgo.mission.document import OnFailure
-from stopgo.mission.transform import Point, SiteOrigin
+from stopgo.mission.document import OnFailure, Point
+from stopgo.mission.transform import SiteOrigin
 
 
 @dataclass(frozen=True)

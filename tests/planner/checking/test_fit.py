@@ -10,11 +10,10 @@ import msgspec
 import pytest
 
 from stopgo.command_line import main
-from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.mission_json import read, write
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
-from stopgo.mission.transform import Point
 from stopgo.planner.checking.fit import misfits_on
 from tests.planner.test_command import drawn
 from tests.planner.worlds import (

@@ -8,9 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from stopgo.mission.document import Mission
+from stopgo.mission.document import Mission, Point
 from stopgo.mission.run_log import Track
-from stopgo.mission.transform import Point
 from tests.mission.worlds import mission_of, stop
 
 HZ = 10
