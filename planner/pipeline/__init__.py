@@ -1,0 +1,167 @@
+"""Floor -> plan: where the scanner must stand, and by which route a robot visits those stops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from stopgo.mission.division import DividedRoute
+    from stopgo.mission.floor import FloorPlan
+    from stopgo.mission.plan import PartPlan, Plan
+    from stopgo.mission.planning import Candidates, NavigableSpace, Route, Selection
+    from stopgo.mission.settings import Settings
+
+Observe = Callable[[Any], None]
+
+
+def plan(
+    floor: FloorPlan,
+    settings: Settings,
+    *,
+    observe: Observe = lambda noun: None,
+    all_parts: bool = False,
+) -> Plan:
+    """Plan the part of the floor that holds the start, else the largest; with `all_parts` the others too.
+
+    Every noun on the way is handed to `observe` as soon as it is made.
+
+    Raises
+    ------
+    AnswerIsNo
+        No target, no candidate, or nothing in sight.
+    InputError
+        A start, an end or a variant that does not fit the floor.
+    """
+    from stopgo.mission.errors import InputError
+    from stopgo.mission.plan import Plan
+    from stopgo.planner.candidates import candidates
+    from stopgo.planner.space.navigable import navigable
+
+    observe(floor)
+    space = navigable(floor, settings)
+    observe(space)
+    if all_parts and settings.divided:
+        raise InputError("--all-parts is not done with robots or shifts; plan each part by its --start")
+    found = parts_to_plan(space) if all_parts else [candidates(space)]
+    planned = frozenset(part.chosen_part for part in found)
+    if settings.divided:
+        return _plan_divided(found[0], planned, observe)
+    return Plan(tuple(_plan_part(part, k, planned, observe) for k, part in enumerate(found)))
+
+
+def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
+    """Plan from candidates on; `planned` are all parts of the floor that the plan enters."""
+    from stopgo.planner.routing import route
+
+    selection = _selected(found, observe)
+    settings = found.space.settings
+    driven = _in_least_time(route(selection)) if settings.minimise == "time" else None
+    observe(selection if driven is None else driven.selection)
+    return _part(driven or route(selection), number, planned, observe)
+
+
+def _selected(found: Candidates, observe: Observe) -> Selection:
+    """The fewest stops."""
+    from stopgo.planner.anywhere import SELECTOR, anywhere
+    from stopgo.planner.refine import refined
+    from stopgo.planner.selection import select
+    from stopgo.planner.visibility import visibility
+
+    observe(found)
+    seen = visibility(found)
+    observe(seen)
+    return (anywhere if found.space.settings.selector == SELECTOR else refined)(select(seen))
+
+
+def _in_least_time(route: Route) -> Route:
+    from stopgo.planner.covering_tour import in_least_time
+
+    return in_least_time(route)
+
+
+def _part(driven: Route, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
+    """The plan that drives a route."""
+    from stopgo.mission.plan import PartPlan
+    from stopgo.planner.appraisal.figures_of_route import figures_of
+    from stopgo.planner.assemble import assemble
+
+    observe(driven)
+    figures = figures_of(driven, planned=planned)
+    observe(figures)
+    mission = assemble(driven, part=number)
+    observe(mission)
+    return PartPlan(driven, figures, mission)
+
+
+UNDIVIDED = -1
+"""Number of the plan that is shared out: its mission is not driven, and has an id of its own."""
+
+
+def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) -> Plan:
+    """Plan one part, and share its stops out among robots or tours."""
+    from stopgo.mission.document import MissionShare
+    from stopgo.mission.plan import DividedPlan, PartPlan, Plan
+    from stopgo.planner.appraisal.figures_of_route import figures_of_share
+    from stopgo.planner.assemble import assemble
+
+    selection = _selected(found, observe)
+    driven, out = _shared_out(selection)
+    observe(driven.selection)
+    whole = _part(driven, UNDIVIDED, planned, observe)
+    shares = []
+    for k, route in enumerate(out.routes):
+        share = MissionShare(kind=out.kind, number=k + 1, of=len(out.routes))
+        mission = assemble(route, part=k, share=share)
+        shares.append(PartPlan(route, figures_of_share(route, whole.figures), mission))
+    made = DividedPlan(out.kind, whole, tuple(shares), out.limit_s, out.bound, out.method)
+    observe(made)
+    return Plan(made.shares, made)
+
+
+def _shared_out(selection: Selection) -> tuple[Route, DividedRoute]:
+    """The route over all stops, and how they are shared out.
+
+    For the least time it is done both with the route of least time and with that of fewest stops: what is
+    quicker for one robot need not be quicker shared out.
+    """
+    from stopgo.planner.covering_tour import as_before
+    from stopgo.planner.routing import route
+    from stopgo.planner.sharing.dividing import divided, taken_by
+
+    driven = route(selection)
+    if selection.visibility.candidates.space.settings.minimise == "stops":
+        return driven, divided(driven)
+    quicker = _in_least_time(driven)
+    both = [(one, divided(one)) for one in (as_before(driven, quicker), quicker)]
+    return min(both, key=lambda one: taken_by(one[1]))
+
+
+def parts_to_plan(space: NavigableSpace) -> list[Candidates]:
+    """Candidates of every part that has any: the part of `plan` first, then the others by area.
+
+    Parts that hold no room are left out where nothing is to be seen from them, as from a landing.
+    """
+    from stopgo.planner.candidates import candidates
+
+    first = candidates(space)
+    rooms = {
+        int(part) for part, k in zip(first.part, first.room, strict=True) if space.rooms[k].room is not None
+    }
+    others = sorted(set(first.part.tolist()) - {-1, first.chosen_part})
+    found = [candidates(space, part=part) for part in others]
+    return [first, *(item for item in found if item.chosen_part in rooms or _see_anything(item))]
+
+
+def _see_anything(found: Candidates) -> bool:
+    from stopgo.mission.errors import AnswerIsNo
+    from stopgo.planner.visibility import visibility
+
+    try:
+        visibility(found)
+    except AnswerIsNo:
+        return False
+    return True
+
+
+__all__ = ["Observe", "plan"]
