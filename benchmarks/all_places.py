@@ -8,11 +8,11 @@ from pathlib import Path
 from benchmarks.shares import FLOORS
 from benchmarks.table import put, table, versions
 from stopgo.mission.settings import Settings
-from stopgo.planner.anywhere import SELECTOR, anywhere
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import read_floor
-from stopgo.planner.refine import refined
 from stopgo.planner.selection import select
+from stopgo.planner.selection.continuous_selection import SELECTOR, anywhere
+from stopgo.planner.selection.refine import refined
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility import visibility
 

@@ -29,8 +29,8 @@ from stopgo.bridge.link.authority import init_site, issue
 from stopgo.bridge.link.keys import now_utc
 from stopgo.bridge.station.station import Station, connect
 from stopgo.bridge.station.window import Window
+from stopgo.mission.console.ports import free_port
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.ports import free_port
 from stopgo.mission.run.orders import Verb
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor

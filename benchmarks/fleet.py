@@ -19,8 +19,8 @@ from stopgo.bridge.commands.spawn import end_robot, start_robot
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.link.zenoh_link import connecting
 from stopgo.bridge.station.fleet import fleet
-from stopgo.mission.events import PoseReport
-from stopgo.mission.ports import free_port
+from stopgo.mission.console.ports import free_port
+from stopgo.mission.run.events import PoseReport
 from tests.bridge.station.test_fleet import router
 
 

@@ -8,15 +8,15 @@ from typing import Any
 
 from benchmarks.shares import FLOORS
 from benchmarks.table import put, table, versions
-from stopgo.mission.planning import Route
+from stopgo.mission.console.table import duration
 from stopgo.mission.settings import Settings
-from stopgo.mission.table import duration
+from stopgo.mission.stages import Route
 from stopgo.planner.candidates import candidates
 from stopgo.planner.covering_tour import in_least_time
 from stopgo.planner.floors import read_floor
-from stopgo.planner.refine import refined
 from stopgo.planner.routing import route
 from stopgo.planner.selection import select
+from stopgo.planner.selection.refine import refined
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility import visibility
 

@@ -23,10 +23,10 @@ from stopgo.bridge.mavlink.simulated.vehicle import Setting
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import upload
+from stopgo.mission.console.ports import free_port
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.read_back import differences, upload_of
-from stopgo.mission.ports import free_port
 from tests.bridge.mavlink.lists import stops
 from tests.bridge.mavlink.lossy import Lossy, Roughness
 

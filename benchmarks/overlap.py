@@ -10,9 +10,9 @@ from pathlib import Path
 from benchmarks.shares import FLOORS
 from benchmarks.table import put, table, versions
 from stopgo.mission.document import Overlap, stop_names
-from stopgo.mission.network import Network
 from stopgo.mission.plan import PartPlan
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages.network import Network
 from stopgo.planner import plan
 from stopgo.planner.floors import FloorOptions, read_floor
 from stopgo.planner.overlap.registered import registered_pairs

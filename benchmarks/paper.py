@@ -19,7 +19,8 @@ from benchmarks.table import median_seconds, put, table, versions
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import BoolArray
-from stopgo.mission.planning import (
+from stopgo.mission.settings import Settings
+from stopgo.mission.stages import (
     IN_HOLE,
     OUTSIDE,
     SLIVER,
@@ -30,7 +31,6 @@ from stopgo.mission.planning import (
     Selection,
     Visibility,
 )
-from stopgo.mission.settings import Settings
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import FloorOptions, read_floor
 from stopgo.planner.routing import GRAPHS, ROUTERS, route
@@ -38,10 +38,10 @@ from stopgo.planner.selection import select
 from stopgo.planner.selection.cover import cover_of
 from stopgo.planner.selection.demands import demands_of
 from stopgo.planner.selection.greedy import greedy as choose_greedily
-from stopgo.planner.sight import sight
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility.bresenham import bresenham
 from stopgo.planner.visibility.exact_sight import exact
+from stopgo.planner.visibility.sight import sight
 from tests.planner.worlds import moved, turned
 
 FLOORS = Path(__file__).parents[2] / "shared" / "data" / "paper"

@@ -9,15 +9,15 @@ import msgspec
 
 from benchmarks.shares import FLOORS
 from benchmarks.table import put, table, versions
-from stopgo.mission.figures import percent
 from stopgo.mission.files.coverage_json import Coverage, coverage_json
-from stopgo.mission.network import network_of
-from stopgo.mission.plan_proof import PlanProof, Simulation
+from stopgo.mission.proof.plan_proof import PlanProof, Simulation
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages.figures import percent
+from stopgo.mission.stages.network import network_of
 from stopgo.planner import plan
 from stopgo.planner.floors import options_of, read_floor
 from stopgo.planner.overlap import USUAL_SHARE
-from stopgo.planner.proving.proving import prove
+from stopgo.planner.scan_simulation.proving import prove
 
 HEAD = (
     *("floor", "stops", "promised", "acquired at 0.1°", "claims not in sight", "missed between rays"),

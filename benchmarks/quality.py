@@ -9,9 +9,9 @@ from typing import Any
 
 from benchmarks.shares import FLOORS
 from benchmarks.table import put, table, versions
-from stopgo.mission.figures import percent
 from stopgo.mission.files.plan_toml import read_settings
-from stopgo.mission.planning import Selection, Visibility
+from stopgo.mission.stages import Selection, Visibility
+from stopgo.mission.stages.figures import percent
 from stopgo.planner import plan
 from stopgo.planner.floors import options_of, read_floor
 

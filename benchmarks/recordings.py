@@ -58,9 +58,9 @@ print(json.dumps(told))
 PLAN = """
 import copyreg, pickle, sys
 from benchmarks.floors import office
-from stopgo.mission.schedule import schedule
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.settings import Settings
-from stopgo.mission.sight import sight_of
+from stopgo.mission.stages.sight import sight_of
 from stopgo.planner import plan
 
 copyreg.pickle(MappingProxyType, lambda m: (eval, (f"__import__('types').MappingProxyType({dict(m)!r})",)))
@@ -105,7 +105,7 @@ def plans(folder: Path, former: Path | None) -> Iterator[list[object]]:
 
 def long_run(folder: Path) -> list[list[object]]:
     """Four hours at ten poses a second, a state each second and a scan at every stop."""
-    from stopgo.recordings.field import FieldRecording
+    from stopgo.recordings.runs.field import FieldRecording
 
     with (folder / "2000-now.pickle").open("rb") as file:
         mission = pickle.load(file)[0].mission
@@ -123,7 +123,7 @@ def long_run(folder: Path) -> list[list[object]]:
 
 def _reports(mission: Any) -> Iterator[Any]:
     """The planned drive, stretched to the run's hours."""
-    from stopgo.recordings.stages.drive import planned_drive
+    from stopgo.recordings.plan.drive import planned_drive
     from tests.recordings import run
 
     drive = planned_drive(mission)
@@ -180,7 +180,7 @@ def listed(folder: Path, source: Path) -> list[list[object]]:
 
 def opened(folder: Path) -> list[list[object]]:
     """Seconds until a viewer without a graphics card shows a plan, and until it shows another moment of it."""
-    from stopgo.recordings.headless import viewer
+    from stopgo.recordings.viewing.headless import viewer
 
     rows = []
     for width, height in sizes():

@@ -8,14 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.table import put, table, versions
-from stopgo.mission.figures import Figures, Share, percent
-from stopgo.mission.planning import Selection, Visibility
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Selection, Visibility
+from stopgo.mission.stages.figures import Figures, Share, percent
 from stopgo.planner import plan
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import FloorOptions, read_floor
-from stopgo.planner.refine import refined
 from stopgo.planner.selection import select
+from stopgo.planner.selection.refine import refined
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility import visibility
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.table import put, table, versions
+from stopgo.mission.console.table import duration
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.schedule import schedule
 from stopgo.mission.settings import Settings
-from stopgo.mission.table import duration
 from stopgo.planner import plan
 from stopgo.planner.floors import FloorOptions, read_floor
 

@@ -21,8 +21,8 @@ import shapely
 from benchmarks.floors import office
 from benchmarks.table import put, table, versions
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.planning import NavigableSpace
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.routing.colony import ant_colony
 from stopgo.planner.routing.grid_graph import RESOLUTIONS, ways_on_grids
 from stopgo.planner.routing.proof import Proof, proved

@@ -18,11 +18,11 @@ from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import Settings
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import FloorOptions, read_floor
-from stopgo.planner.shapes import local_origin, to_grid, to_shape
-from stopgo.planner.sight import sight as sight_module
-from stopgo.planner.sight.sight import Scene, scene_of, sight
+from stopgo.planner.geometry.shapes import local_origin, to_grid, to_shape
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility.exact_sight import open_space
+from stopgo.planner.visibility.sight import sight as sight_module
+from stopgo.planner.visibility.sight.sight import Scene, scene_of, sight
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 PAPER = ("case1_structural", "case2_structural", "case1_rooms", "case2_rooms")

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from stopgo.mission.console.table import printable, printable_lines
 from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
-from stopgo.mission.table import printable, printable_lines
 
 if TYPE_CHECKING:
     import rich.progress

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stopgo.mission.errors import InputError
-from stopgo.mission.toml_file import read_toml
+from stopgo.mission.settings.toml_file import read_toml
 
 NAMES = ("robot", "mavlink", "connect", "site", "keys", "as")
 """As in stopgo.toml; options have two hyphens before them, the environment STOPGO_."""

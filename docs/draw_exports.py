@@ -19,8 +19,8 @@ from stopgo.mission.files.coverage_json import write_coverage
 from stopgo.mission.files.exports import exported
 from stopgo.mission.files.exports.format import FloorDrawing, Supplements
 from stopgo.mission.files.exports.stretches import read_stretches
-from stopgo.mission.planning import Route
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Route
 from stopgo.planner import plan
 from stopgo.planner.floors import read_floor
 from stopgo.planner.floors.dxf import metres_in

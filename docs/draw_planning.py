@@ -33,7 +33,8 @@ from stopgo.mission.files.svg import (
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon
 from stopgo.mission.plan import PartPlan
-from stopgo.mission.planning import (
+from stopgo.mission.settings import Settings
+from stopgo.mission.stages import (
     AT_EDGE,
     IN_HOLE,
     KEPT,
@@ -44,8 +45,7 @@ from stopgo.mission.planning import (
     NavigableSpace,
     Visibility,
 )
-from stopgo.mission.seen import runs_of, seen_units
-from stopgo.mission.settings import Settings
+from stopgo.mission.stages.covered_intervals import runs_of, seen_units
 from stopgo.planner import plan
 from stopgo.planner.floors import FloorOptions, read_floor
 from stopgo.planner.visibility.bresenham import bresenham

@@ -16,7 +16,7 @@ from typing import Any
 
 from PIL import Image
 
-from stopgo.recordings.headless import REDRAW_S, container, must_be_drawable, outermost, viewer
+from stopgo.recordings.viewing.headless import REDRAW_S, container, must_be_drawable, outermost, viewer
 
 OFFICE = "recordings/samples/office.dxf"
 SETTLED_S = 10.0

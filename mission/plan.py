@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from stopgo.mission.document import Mission
-from stopgo.mission.figures import Figures, percent
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
-from stopgo.mission.schedule import schedule
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
+from stopgo.mission.stages.figures import Figures, percent
 
 
 @dataclass(frozen=True, eq=False, repr=False)

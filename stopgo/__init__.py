@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from stopgo.bridge.station.follow import Followed
     from stopgo.bridge.station.station import Station
     from stopgo.mission.document import Mission
+    from stopgo.mission.document.problems import Problem
     from stopgo.mission.floor import FloorPlan
     from stopgo.mission.plan import Plan
-    from stopgo.mission.problems import Problem
     from stopgo.mission.settings import Settings
     from stopgo.recordings.replay.replayed import Replay
 
@@ -120,7 +120,7 @@ def write_mission(mission: Mission, path: str | Path) -> None:
 
 def check(mission: Mission, floor: str | Path | None = None) -> tuple[Problem, ...]:
     """What of a mission makes no sense; and with a floor's file, what does not fit that floor."""
-    from stopgo.mission.problems import problems_of
+    from stopgo.mission.document.problems import problems_of
 
     problems = problems_of(mission)
     if floor is None:
@@ -204,7 +204,7 @@ def replay(
     AnswerIsNo
         When its halts fit the stops in no way, or in several.
     """
-    from stopgo.mission.transform import Transform
+    from stopgo.mission.frames.transform import Transform
     from stopgo.recordings.logs import read_log
     from stopgo.recordings.replay.log_placing import Placing
     from stopgo.recordings.replay.replaying import replay as laid

@@ -9,9 +9,9 @@ import sys
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from stopgo.mission.console.json_answer import answering
+from stopgo.mission.console.process import PIPE_CLOSED, Signals, drop_output, have_output, reader_is_gone
 from stopgo.mission.errors import InputError, MissingExtra, StopgoError
-from stopgo.mission.json_answer import answering
-from stopgo.mission.process import PIPE_CLOSED, Signals, drop_output, have_output, reader_is_gone
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from typer.exceptions import TyperException
     from typer.models import CommandInfo
 
-FOLDERS = ("stopgo.planner.cli", "stopgo.bridge.cli", "stopgo.recordings.cli", "stopgo.mission.cli")
-"""Each folder's commands; each module has `add_commands(app)` and imports slow libraries where used."""
+COMMANDS = ("plan_commands", "bridge_commands", "recording_commands", "document_commands")
+"""The modules of `stopgo.commands`, in the order of the help; each has
+`add_commands(app)` and imports slow libraries where used."""
 
 INTERRUPTED = 130
 COMPLETING = "_STOPGO_COMPLETE"
@@ -94,8 +95,8 @@ def build_app() -> typer.Typer:
             typer.echo(__version__)
             raise typer.Exit
 
-    for folder in FOLDERS:
-        import_module(folder).add_commands(app)
+    for name in COMMANDS:
+        import_module(f"stopgo.commands.{name}").add_commands(app)
     return app
 
 
@@ -135,7 +136,7 @@ def _run(arguments: list[str]) -> int:
 
 def _must_be_text(arguments: list[str]) -> None:
     """Refuse a name of bytes that are not UTF-8 before anything is written: no answer could tell it."""
-    from stopgo.mission.table import printable
+    from stopgo.mission.console.table import printable
 
     for argument in arguments:
         if any("\ud800" <= letter <= "\udfff" for letter in argument):
@@ -197,7 +198,7 @@ def _missing(error: ModuleNotFoundError) -> tuple[str, int]:
 
 def _say(message: str) -> None:
     """The line on stderr, if there is one."""
-    from stopgo.mission.table import printable, shortened
+    from stopgo.mission.console.table import printable, shortened
 
     if message:
         with contextlib.suppress(OSError):  # nobody reads it

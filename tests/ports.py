@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from stopgo.mission import ports
+from stopgo.mission.console import ports
 
 LOWEST, EACH, WORKERS = 14_000, 1_500, 8
 _given: set[int] = set()

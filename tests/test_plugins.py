@@ -20,9 +20,9 @@ import stopgo
 from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.robot.plugin_body import GuardedBase, plugin_body
 from stopgo.command_line import main
+from stopgo.mission.console.plugins import Variant
 from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.plugins import Variant
 from stopgo.mission.settings import Settings
 from stopgo.planner import plan
 from stopgo.planner.floors import read_floor
@@ -91,7 +91,7 @@ WRONG: dict[str, tuple[str, str, str]] = {
     "sees nothing": ("visibility", "def f(found): return None", "gave nothing, not a Visibility"),
     "sees what is not": (
         "visibility",
-        NUMPY + "from stopgo.mission.planning import Visibility\ndef f(found):\n"
+        NUMPY + "from stopgo.mission.stages import Visibility\ndef f(found):\n"
         "    n = len(found.kept)\n"
         "    one = np.zeros(n, dtype=int)\n"
         "    return Visibility(found, np.arange(n + 1), one, one, one + 10**9, 'x')",
@@ -181,7 +181,7 @@ def entry(monkeypatch: pytest.MonkeyPatch, group: str, name: str, value: str) ->
         mine = [metadata.EntryPoint(name, value, group)] if asked.get("group") == group else []
         return [*there(**asked), *mine]
 
-    monkeypatch.setattr("stopgo.mission.plugins.entry_points", with_ours)
+    monkeypatch.setattr("stopgo.mission.console.plugins.entry_points", with_ours)
 
 
 def test_an_installed_package_brings_variants_by_name(module: Write, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,7 +194,7 @@ def test_an_installed_package_brings_variants_by_name(module: Write, monkeypatch
 
 READER = """
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.geometry import Polygon
 from stopgo.planner.floors.reader import Reader
 

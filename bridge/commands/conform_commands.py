@@ -27,7 +27,7 @@ from stopgo.mission.errors import InputError
 if TYPE_CHECKING:
     from stopgo.bridge.conform.requirements import ConformVerdict
     from stopgo.bridge.conform.robot_bench import RobotBench
-    from stopgo.mission.events import Pose
+    from stopgo.mission.run.events import Pose
 
 TRIED = ("requirements", 1)
 
@@ -159,7 +159,7 @@ def conform_station(
 def report(peer: str, kind: str, found: Iterable[ConformVerdict], *, as_json: bool) -> None:
     """Tell every verdict, and end with the exit code that they come to."""
     from stopgo.bridge.conform.requirements import counted
-    from stopgo.mission.table import table
+    from stopgo.mission.console.table import table
 
     found = list(found)
     counts = counted(found)

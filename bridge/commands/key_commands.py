@@ -10,8 +10,8 @@ import typer
 
 from stopgo.bridge.commands.connection import SiteName
 from stopgo.bridge.console import print_json, tell, tell_lines
+from stopgo.mission.console.table import table
 from stopgo.mission.errors import InputError
-from stopgo.mission.table import table
 
 SiteFolder = Annotated[Path, typer.Option("--in", metavar="DIR", help="The site's folder of keys.")]
 Days = Annotated[int, typer.Option(min=1, max=825, help="How long they are valid.")]

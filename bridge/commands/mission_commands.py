@@ -26,7 +26,7 @@ from stopgo.bridge.console import Bar, carried_out, print_json, refusals_in, say
 if TYPE_CHECKING:
     from stopgo.bridge.link.protocol import Accepted
     from stopgo.mission.document import Mission
-    from stopgo.mission.transform import Transform
+    from stopgo.mission.frames.transform import Transform
 
 PushTimeout = Annotated[
     float | None,

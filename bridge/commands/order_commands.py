@@ -33,7 +33,7 @@ from stopgo.bridge.console import carried_out, print_json, refusals_in, tell
 if TYPE_CHECKING:
     from stopgo.bridge.station.fleet import FleetMember
     from stopgo.bridge.station.roster import LastSeen
-    from stopgo.mission.events import StateReport
+    from stopgo.mission.run.events import StateReport
     from stopgo.mission.run.orders import Answer, Verb
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
@@ -248,7 +248,7 @@ def report_answer(answer: Answer, robot: str, json_: bool) -> None:
 
 def state_line(report: StateReport) -> str:
     """The state as one line a person reads."""
-    from stopgo.mission.tolerance import told_outside
+    from stopgo.mission.run.tolerance import told_outside
 
     mission = (
         f"mission {report.mission_id[:12]} revision {report.revision}" if report.mission_id else "no mission"

@@ -21,9 +21,9 @@ from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
     from stopgo.bridge.mavlink.driving.mavlink_scanner import ScanTrigger
-    from stopgo.mission.events import Pose
+    from stopgo.mission.frames.transform import Transform
+    from stopgo.mission.run.events import Pose
     from stopgo.mission.run.revision import RevisionPolicy
-    from stopgo.mission.transform import Transform
 
 MAVLINK = "mavlink:"
 """Before the URL of an autopilot that is the controller."""
@@ -93,8 +93,8 @@ def robot(
 
     Example: stopgo robot --name r1 --state r1.state --controller mavlink:serial:/dev/ttyAMA0:921600
     """
-    from stopgo.bridge.robot.bodies import OpenBody, SimulatedBody
     from stopgo.bridge.robot.program import RobotOptions, run_robot
+    from stopgo.bridge.robot.robot_hardware import OpenBody, SimulatedBody
     from stopgo.bridge.robot.simulator import Faults, read_fault
 
     given = given_in(context)
@@ -153,7 +153,7 @@ def read_map(text: str | None) -> Transform | None:
 
 def read_transform(option: str, text: str) -> Transform:
     """A transform from X,Y,HEADING in metres and degrees."""
-    from stopgo.mission.transform import Transform
+    from stopgo.mission.frames.transform import Transform
 
     pose = read_pose(option, text)
     return Transform(x=pose.x, y=pose.y, heading=pose.heading)
@@ -163,7 +163,7 @@ def read_pose(option: str, text: str) -> Pose:
     """A pose from X,Y,HEADING in metres and degrees."""
     import math
 
-    from stopgo.mission.events import Pose
+    from stopgo.mission.run.events import Pose
 
     try:
         x, y, heading = (float(part) for part in text.split(","))

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from stopgo.mission.console.ports import free_port
 from stopgo.mission.errors import RobotUnreachable
-from stopgo.mission.ports import free_port
 
 READY_S = 60.0
 END_S = 30.0

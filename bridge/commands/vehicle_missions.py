@@ -18,7 +18,6 @@ from stopgo.bridge.mavlink.line.parameter_reading import read_parameters
 from stopgo.bridge.mavlink.line.peer import Peer, reached
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.line.wire import read_line
-from stopgo.bridge.mavlink.transfer.after_failure import own_items
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import (
     NOTHING_SENT,
@@ -28,11 +27,14 @@ from stopgo.bridge.mavlink.transfer.upload import (
     if_stopped,
     upload,
 )
+from stopgo.bridge.mavlink.transfer.upload_recovery import own_items
+from stopgo.mission.console.table import table
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.exports import qgc_plan, qgc_waypoints
-from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.accuracy import why_beside
 from stopgo.mission.mavlink.autopilots import AUTOPILOTS, autopilot_named
 from stopgo.mission.mavlink.fields import PLACED
@@ -41,8 +43,6 @@ from stopgo.mission.mavlink.local_frame import VehicleOrigin
 from stopgo.mission.mavlink.read_back import home_item
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.mavlink.translation_options import ScanWait, Settle, Trigger
-from stopgo.mission.table import table
-from stopgo.mission.transform import SiteOrigin
 
 ITEMS = ("items", 1)
 T = TypeVar("T", bound=str)

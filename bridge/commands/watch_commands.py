@@ -16,8 +16,8 @@ from stopgo.bridge.console import print_json, say, tell, tell_lines
 
 if TYPE_CHECKING:
     from stopgo.bridge.station.watch import Showing
-    from stopgo.mission.events import StateReport
-    from stopgo.mission.heard_run import HeardRun
+    from stopgo.mission.comparing.run_collector import HeardRun
+    from stopgo.mission.run.events import StateReport
 
 
 class Recorder(Protocol):
@@ -91,8 +91,8 @@ def watch_by(recording: Recorder) -> Callable[..., None]:
 
 def tell_compared(heard: HeardRun, state: StateReport, *, json_: bool) -> int:
     """Tell the run beside its mission; the exit code that it comes to."""
-    from stopgo.mission.comparing.judging import judge
-    from stopgo.mission.comparing.telling import comparison_json, comparison_text
+    from stopgo.mission.comparing.comparison_text import comparison_json, comparison_text
+    from stopgo.mission.comparing.run_verdict import judge
 
     compared = heard.compared()
     if json_:

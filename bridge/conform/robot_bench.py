@@ -33,7 +33,7 @@ from stopgo.bridge.link.protocol import (
     encode,
 )
 from stopgo.mission.document import Mission
-from stopgo.mission.events import AnyEvent, Pose, PoseReport, StateReport, event_of
+from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, StateReport, event_of
 from stopgo.mission.run.orders import Answer, Order, Verb
 
 TRY_S: Final = 1.0

@@ -10,8 +10,8 @@ from stopgo.bridge.conform.requirements import NotTried, Requirement, must
 from stopgo.bridge.conform.robot_bench import RobotBench, rejects, told_of
 from stopgo.bridge.link.protocol import Accepted, encode
 from stopgo.mission.document import Mission
-from stopgo.mission.events import TakenOver
 from stopgo.mission.run.decision import STATES
+from stopgo.mission.run.events import TakenOver
 from stopgo.mission.run.orders import LONGEST_VALID_S, Verb
 from stopgo.mission.run.states import DetailedState
 

@@ -29,7 +29,7 @@ from stopgo.bridge.link.protocol import (
     encode,
 )
 from stopgo.mission.document import Mission
-from stopgo.mission.events import STOPS_LISTED, Pose, StateReport
+from stopgo.mission.run.events import STOPS_LISTED, Pose, StateReport
 from stopgo.mission.run.orders import Order
 
 STATE_BYTES = 16 * 1024

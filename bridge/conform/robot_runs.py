@@ -11,7 +11,16 @@ from stopgo.bridge.conform.robot_questions import keeps_a_record, states_are_bou
 from stopgo.bridge.link.capabilities import RECORD
 from stopgo.bridge.link.protocol import POSE_PAGE, RECORD_PAGE, Accepted, PosePage, RecordEntry, RecordPage
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.events import AnyEvent, Arrived, Finished, Scanned, Settled, Skipped, Started, StateReport
+from stopgo.mission.run.events import (
+    AnyEvent,
+    Arrived,
+    Finished,
+    Scanned,
+    Settled,
+    Skipped,
+    Started,
+    StateReport,
+)
 from stopgo.mission.run.orders import LONGEST_VALID_S, Answer
 
 RUN_S = 180.0

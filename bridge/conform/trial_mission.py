@@ -17,7 +17,7 @@ from stopgo.mission.document import (
     Stop,
     sealed,
 )
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 
 REACH_M = 0.5
 """How far ahead the last stop of a mission lies that is driven."""

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
 
-from stopgo.mission.decoding import one_decode_error
+from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 

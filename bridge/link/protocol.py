@@ -12,9 +12,10 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
-from stopgo.mission.decoding import one_decode_error
+from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import (
+from stopgo.mission.frames.transform import Transform
+from stopgo.mission.run.events import (
     AnyEvent,
     Health,
     Nanoseconds,
@@ -25,7 +26,6 @@ from stopgo.mission.events import (
 )
 from stopgo.mission.run.lease import Lease
 from stopgo.mission.run.orders import Answer, Count, ShortText
-from stopgo.mission.transform import Transform
 
 VERSION: Final = 1
 CHUNK_BYTES: Final = 32 * 1024

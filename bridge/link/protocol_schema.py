@@ -13,7 +13,7 @@ import msgspec
 
 from stopgo.bridge.link.protocol import VERSION, Tagged
 from stopgo.bridge.link.seals import Seal
-from stopgo.mission.events import KINDS, AnyEvent, Health, PoseReport, StateReport, UnknownKind
+from stopgo.mission.run.events import KINDS, AnyEvent, Health, PoseReport, StateReport, UnknownKind
 from stopgo.mission.run.orders import Answer, Order
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"

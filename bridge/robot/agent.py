@@ -42,11 +42,11 @@ from stopgo.bridge.robot.recorder import ENTRY_S, RunRecorder
 from stopgo.bridge.robot.refusal_log import RefusalLog
 from stopgo.bridge.robot.runner import Position, Runner, state_report
 from stopgo.mission import __version__
-from stopgo.mission.events import PoseReport, StateReport
+from stopgo.mission.frames.transform import Transform
+from stopgo.mission.run.events import PoseReport, StateReport
 from stopgo.mission.run.lease import Lease, kept
 from stopgo.mission.run.orders import Order
 from stopgo.mission.run.states import Run
-from stopgo.mission.transform import Transform
 
 STATE_EVERY_S = 1.0
 POSE_EVERY_S = 0.05

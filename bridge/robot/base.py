@@ -9,7 +9,7 @@ from typing import Literal, Protocol
 import msgspec
 
 from stopgo.mission.document import Mission, Point, RobotSpec, Scan
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 from stopgo.mission.run.scans import ScanFailed, ScanResult
 
 Outcome = Literal["arrived", "interrupted", "blocked"]

@@ -19,23 +19,23 @@ from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.link.protocol import Commit, Rejected
 from stopgo.bridge.robot.answers import answer_to, answered, remember_answer, situation_of
 from stopgo.bridge.robot.base import Base, Scanner
+from stopgo.bridge.robot.current_task import faces, has_work, label, moved, same_work
 from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.mission_fitness import follows, weighed_by, why_unfit
 from stopgo.bridge.robot.mission_reading import read_mission
-from stopgo.bridge.robot.present_work import faces, has_work, label, moved, same_work
+from stopgo.bridge.robot.pending_writes import Unstored
 from stopgo.bridge.robot.runner import Position
-from stopgo.bridge.robot.unstored import Unstored
 from stopgo.mission.document import Mission
-from stopgo.mission.events import AnyEvent, Pose
-from stopgo.mission.run import revision, way
+from stopgo.mission.run import revision, route_position
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.decision import Decision, Situation, decide, handed_over
+from stopgo.mission.run.events import AnyEvent, Pose
 from stopgo.mission.run.lease import Lease, claimed, lasting_ns
 from stopgo.mission.run.orders import FREE_VERBS, Answer, Order, Refused
 from stopgo.mission.run.revision import RevisionPolicy
 from stopgo.mission.run.scans import ScanFailed, ScanResult
 from stopgo.mission.run.states import Change, Run
-from stopgo.mission.tolerance import deviation, is_outside
+from stopgo.mission.run.tolerance import deviation, is_outside
 
 SETTLE_SAMPLE_S = 0.1
 SETTLE_LIMIT_S = 30.0
@@ -351,7 +351,9 @@ class Controller:
         """Drive what is left of the leg, or the correction to the stop."""
         stop, pose = mission.stops[run.at], self._base.pose()
         at_stop = run.leg > run.at
-        path = ((stop.x, stop.y),) if at_stop else way.forward(mission.stops[run.leg].approach, pose)
+        path = (
+            ((stop.x, stop.y),) if at_stop else route_position.forward(mission.stops[run.leg].approach, pose)
+        )
         outcome = "arrived"
         stands = at_stop and not is_outside(deviation(pose, stop), stop.tolerance_m)
         if not (stands and faces(pose, stop)):
@@ -400,10 +402,10 @@ class Controller:
         self._advance(run, lambda now: runs.verified(now, mission, here))
 
     def _drive_home(self, run: Run, mission: Mission) -> None:
-        legs, pose = way.legs_of(mission), self._base.pose()
+        legs, pose = route_position.legs_of(mission), self._base.pose()
         returning = run.leg == len(mission.stops)
         leg = legs[run.leg]
-        path = way.forward(leg, pose) if returning else way.backward(leg, pose)
+        path = route_position.forward(leg, pose) if returning else route_position.backward(leg, pose)
         outcome = self._base.goto(path, heading=None, limits=mission.robot, interrupt=self._interrupt)
         if outcome == "blocked":
             here = self._base.pose()

@@ -30,7 +30,7 @@ from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.mission_reading import read_mission
 from stopgo.bridge.robot.pages import address_of, part_page
 from stopgo.mission.document import Mission, digest_of
-from stopgo.mission.problems import problems_of
+from stopgo.mission.document.problems import problems_of
 from stopgo.mission.run.orders import Reason
 
 MOST_REASONS = 20

@@ -23,7 +23,7 @@ from stopgo.bridge.robot.journal_format import bring_up_to_date, make_tables, pu
 from stopgo.bridge.robot.reserve import Reserve
 from stopgo.bridge.robot.sealed_rows import DamagedRow, NewestTransaction, put, sealed, verify
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import AnyEvent, event_of
+from stopgo.mission.run.events import AnyEvent, event_of
 from stopgo.mission.run.orders import Answer
 from stopgo.mission.run.states import Change, told_of
 

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from threading import Event
 
 from stopgo.bridge.robot.base import Base, BaseHealth, Outcome, Rest
-from stopgo.mission import turning
 from stopgo.mission.document import Mission, Point, RobotSpec
-from stopgo.mission.events import Pose
-from stopgo.mission.transform import Transform
-from stopgo.mission.turning import SAME
+from stopgo.mission.frames import frame_transform
+from stopgo.mission.frames.frame_transform import SAME
+from stopgo.mission.frames.transform import Transform
+from stopgo.mission.run.events import Pose
 
 
 class OnMap:
@@ -70,7 +70,7 @@ class OnMap:
 
 def turned_point(point: Point, to_map: Transform) -> Point:
     """Site to map: turned by `heading`, then shifted."""
-    return turning.turned(to_map, point)
+    return frame_transform.turned(to_map, point)
 
 
 def turned(pose: Pose, to_map: Transform) -> Pose:
@@ -83,6 +83,6 @@ def turned_back(pose: Pose, to_map: Transform) -> Pose:
     """A pose of the map in the site's frame; exactly itself where there is nothing to turn."""
     if to_map == SAME:
         return pose
-    x, y = turning.turned_back(to_map, (pose.x, pose.y))
+    x, y = frame_transform.turned_back(to_map, (pose.x, pose.y))
     heading = math.remainder(pose.heading - to_map.heading, math.tau)
     return Pose(x=x, y=y, heading=heading)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from stopgo.mission.document import Point
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 
 
 class Phase(Protocol):

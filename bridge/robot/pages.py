@@ -22,7 +22,7 @@ from stopgo.bridge.link.protocol import (
     parts_of,
 )
 from stopgo.bridge.robot.journal import Journal
-from stopgo.mission.events import PoseReport
+from stopgo.mission.run.events import PoseReport
 
 POSES_KEPT = 3000
 """For stations that come late or were cut off."""

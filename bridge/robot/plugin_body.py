@@ -12,14 +12,14 @@ from typing import Any, TypeVar, get_args
 
 from stopgo.bridge.link.clock import Clock
 from stopgo.bridge.robot.base import Base, BaseHealth, Outcome, Rest, Scanner
-from stopgo.bridge.robot.bodies import Body
 from stopgo.bridge.robot.map_frame import OnMap
+from stopgo.bridge.robot.robot_hardware import Body
+from stopgo.mission.console.plugins import Variant, variant
 from stopgo.mission.document import Mission, Point, RobotSpec, Scan
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import Pose
-from stopgo.mission.plugins import Variant, variant
+from stopgo.mission.frames.transform import Transform
+from stopgo.mission.run.events import Pose
 from stopgo.mission.run.scans import ScanFailed, ScanResult
-from stopgo.mission.transform import Transform
 
 T = TypeVar("T")
 

@@ -19,16 +19,16 @@ from stopgo.bridge.link.clock import Clock, WallClock
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import KeyExpressions, place_of
 from stopgo.bridge.robot.agent import Agent, on_link, others_of
-from stopgo.bridge.robot.bodies import OpenBody
 from stopgo.bridge.robot.controller import Controller, new_boot_id
 from stopgo.bridge.robot.inbox import Inbox
 from stopgo.bridge.robot.journal import Journal, open_journal
 from stopgo.bridge.robot.recorder import LIMIT_BYTES, RunRecorder
 from stopgo.bridge.robot.refusal_log import RefusalLog
+from stopgo.bridge.robot.robot_hardware import OpenBody
 from stopgo.bridge.robot.simulator import NO_FAULTS, Faults
 from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.revision import RevisionPolicy
-from stopgo.mission.transform import Transform
 
 LOOK_S = 1.5
 """How long a robot that joins a router waits for what that one knows."""

@@ -18,8 +18,8 @@ from stopgo.bridge.record_file import open_record_file, read_record_file
 from stopgo.bridge.robot.base import BaseHealth
 from stopgo.bridge.robot.run_record import RunRecord
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import Health, PoseReport, PosesMissing, StateReport
 from stopgo.mission.files.file_name import file_name
+from stopgo.mission.run.events import Health, PoseReport, PosesMissing, StateReport
 
 ENTRY_S = 0.5
 """How often an entry is written: what a robot that is killed can lose, with the time that takes."""

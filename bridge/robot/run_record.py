@@ -9,7 +9,7 @@ import msgspec
 
 from stopgo.bridge.link.protocol import RECORD_PAGE, PoseRow, RecordEntry, RecordPage, encode
 from stopgo.bridge.record_file import RecordFile
-from stopgo.mission.events import Health, PoseReport, PosesMissing, StateReport
+from stopgo.mission.run.events import Health, PoseReport, PosesMissing, StateReport
 
 ANEW = "the robot's program was started anew"
 UNSEEN = "the robot kept no record then"

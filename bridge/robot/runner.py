@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from stopgo.mission.document import Mission
-from stopgo.mission.events import STOPS_LISTED, Pose, StateReport
+from stopgo.mission.run.events import STOPS_LISTED, Pose, StateReport
 from stopgo.mission.run.orders import Answer, Order
 from stopgo.mission.run.states import Run, stop_of
 

@@ -20,7 +20,7 @@ from stopgo.bridge.robot.base import BaseHealth, Outcome, Rest
 from stopgo.bridge.robot.motion import Brake, Motion, along
 from stopgo.mission.document import Mission, Point, RobotSpec, Scan
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 from stopgo.mission.run.scans import ScanFailed, ScanResult
 
 SLICE_S = 0.5

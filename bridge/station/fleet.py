@@ -14,7 +14,7 @@ from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.link.tls_probe import why_no_link
 from stopgo.bridge.station.station import Station, whoami
 from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
-from stopgo.mission.events import StateReport
+from stopgo.mission.run.events import StateReport
 
 GATHER_S = 0.3
 """Once one robot of a fleet has shown itself, the others get this long."""

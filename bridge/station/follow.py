@@ -15,7 +15,7 @@ from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, decode
 from stopgo.bridge.station.record import AGAIN_S, Past, RecordHistory
 from stopgo.bridge.station.robot_replies import PastEvents, read_events, read_reply
-from stopgo.mission.events import (
+from stopgo.mission.run.events import (
     Aborted,
     AnyEvent,
     Finished,

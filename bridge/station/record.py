@@ -13,7 +13,7 @@ from stopgo.bridge.link.protocol import RECORD_PAGE, KeyExpressions, RecordEntry
 from stopgo.bridge.station.robot_replies import read_reply
 from stopgo.bridge.station.window import Window, windowed
 from stopgo.mission.errors import OutcomeUnknown
-from stopgo.mission.events import Health, Pose, PoseReport, PosesMissing, StateReport
+from stopgo.mission.run.events import Health, Pose, PoseReport, PosesMissing, StateReport
 
 PAGE_S = 10.0
 """How long a page is waited for: on a slow line it takes a second, and others lie before it."""

@@ -8,7 +8,7 @@ import msgspec
 
 from stopgo.bridge.link.protocol import LogPage, Malformed, Rejected, Reply, decode
 from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
-from stopgo.mission.events import AnyEvent
+from stopgo.mission.run.events import AnyEvent
 
 M = TypeVar("M")
 

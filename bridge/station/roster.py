@@ -13,11 +13,11 @@ from pathlib import Path
 import msgspec
 
 from stopgo.bridge.link.protocol import KeyExpressions
-from stopgo.mission.decoding import one_decode_error
+from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.file_name import file_name
-from stopgo.mission.toml_file import read_toml
+from stopgo.mission.settings.toml_file import read_toml
 
 
 class LastSeen(msgspec.Struct, frozen=True, kw_only=True):

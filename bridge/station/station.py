@@ -43,10 +43,10 @@ from stopgo.bridge.station.robot_replies import read_reply
 from stopgo.bridge.station.window import Window, windowed
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
-from stopgo.mission.events import AnyEvent, Scanned, Skipped, StateReport, Unconfirmed
 from stopgo.mission.files.mission_json import parse
+from stopgo.mission.run.events import AnyEvent, Scanned, Skipped, StateReport, Unconfirmed
 from stopgo.mission.run.orders import FREE_VERBS, LONGEST_VALID_S, Answer, Order, Verb
-from stopgo.mission.tolerance import stops_outside
+from stopgo.mission.run.tolerance import stops_outside
 
 TRY_S = 1.0
 """How long one try waits for its answer."""

@@ -10,14 +10,18 @@ from typing import Any, Protocol
 
 import msgspec
 
+from stopgo.bridge.station.finished_run import past_reports
 from stopgo.bridge.station.follow import Followed, Silence
-from stopgo.bridge.station.past import past_reports
 from stopgo.bridge.station.record import Past
 from stopgo.bridge.station.station import Station
+from stopgo.mission.comparing.run_collector import RunTaker
 from stopgo.mission.comparing.spans import stood_s
+from stopgo.mission.console.table import printable
 from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import OutcomeUnknown
-from stopgo.mission.events import (
+from stopgo.mission.run.decision import STATES
+from stopgo.mission.run.events import (
     AnyEvent,
     Arrived,
     Health,
@@ -31,11 +35,7 @@ from stopgo.mission.events import (
     StateReport,
     UnknownKind,
 )
-from stopgo.mission.heard_run import RunTaker
-from stopgo.mission.run.decision import STATES
-from stopgo.mission.schedule import schedule
-from stopgo.mission.table import printable
-from stopgo.mission.tolerance import scanned_beside, told_outside
+from stopgo.mission.run.tolerance import scanned_beside, told_outside
 
 REDRAW_S = 0.2
 LOST_S = 3.0

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from stopgo.mission.acquired import Acquired
-from stopgo.mission.comparison import StopComparison
+from stopgo.mission.comparing.acquired import Acquired
+from stopgo.mission.comparing.comparison import StopComparison
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import IntArray, frozen
-from stopgo.mission.sight import Sight
+from stopgo.mission.stages.sight import Sight
 
 SCANNED, UNSURE = "scanned", "unconfirmed"
 

@@ -8,13 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from stopgo.mission.acquired import Acquired
+from stopgo.mission.comparing.acquired import Acquired
 from stopgo.mission.comparing.acquiring import acquired_by
-from stopgo.mission.comparing.beside import beside
+from stopgo.mission.comparing.comparison import Comparison, StopComparison
+from stopgo.mission.comparing.path_deviation import beside
 from stopgo.mission.comparing.spans import spans_of
-from stopgo.mission.comparison import Comparison, StopComparison
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.events import (
+from stopgo.mission.document.schedule import schedule
+from stopgo.mission.run.events import (
     Aborted,
     AnyEvent,
     Arrived,
@@ -26,10 +27,9 @@ from stopgo.mission.events import (
     Skipped,
     Unconfirmed,
 )
-from stopgo.mission.run_log import RunLog
-from stopgo.mission.schedule import schedule
-from stopgo.mission.sight import Sight
-from stopgo.mission.tolerance import deviation
+from stopgo.mission.run.run_log import RunLog
+from stopgo.mission.run.tolerance import deviation
+from stopgo.mission.stages.sight import Sight
 
 VISITS = (Arrived, Settled, Scanned, Unconfirmed, Skipped, Failed)
 """Events at a stop."""

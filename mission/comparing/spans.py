@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from stopgo.mission.comparison import Span
-from stopgo.mission.events import (
+from stopgo.mission.comparing.comparison import Span
+from stopgo.mission.run.events import (
     Aborted,
     AnyEvent,
     Finished,
@@ -17,7 +17,7 @@ from stopgo.mission.events import (
     Started,
     State,
 )
-from stopgo.mission.run_log import RunLog
+from stopgo.mission.run.run_log import RunLog
 
 STANDING: tuple[State, ...] = ("PAUSED", "HELD")
 OVER: tuple[State, ...] = ("FINISHED", "ABORTED")

@@ -10,16 +10,16 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from stopgo.mission.decoding import one_decode_error
 from stopgo.mission.document import Mission
+from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
-from stopgo.mission.figures import Figures, Share
 from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.floor import Element
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.network import network_of, network_table
-from stopgo.mission.planning import Route, Targets
-from stopgo.mission.seen import runs_of, seen_units
+from stopgo.mission.stages import Route, Targets
+from stopgo.mission.stages.covered_intervals import runs_of, seen_units
+from stopgo.mission.stages.figures import Figures, Share
+from stopgo.mission.stages.network import network_of, network_table
 
 DIGITS = 6
 """A micrometre, and a millionth of a segment."""

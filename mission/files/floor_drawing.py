@@ -12,8 +12,8 @@ from stopgo.mission.files.sheet import PaperSheet
 from stopgo.mission.files.svg import clean, group, line_data, number, path, ring_data
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, Polygon
-from stopgo.mission.planning import NavigableSpace, OpeningState, Selection, Targets
-from stopgo.mission.seen import runs_of, seen_units
+from stopgo.mission.stages import NavigableSpace, OpeningState, Selection, Targets
+from stopgo.mission.stages.covered_intervals import runs_of, seen_units
 
 LOOKS: dict[str, dict[str, object]] = {
     "walls": {"fill": "#9b9b9b", "stroke": "#6f6f6f"},

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from stopgo.mission.console.table import printable
 from stopgo.mission.files.dxf_bytes import encoded, reproducible
 from stopgo.mission.floor import FloorPlan, Room
 from stopgo.mission.geometry import FloatArray, Polygon
-from stopgo.mission.kinds import KINDS
-from stopgo.mission.table import printable
+from stopgo.mission.settings.element_kinds import KINDS
 
 if TYPE_CHECKING:
     from ezdxf.entities import DXFEntity

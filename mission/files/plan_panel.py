@@ -9,19 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from msgspec import UNSET
 
+from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission
-from stopgo.mission.figures import Figures, Share, percent
+from stopgo.mission.document.limits import limits_in_words
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.files import floor_drawing as floor_look
 from stopgo.mission.files import route_drawing as route_look
 from stopgo.mission.files.shared_drawing import back, letter, line_of
 from stopgo.mission.files.sheet import COLUMN, HEADER, ROW, Chunk, PaperBox, PaperSheet
 from stopgo.mission.files.svg import circle, group, line, number, path, polygon, rect, shortened, text
 from stopgo.mission.geometry import polyline_length
-from stopgo.mission.limits import limits_in_words
-from stopgo.mission.network import network_of
-from stopgo.mission.planning import Route, Selection
-from stopgo.mission.schedule import schedule
-from stopgo.mission.table import duration
+from stopgo.mission.stages import Route, Selection
+from stopgo.mission.stages.figures import Figures, Share, percent
+from stopgo.mission.stages.network import network_of
 
 BODY = 2.5
 LINE = 4.2

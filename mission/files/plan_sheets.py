@@ -13,8 +13,9 @@ from itertools import product
 
 import numpy as np
 
+from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission
-from stopgo.mission.figures import Figures, percent
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.files import plan_panel as panel
 from stopgo.mission.files.floor_drawing import outline
 from stopgo.mission.files.pdf import PdfPage, pdf_of
@@ -24,9 +25,8 @@ from stopgo.mission.files.sheet import COLUMN, GAP, MARGIN, PAPERS, PaperBox, Pa
 from stopgo.mission.files.svg import group, line, rect, shortened, text
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.planning import Route
-from stopgo.mission.schedule import schedule
-from stopgo.mission.table import duration
+from stopgo.mission.stages import Route
+from stopgo.mission.stages.figures import Figures, percent
 
 READABLE = 100
 """1:N at which stops and walls are told apart; a floor that one sheet shows so needs no further ones."""

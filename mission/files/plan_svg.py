@@ -8,7 +8,6 @@ from itertools import chain
 import numpy as np
 
 from stopgo.mission.document import Mission
-from stopgo.mission.figures import Figures
 from stopgo.mission.files import plan_panel as panel
 from stopgo.mission.files.floor_drawing import building, targets
 from stopgo.mission.files.room_labels import STOPS, WALLS, WAY, Busy, points_along, room_labels
@@ -18,7 +17,8 @@ from stopgo.mission.files.sheet import PaperBox, PaperSheet, SheetContents, fit
 from stopgo.mission.files.svg import FONT, attributes, clean, group, number, rect
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray, bounds
-from stopgo.mission.planning import Route
+from stopgo.mission.stages import Route
+from stopgo.mission.stages.figures import Figures
 
 PADDING = 8.0
 """Millimetres kept free round the floor, for coordinates and what stands on its edge."""

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from stopgo.mission.errors import InputError
-from stopgo.mission.parameter import Parameter
-from stopgo.mission.scanners import SCANNERS
 from stopgo.mission.settings import PARAMETERS, Settings, check_settings
-from stopgo.mission.toml_file import read_toml
+from stopgo.mission.settings.parameter import Parameter
+from stopgo.mission.settings.scanners import SCANNERS
+from stopgo.mission.settings.toml_file import read_toml
 
 
 def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:

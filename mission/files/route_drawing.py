@@ -11,7 +11,7 @@ from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.sheet import PaperSheet
 from stopgo.mission.files.svg import circle, group, line, line_data, path, polygon, rect, text
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.network import network_of
+from stopgo.mission.stages.network import network_of
 
 WAY: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.35}
 """The way to each stop."""

@@ -14,12 +14,12 @@ from typing import Protocol
 from urllib.parse import parse_qsl
 
 from stopgo.mission.document import Stop
-from stopgo.mission.events import Pose
-from stopgo.mission.geodesy import heading_of
+from stopgo.mission.frames.geodesy import heading_of
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.read_back import point_at
+from stopgo.mission.run.events import Pose
 from stopgo.mission.run.scans import ScanFailed, ScanResult, missing_in
-from stopgo.mission.tolerance import deviation, is_outside
+from stopgo.mission.run.tolerance import deviation, is_outside
 
 NEAR_M = 0.5
 """What is told from farther away is of another stop."""

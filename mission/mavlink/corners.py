@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from stopgo.mission.document import Point
-from stopgo.mission.run.way import foot
+from stopgo.mission.run.route_position import foot
 
 THIN = 0.05
 """Share of the allowance that is spent on leaving out points of nearly straight pieces, for speed."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.transform import SiteOrigin
 
 ItemRole = Literal["home", "speed", "corner", "stop", "settle", "trigger", "scan", "return", "other"]
 """What an item does in a mission of scan stops."""

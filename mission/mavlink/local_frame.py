@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 from stopgo.mission.document import Point
-from stopgo.mission.events import Pose
-from stopgo.mission.geodesy import Geodetic, bearing_deg, from_geodetic, heading_of
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.geodesy import Geodetic, bearing_deg, from_geodetic, heading_of
+from stopgo.mission.frames.transform import SiteOrigin
+from stopgo.mission.run.events import Pose
 
 SAME_M = 0.05
 """Origins that are no farther apart are the same: each is written in steps of a centimetre."""

@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator, Sequence
 
 from stopgo.mission.document import Point
-from stopgo.mission.geodesy import Geodetic, from_geodetic, from_steps, to_steps
+from stopgo.mission.frames.geodesy import Geodetic, from_geodetic, from_steps, to_steps
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.items import Command, Item, ItemList, MavFrame, Placed
-from stopgo.mission.transform import SiteOrigin
 
 CLOSE = 1e-6
 """Relative difference within which two float32 numbers are the same: some sixteen of their steps."""

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 from stopgo.mission.document import Point
 from stopgo.mission.errors import InputError
-from stopgo.mission.geodesy import from_geodetic, from_steps, heading_of
+from stopgo.mission.frames.geodesy import from_geodetic, from_steps, heading_of
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.items import Command, Item, Placed
 from stopgo.mission.mavlink.recognise import number_carried
-from stopgo.mission.transform import SiteOrigin
 
 FAR_M = 100_000.0
 """Metres from a site's origin beyond which a place belongs to another site."""

@@ -6,14 +6,14 @@ import math
 from collections.abc import Sequence
 
 from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document.problems import problems_of
 from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.fields import as_sent
 from stopgo.mission.mavlink.items import Command, Placed
 from stopgo.mission.mavlink.translation_options import TranslationOptions
-from stopgo.mission.problems import problems_of
 from stopgo.mission.run.scans import needs_heading
-from stopgo.mission.transform import SiteOrigin
 
 LONGEST_SCRIPT_S = 255
 """NAV_SCRIPT_TIME keeps its timeout in a uint8."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stopgo.mission.geodesy import Geodetic, from_steps
+from stopgo.mission.frames.geodesy import Geodetic, from_steps
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
 
 Message = Any

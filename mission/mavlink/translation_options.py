@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
-from stopgo.mission.transform import SiteOrigin
 
 Trigger = Literal["auto", "script", "camera", "none"]
 ScanWait = Literal["delay", "script_time"]

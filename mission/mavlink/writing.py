@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from stopgo.mission.document import Point, Stop
-from stopgo.mission.geodesy import bearing_deg, to_geodetic, to_steps
+from stopgo.mission.frames.geodesy import bearing_deg, to_geodetic, to_steps
 from stopgo.mission.mavlink.items import NAN, Command, Item, MavFrame
 from stopgo.mission.mavlink.translation_options import TranslationOptions
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stopgo.mission.document import Mission
-from stopgo.mission.schedule import schedule
+from stopgo.mission.document.schedule import schedule
 
 
 def what_is_missing(mission: Mission, *, battery: float, endurance_s: float | None, first: int = 0) -> str:

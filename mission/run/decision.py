@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import partial
 
 from stopgo.mission.document import Mission
-from stopgo.mission.events import Pose, TakenOver
-from stopgo.mission.run import way
+from stopgo.mission.run import route_position
 from stopgo.mission.run.battery import what_is_missing
+from stopgo.mission.run.events import Pose, TakenOver
 from stopgo.mission.run.lease import Lease, claimed
 from stopgo.mission.run.orders import DRIVING, FREE_VERBS, LONGEST_VALID_S, Order, Refused
 from stopgo.mission.run.states import (
@@ -162,7 +162,7 @@ def _starting_leg(order: Order, mission: Mission, pose: Pose) -> int | Refused:
             return 0
         return Refused("not_at_start", f"the robot is {away:.2f} m from the mission's start {_xy(start)}; "
                        "drive it there, or start --from-here on the route")  # fmt: skip
-    leg, place = way.nearest_leg(mission, pose)
+    leg, place = route_position.nearest_leg(mission, pose)
     if place.distance > mission.stops[leg].tolerance_m:
         return Refused("off_route", f"the robot is {place.distance:.2f} m from the route's nearest point")
     return leg
@@ -179,10 +179,10 @@ def _resume(order: Order, mission: Mission, situation: Situation) -> Change | Re
 
 def off_route(run: Run, mission: Mission, pose: Pose) -> Refused | None:
     """Refused if the robot stands farther from its leg than the stop's tolerance."""
-    legs = way.legs_of(mission)
+    legs = route_position.legs_of(mission)
     leg = min(run.leg, len(legs) - 1)
     tolerance = mission.stops[min(leg, len(mission.stops) - 1)].tolerance_m
-    near = [way.nearest(legs[index], pose).distance for index in {leg, max(0, leg - 1)}]
+    near = [route_position.nearest(legs[index], pose).distance for index in {leg, max(0, leg - 1)}]
     if min(near) <= tolerance:
         return None
     return Refused("off_route", f"the robot is {min(near):.2f} m off its route (tolerance {tolerance:g} m); "

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 
 import msgspec
 
-from stopgo.mission.events import State
+from stopgo.mission.run.events import State
 
 LONGEST_VALID_S: Final = 60.0
 """No order may claim to be valid for longer."""

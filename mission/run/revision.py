@@ -11,7 +11,7 @@ from functools import partial
 from typing import Literal
 
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.events import RevisionDropped, RevisionTaken, RevisionWaits
+from stopgo.mission.run.events import RevisionDropped, RevisionTaken, RevisionWaits
 from stopgo.mission.run.states import Change, Run, changed, next_leg
 
 RevisionPolicy = Literal["next-stop", "refuse"]

@@ -8,7 +8,7 @@ import re
 import msgspec
 
 from stopgo.mission.document import ScannerSpec
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 
 HEADING_RAD = math.radians(5.0)
 """How far a stop's heading may be missed by a scanner that does not see all round."""

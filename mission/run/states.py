@@ -14,7 +14,7 @@ from typing import Literal
 import msgspec
 
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.events import (
+from stopgo.mission.run.events import (
     Aborted,
     AnyEvent,
     Arrived,
@@ -34,7 +34,7 @@ from stopgo.mission.events import (
     StopState,
 )
 from stopgo.mission.run.scans import ScanFailed, ScanResult, missing_in
-from stopgo.mission.tolerance import deviation, is_outside
+from stopgo.mission.run.tolerance import deviation, is_outside
 
 After = Literal["FINISHED", "ABORTED", "PAUSED"]
 DetailedState = State | Literal["PAUSED homing", "HELD homing"]

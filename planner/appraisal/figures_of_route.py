@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from stopgo.mission.figures import Figures, Shares
 from stopgo.mission.floor import Finding, Rank
-from stopgo.mission.ledger import ledger_of
-from stopgo.mission.planning import Candidates, Route, Selection
-from stopgo.mission.seen import seen_units
+from stopgo.mission.stages import Candidates, Route, Selection
+from stopgo.mission.stages.coverage_totals import ledger_of
+from stopgo.mission.stages.covered_intervals import seen_units
+from stopgo.mission.stages.figures import Figures, Shares
 from stopgo.planner.appraisal.plausible import doubts_of, near_legs
 from stopgo.planner.appraisal.quality import NOT_MET, not_met, quality_of
 from stopgo.planner.appraisal.unreached import unreached
+from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.overlap.registered import SCANS_APART, scans_apart
-from stopgo.planner.shapes import local_origin, to_shape
 from stopgo.planner.space.reach import reach_of
 
 

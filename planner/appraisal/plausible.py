@@ -9,11 +9,11 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from stopgo.mission.figures import LEG_OVER_IGNORED
 from stopgo.mission.floor import Finding, FloorPlan
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.planning import NavigableSpace, Route
-from stopgo.planner.shapes import HAIRLINE, local_origin, to_shape, union
+from stopgo.mission.stages import NavigableSpace, Route
+from stopgo.mission.stages.figures import LEG_OVER_IGNORED
+from stopgo.planner.geometry.shapes import HAIRLINE, local_origin, to_shape, union
 from stopgo.planner.space.targets import solid_of
 
 BESIDE_WALL = 0.35

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from stopgo.mission.figures import LimitCost, Quality, percent
+from stopgo.mission.document.limits import limits_in_words
+from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import BoolArray, frozen
-from stopgo.mission.ledger import ledger_of
-from stopgo.mission.limits import limits_in_words
-from stopgo.mission.planning import Selection, Visibility
 from stopgo.mission.settings import Settings
-from stopgo.mission.specs import limits_spec_of
+from stopgo.mission.stages import Selection, Visibility
+from stopgo.mission.stages.coverage_totals import ledger_of
+from stopgo.mission.stages.figures import LimitCost, Quality, percent
 from stopgo.planner.selection import quick
 from stopgo.planner.visibility import seen_well
 from stopgo.planner.visibility.limited import without

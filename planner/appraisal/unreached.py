@@ -8,19 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
-from stopgo.mission.planning import (
-    AT_EDGE,
-    IN_HOLE,
-    OTHER_PART,
-    TOO_CLOSE,
-    UNREACHABLE,
-    Candidates,
-    Unreached,
-)
-from stopgo.planner.candidates.place import Place
-from stopgo.planner.shapes import local_origin, to_shape
+from stopgo.mission.stages import AT_EDGE, IN_HOLE, OTHER_PART, TOO_CLOSE, UNREACHABLE, Candidates, Unreached
+from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.space.floor_gaps import gap_before
 from stopgo.planner.space.opening_joins import PROBES
+from stopgo.planner.space.place import Place
 from stopgo.planner.space.reach import reach_of
 
 LEAST_AREA = 0.01

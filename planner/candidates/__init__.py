@@ -10,9 +10,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from stopgo.mission.console.plugins import variant
 from stopgo.mission.errors import AnswerIsNo, InputError
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
-from stopgo.mission.planning import (
+from stopgo.mission.stages import (
     AT_EDGE,
     AVOIDED,
     DROP_REASONS,
@@ -25,14 +26,13 @@ from stopgo.mission.planning import (
     Candidates,
     NavigableSpace,
 )
-from stopgo.mission.plugins import variant
 from stopgo.planner.candidates.fallback import best_point
 from stopgo.planner.candidates.given import doorways, places_to_use
 from stopgo.planner.candidates.grid import grid
-from stopgo.planner.candidates.place import Place
 from stopgo.planner.candidates.proposals import Proposals, in_order, joined
 from stopgo.planner.candidates.triangulation import triangulation
-from stopgo.planner.shapes import local_origin
+from stopgo.planner.geometry.shapes import local_origin
+from stopgo.planner.space.place import Place
 from stopgo.planner.space.reach import Reach, reach_of
 
 Strategy = Callable[[NavigableSpace], tuple[FloatArray, IntArray] | tuple[FloatArray, IntArray, IntArray]]

@@ -6,9 +6,9 @@ import numpy as np
 import shapely
 
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.planning import KEPT
-from stopgo.planner.candidates.place import Place
-from stopgo.planner.shapes import polygon_parts, roughly_widened
+from stopgo.mission.stages import KEPT
+from stopgo.planner.geometry.shapes import polygon_parts, roughly_widened
+from stopgo.planner.space.place import Place
 
 HAIR = 1e-6
 """Clearances are shortened by this to find strips that are allowed but have no width."""

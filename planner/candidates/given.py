@@ -7,11 +7,11 @@ import shapely
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.planning import DROP_REASONS, KEPT, NavigableSpace, OpeningState
-from stopgo.planner.candidates.place import Place
+from stopgo.mission.stages import DROP_REASONS, KEPT, NavigableSpace, OpeningState
 from stopgo.planner.candidates.proposals import Proposals
-from stopgo.planner.shapes import local_origin, to_shape
+from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.space.opening_joins import widest_clear
+from stopgo.planner.space.place import Place
 
 
 def doorways(space: NavigableSpace) -> Proposals:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.planning import NavigableSpace
-from stopgo.planner.room_grid import room_grid
-from stopgo.planner.shapes import local_origin, to_shape
+from stopgo.mission.stages import NavigableSpace
+from stopgo.planner.geometry.room_grid import room_grid
+from stopgo.planner.geometry.shapes import local_origin, to_shape
 
 
 def grid(space: NavigableSpace) -> tuple[FloatArray, IntArray]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
+from stopgo.mission.document.specs import DECIMALS
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
-from stopgo.mission.planning import KEPT
-from stopgo.mission.specs import DECIMALS
+from stopgo.mission.stages import KEPT
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,10 +15,10 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.planning import KEPT, SLIVER, TOO_SMALL, NavigableSpace
-from stopgo.planner.candidates.place import Place
-from stopgo.planner.room_grid import main_axes
-from stopgo.planner.shapes import GRID, one_shape, polygon_parts, roughly_widened, segments_of
+from stopgo.mission.stages import KEPT, SLIVER, TOO_SMALL, NavigableSpace
+from stopgo.planner.geometry.room_grid import main_axes
+from stopgo.planner.geometry.shapes import GRID, one_shape, polygon_parts, roughly_widened, segments_of
+from stopgo.planner.space.place import Place
 
 LEAST_ANGLE = float(np.arcsin(1 / 6))
 """alpha_min in radians: sin alpha_min = l_min / (6 l_min) (paper, Eq. 2), 9.594° whatever l_min is."""

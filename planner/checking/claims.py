@@ -17,19 +17,19 @@ import numpy as np
 from msgspec import UNSET
 
 from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document.problems import Problem
 from stopgo.mission.errors import AnswerIsNo, InputError
-from stopgo.mission.figures import percent
 from stopgo.mission.files.coverage_json import DIGITS, Coverage
 from stopgo.mission.geometry import BoolArray, IntArray, frozen
-from stopgo.mission.planning import Candidates, NavigableSpace, weights_of
-from stopgo.mission.problems import Problem
+from stopgo.mission.stages import Candidates, NavigableSpace, weights_of
+from stopgo.mission.stages.figures import percent
 from stopgo.planner.candidates import STRATEGIES, candidates
-from stopgo.planner.shapes import local_origin
-from stopgo.planner.sight.sightlines import SightLines
+from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility.exact_sight import sides_of_door, viewpoints_of
 from stopgo.planner.visibility.headings import in_view, with_headings
-from stopgo.planner.visibility.runs import visibility_of
+from stopgo.planner.visibility.sight.sightlines import SightLines
+from stopgo.planner.visibility.unit_ranges import visibility_of
 
 ROUNDED = 10.0**-DIGITS
 """Shares in coverage.json are of lengths that are rounded themselves."""

@@ -16,13 +16,13 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.document import Mission, Point, Stop
+from stopgo.mission.document.problems import Problem
+from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.problems import Problem
 from stopgo.mission.settings import Settings
-from stopgo.mission.specs import limits_spec_of
 from stopgo.planner.appraisal.plausible import over_ignored
-from stopgo.planner.shapes import HAIRLINE, SLACK, holds, segments_of
+from stopgo.planner.geometry.shapes import HAIRLINE, SLACK, holds, segments_of
 from stopgo.planner.space.gaps import CLEAR_SLACK, Walls
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.targets import solid_of

@@ -12,15 +12,15 @@ import numpy as np
 import shapely
 
 from stopgo.mission.document import Mission, Stop
+from stopgo.mission.document.problems import Problem
 from stopgo.mission.geometry import IntArray
-from stopgo.mission.planning import NavigableSpace
-from stopgo.mission.problems import Problem
+from stopgo.mission.stages import NavigableSpace
+from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid
 from stopgo.planner.overlap import LEAST_COMMON_M, LEAST_HOLD_M
 from stopgo.planner.overlap.boundary import Boundary, boundary_of, shown_by
 from stopgo.planner.overlap.pairs import Overlaps
-from stopgo.planner.shapes import GRID, local_origin, to_grid
-from stopgo.planner.sight.sightlines import Midpoints, sees
 from stopgo.planner.visibility.exact_sight import sides_of_door
+from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
 
 ROUNDED = 1e-5
 """Figures of a pair are sums of rounded lengths."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stopgo.mission.document import Mission
+from stopgo.mission.document.problems import Problem
 from stopgo.mission.errors import AnswerIsNo, InputError
 from stopgo.mission.files.coverage_json import Coverage
 from stopgo.mission.files.plan_toml import read_settings
-from stopgo.mission.problems import Problem
 from stopgo.planner.checking.claims import Recount, overclaims, recount
 from stopgo.planner.checking.fit import misfits_on, other_machine
 from stopgo.planner.checking.network_claims import network_overclaims

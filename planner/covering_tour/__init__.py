@@ -12,15 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.geometry import IntArray, frozen
-from stopgo.mission.planning import LeastTime, Route, Selection
-from stopgo.mission.schedule import schedule
-from stopgo.planner.assemble import assemble
+from stopgo.mission.stages import LeastTime, Route, Selection
 from stopgo.planner.covering_tour.least_time_bound import least_time
 from stopgo.planner.covering_tour.problem import TourProblem, problem_of
 from stopgo.planner.covering_tour.search import shorter_line
 from stopgo.planner.covering_tour.timed_line import PointLine
 from stopgo.planner.routing import assembled, legs_between, points_and_ends, tour_bound
+from stopgo.planner.routing.assemble import assemble
 from stopgo.planner.selection import coverage_steps
 from stopgo.planner.selection.greedy import in_greedy_order
 

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stopgo.mission.document import RobotSpec
+from stopgo.mission.document.schedule import straight_time
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.schedule import straight_time
 from stopgo.planner.covering_tour.zones import Zone
 from stopgo.planner.routing import Ends, far_edge, tour_matrix
 from stopgo.planner.routing.tour import NANOMETRES, best_of_all, length_of, nanometres

@@ -12,11 +12,11 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from stopgo.mission.document import RobotSpec
+from stopgo.mission.document.schedule import straight_times, turn_time
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
-from stopgo.mission.schedule import straight_times, turn_time
+from stopgo.planner.geometry.shapes import SLACK
 from stopgo.planner.routing.legs import Legs
 from stopgo.planner.routing.ways import Ways
-from stopgo.planner.shapes import SLACK
 
 MICROSECONDS = 1e6
 """Per second."""

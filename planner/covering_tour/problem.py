@@ -9,11 +9,11 @@ from functools import cached_property
 
 import numpy as np
 
+from stopgo.mission.document.schedule import straight_times
+from stopgo.mission.document.specs import robot_of
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
-from stopgo.mission.planning import Candidates, Route, Visibility
-from stopgo.mission.schedule import straight_times
 from stopgo.mission.settings import Settings
-from stopgo.mission.specs import robot_of
+from stopgo.mission.stages import Candidates, Route, Visibility
 from stopgo.planner.covering_tour.least_time_bound import RouteAsked
 from stopgo.planner.covering_tour.leg_table import MICROSECONDS, NO_HEADING, LegTable, leg_table
 from stopgo.planner.covering_tour.search import LineTask
@@ -24,8 +24,8 @@ from stopgo.planner.routing import legs_between, rank_at_door
 from stopgo.planner.routing.legs import Legs
 from stopgo.planner.selection import METHODS, left_by, offered_further, posed
 from stopgo.planner.selection.bound import lower_bound
+from stopgo.planner.selection.connected_selection import JoinedCover
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.selection.hanging_together import JoinedCover
 
 MOST_PLACES = 1500
 """Candidates that may become stops: those nearest to the stops there are."""

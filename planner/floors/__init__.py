@@ -11,11 +11,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import cast
 
+from stopgo.mission.console.plugins import Variant
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.layer_kinds import kinds_by_name
-from stopgo.mission.plugins import Variant
 from stopgo.mission.settings import FLOOR_PARAMETERS, Settings
+from stopgo.mission.settings.layer_kinds import kinds_by_name
 from stopgo.planner.floors.foreign import foreign_readers, sound
 from stopgo.planner.floors.reader import FloorFile, FloorOptions, Reader
 from stopgo.planner.floors.survey import Survey

@@ -11,7 +11,7 @@ import shapely
 
 from stopgo.mission.floor import Element, Finding, IgnoredLine, Room
 from stopgo.mission.geometry import FloatArray, Polygon, frozen
-from stopgo.mission.kinds import KINDS
+from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.planner.floors.drawn import Closed, Drawn, Oddity, Open, faces_of, hole_indices, place
 from stopgo.planner.floors.rings import SNAP, Region, canonical_region, parents, polygons_of, to_shapely
 

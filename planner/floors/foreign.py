@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from stopgo.mission.console.plugins import Variant, installed, variant
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.kinds import KINDS
-from stopgo.mission.plugins import Variant, installed, variant
+from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.planner.floors.reader import Reader
 
 

@@ -12,7 +12,7 @@ from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.drawn import place
 from stopgo.planner.floors.rings import SNAP, Region, polygons_of
-from stopgo.planner.shapes import SLACK, polygon_parts, segments_of
+from stopgo.planner.geometry.shapes import SLACK, polygon_parts, segments_of
 
 JOINT = 0.02
 """The widest gap in a floor, in metres, that is a joint between slabs."""

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 
 from stopgo.mission.errors import InputError
-from stopgo.mission.layer_kinds import LAYER_ROLES
+from stopgo.mission.settings.layer_kinds import LAYER_ROLES
 from stopgo.planner.floors.survey import LayerUse, Survey
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from stopgo.mission.kinds import KINDS
+from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.planner.floors.layer_names import LayerReading, reading_of
 
 ROLES: dict[str, str] = {

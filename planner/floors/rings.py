@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, Polygon, frozen, ring_area
-from stopgo.planner.shapes import QUARTER, boundary_lines, widened
+from stopgo.planner.geometry.shapes import QUARTER, boundary_lines, widened
 
 SNAP = 1e-3
 """Ends closer than this, in metres, meet."""

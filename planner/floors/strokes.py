@@ -13,7 +13,7 @@ from ezdxf.math import OCS, Z_AXIS, Matrix44, Vec3
 
 from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray, frozen, ring_area
-from stopgo.mission.kinds import KINDS
+from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.planner.floors.curves import LARGEST, Curve, Fineness, curves_of
 from stopgo.planner.floors.drawing import BROKEN_INPUT, legible
 from stopgo.planner.floors.drawn_shapes import Shape

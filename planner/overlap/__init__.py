@@ -6,8 +6,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
-from stopgo.mission.planning import Candidates
-from stopgo.planner.kept import kept
+from stopgo.mission.stages import Candidates
+from stopgo.planner.geometry.instance_cache import kept
 from stopgo.planner.overlap.boundary import shown
 from stopgo.planner.overlap.pairs import Overlaps, Pairs
 

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
-from stopgo.mission.planning import Candidates, NavigableSpace
 from stopgo.mission.settings import Settings
-from stopgo.planner.shapes import GRID, local_origin, to_grid, whole_steps_of
-from stopgo.planner.sight.sight import scene_of, sight
+from stopgo.mission.stages import Candidates, NavigableSpace
+from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps_of
 from stopgo.planner.space.targets import face_segments, units_on
 from stopgo.planner.visibility.exact_sight import open_space, viewpoints_of
 from stopgo.planner.visibility.headings import in_view
-from stopgo.planner.visibility.runs import ranges, runs_of
+from stopgo.planner.visibility.sight.sight import scene_of, sight
+from stopgo.planner.visibility.unit_ranges import ranges, runs_of
 
 PIECE_M = 0.05
 """Boundary is seen by pieces of this length (m), whatever the plan's units are."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.overlap.boundary import Shown
-from stopgo.planner.visibility.runs import ranges
+from stopgo.planner.visibility.unit_ranges import ranges
 
 LEVER_M = 0.01 / math.radians(0.1)
 """A turn counts as the way it makes at this distance: 0.1° as much as 1 cm, what is allowed of each."""

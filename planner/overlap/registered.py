@@ -8,16 +8,16 @@ import numpy as np
 import shapely
 
 from stopgo.mission.document import Overlap, stop_names
+from stopgo.mission.document.specs import rounded
 from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.network import Network
-from stopgo.mission.planning import OpeningState, Route
 from stopgo.mission.settings import Settings
-from stopgo.mission.specs import rounded
-from stopgo.planner.kept import kept
+from stopgo.mission.stages import OpeningState, Route
+from stopgo.mission.stages.network import Network
+from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.overlap import USUAL_SHARE, Overlaps, registers
 from stopgo.planner.overlap.boundary import shown
-from stopgo.planner.shapes import local_origin
 
 
 @kept

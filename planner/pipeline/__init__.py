@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from stopgo.mission.division import DividedRoute
     from stopgo.mission.floor import FloorPlan
     from stopgo.mission.plan import PartPlan, Plan
-    from stopgo.mission.planning import Candidates, NavigableSpace, Route, Selection
     from stopgo.mission.settings import Settings
+    from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection
+    from stopgo.mission.stages.division import DividedRoute
 
 Observe = Callable[[Any], None]
 
@@ -63,9 +63,9 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
 
 def _selected(found: Candidates, observe: Observe) -> Selection:
     """The fewest stops."""
-    from stopgo.planner.anywhere import SELECTOR, anywhere
-    from stopgo.planner.refine import refined
     from stopgo.planner.selection import select
+    from stopgo.planner.selection.continuous_selection import SELECTOR, anywhere
+    from stopgo.planner.selection.refine import refined
     from stopgo.planner.visibility import visibility
 
     observe(found)
@@ -84,7 +84,7 @@ def _part(driven: Route, number: int, planned: frozenset[int], observe: Observe)
     """The plan that drives a route."""
     from stopgo.mission.plan import PartPlan
     from stopgo.planner.appraisal.figures_of_route import figures_of
-    from stopgo.planner.assemble import assemble
+    from stopgo.planner.routing.assemble import assemble
 
     observe(driven)
     figures = figures_of(driven, planned=planned)
@@ -103,7 +103,7 @@ def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) 
     from stopgo.mission.document import MissionShare
     from stopgo.mission.plan import DividedPlan, PartPlan, Plan
     from stopgo.planner.appraisal.figures_of_route import figures_of_share
-    from stopgo.planner.assemble import assemble
+    from stopgo.planner.routing.assemble import assemble
 
     selection = _selected(found, observe)
     driven, out = _shared_out(selection)
@@ -127,7 +127,7 @@ def _shared_out(selection: Selection) -> tuple[Route, DividedRoute]:
     """
     from stopgo.planner.covering_tour import as_before
     from stopgo.planner.routing import route
-    from stopgo.planner.sharing.dividing import divided, taken_by
+    from stopgo.planner.task_allocation.dividing import divided, taken_by
 
     driven = route(selection)
     if selection.visibility.candidates.space.settings.minimise == "stops":

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stopgo.mission.console.plugins import Variant, variant
 from stopgo.mission.errors import AnswerIsNo, InputError
 from stopgo.mission.geometry import FloatArray, IntArray, frozen, polyline_length
-from stopgo.mission.planning import Candidates, NavigableSpace, Route, Selection
-from stopgo.mission.plugins import Variant, variant
+from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection
+from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing.colony import ant_colony
 from stopgo.planner.routing.grid_graph import grid_ways
 from stopgo.planner.routing.legs import Legs
@@ -24,7 +25,6 @@ from stopgo.planner.routing.proof import proved
 from stopgo.planner.routing.roadmap import ways_between
 from stopgo.planner.routing.tour import NANOMETRES, nanometres, shortest_tour
 from stopgo.planner.routing.ways import Ways
-from stopgo.planner.shapes import local_origin
 from stopgo.planner.space.reach import reach_of
 
 Router = Callable[..., IntArray]

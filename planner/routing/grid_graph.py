@@ -25,12 +25,12 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.planning import NavigableSpace
 from stopgo.mission.settings import Settings
-from stopgo.planner.room_grid import main_axes, room_grid
+from stopgo.mission.stages import NavigableSpace
+from stopgo.planner.geometry.room_grid import main_axes, room_grid
+from stopgo.planner.geometry.shapes import GRID, local_origin, to_shape
 from stopgo.planner.routing.roadmap import anchors_of, on_crossings, outward_corners
 from stopgo.planner.routing.ways import Ways, shortest_ways
-from stopgo.planner.shapes import GRID, local_origin, to_shape
 from stopgo.planner.space.opening_joins import middle_and_normal
 
 RESOLUTIONS = (1.0, 0.5, 0.25, 0.125, 0.0625)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from stopgo.mission.console.plugins import Variant
 from stopgo.mission.geometry import FloatArray, frozen, polyline_length
-from stopgo.mission.plugins import Variant
 from stopgo.planner.routing.ways import Ways
 
 TOLERANCE = 1e-6

@@ -14,12 +14,20 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.planning import NavigableSpace
+from stopgo.mission.stages import NavigableSpace
+from stopgo.planner.geometry.shapes import (
+    GRID,
+    local_origin,
+    polygon_parts,
+    snapped,
+    to_grid,
+    to_shape,
+    whole_steps,
+)
 from stopgo.planner.routing.ways import Ways, shortest_ways
-from stopgo.planner.shapes import GRID, local_origin, polygon_parts, snapped, to_grid, to_shape, whole_steps
-from stopgo.planner.sight.mesh import mesh_of
-from stopgo.planner.sight.sight import scene_of, sight
 from stopgo.planner.space.reach import reach_of
+from stopgo.planner.visibility.sight.mesh import mesh_of
+from stopgo.planner.visibility.sight.sight import scene_of, sight
 
 PAIRS = 1_000_000
 """Pairs of nodes held at a time, about 200 bytes each."""

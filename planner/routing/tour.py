@@ -10,7 +10,7 @@ import numpy as np
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.planner.compiling import compiled
+from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.routing.subsets import best_of_all
 from stopgo.planner.routing.tour_kernel import HELPERS, iterated_search
 

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
-from stopgo.planner.shapes import SLACK
+from stopgo.planner.geometry.shapes import SLACK
 
 CHUNK = 256
 """Points whose distances to all nodes are held at a time."""

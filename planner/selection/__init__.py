@@ -11,18 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from stopgo.mission.console.plugins import Variant, variant
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
-from stopgo.mission.planning import Selection, Visibility
-from stopgo.mission.plugins import Variant, variant
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Selection, Visibility
 from stopgo.planner.overlap import links_of
 from stopgo.planner.selection.bound import counting_bound, lower_bound
+from stopgo.planner.selection.connected_selection import JoinedCover, Search, connected
 from stopgo.planner.selection.cover import Cover, cover_of
 from stopgo.planner.selection.demands import demands_of
 from stopgo.planner.selection.exact_cover import exact
 from stopgo.planner.selection.greedy import greedy, in_greedy_order
-from stopgo.planner.selection.hanging_together import JoinedCover, Search, connected
 from stopgo.planner.selection.improve import improved
 from stopgo.planner.selection.separators import Conditions
 

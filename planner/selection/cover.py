@@ -10,9 +10,9 @@ import numpy as np
 from scipy.sparse import block_diag, coo_array, csr_array, diags_array, hstack
 
 from stopgo.mission.geometry import IntArray
-from stopgo.mission.planning import Visibility
+from stopgo.mission.stages import Visibility
 from stopgo.planner.selection.demands import Demands
-from stopgo.planner.visibility.runs import ranges
+from stopgo.planner.visibility.unit_ranges import ranges
 
 
 @dataclass(frozen=True, eq=False)

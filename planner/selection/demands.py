@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
-from stopgo.mission.planning import Visibility, weights_of
+from stopgo.mission.stages import Visibility, weights_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from stopgo.mission.geometry import IntArray
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.visibility.runs import ranges
+from stopgo.planner.visibility.unit_ranges import ranges
 
 
 def greedy(cover: Cover) -> IntArray:

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.planner.shapes import GRID, polygon_parts
+from stopgo.planner.geometry.shapes import GRID, polygon_parts
 
 
 @dataclass(frozen=True, eq=False)

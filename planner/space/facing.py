@@ -8,8 +8,8 @@ import numpy as np
 import shapely
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
-from stopgo.mission.planning import RoomSpace, Targets
-from stopgo.planner.shapes import to_shape
+from stopgo.mission.stages import RoomSpace, Targets
+from stopgo.planner.geometry.shapes import to_shape
 from stopgo.planner.space.ground import Ground
 
 AHEAD = (0.02, 0.1, 0.25)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
-from stopgo.mission.planning import NavigableSpace
-from stopgo.planner.kept import kept
-from stopgo.planner.shapes import SLACK, local_origin, polygon_parts, segments_of, to_shape
+from stopgo.mission.stages import NavigableSpace
+from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.shapes import SLACK, local_origin, polygon_parts, segments_of, to_shape
 from stopgo.planner.space.reach import INSIDE, reach_of
 
 APART = 0.1

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import FloatArray
-from stopgo.planner.shapes import GRID, GROWTH, SLACK, holds
+from stopgo.planner.geometry.shapes import GRID, GROWTH, SLACK, holds
 
 STEPS = 0.02 * 1.4 ** np.arange(15)
 """Distances from a gap's middle, up to about 2 m, at which the drive area is looked for."""

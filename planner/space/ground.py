@@ -12,7 +12,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
-from stopgo.planner.shapes import (
+from stopgo.planner.geometry.shapes import (
     GRID,
     GROWTH,
     HAIRLINE,

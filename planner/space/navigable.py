@@ -6,11 +6,11 @@ import numpy as np
 
 from stopgo.mission.errors import AnswerIsNo, InputError
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.geodesy import out_of_reach
+from stopgo.mission.frames.geodesy import out_of_reach
 from stopgo.mission.geometry import FloatArray, frozen
-from stopgo.mission.planning import NavigableSpace
 from stopgo.mission.settings import Settings
-from stopgo.planner.shapes import local_origin, to_polygons
+from stopgo.mission.stages import NavigableSpace
+from stopgo.planner.geometry.shapes import local_origin, to_polygons
 from stopgo.planner.space.facing import faced_rooms
 from stopgo.planner.space.ground import Ground, drivable
 from stopgo.planner.space.opening_joins import Crossing, barrier

@@ -11,7 +11,14 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.floor import FloorPlan, Opening
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
-from stopgo.planner.shapes import SLACK, boundary_lines, local_origin, polygon_parts, to_shape, widened
+from stopgo.planner.geometry.shapes import (
+    SLACK,
+    boundary_lines,
+    local_origin,
+    polygon_parts,
+    to_shape,
+    widened,
+)
 
 PROBES = (0.15, 0.25, 0.4, 0.6)
 """Distances in metres from an opening's line at which its rooms are looked for."""

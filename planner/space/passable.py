@@ -14,9 +14,9 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.planning import OpeningState
 from stopgo.mission.settings import Settings
-from stopgo.planner.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
+from stopgo.mission.stages import OpeningState
+from stopgo.planner.geometry.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
 from stopgo.planner.space.connected import Parts, parts_of
 from stopgo.planner.space.gaps import Gap, gaps_between
 from stopgo.planner.space.ground import Ground

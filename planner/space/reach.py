@@ -10,9 +10,9 @@ import numpy as np
 import shapely
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
-from stopgo.mission.planning import NavigableSpace
-from stopgo.planner.kept import kept
-from stopgo.planner.shapes import GRID, boundary_lines, local_origin, segments_of, to_shape
+from stopgo.mission.stages import NavigableSpace
+from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.shapes import GRID, boundary_lines, local_origin, segments_of, to_shape
 from stopgo.planner.space.connected import Parts, parts_of
 from stopgo.planner.space.gaps import Site, Walls
 

@@ -7,9 +7,9 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.planning import RoomSpace
 from stopgo.mission.settings import Settings
-from stopgo.planner.shapes import polygon_parts, roughly_widened, to_polygons, to_shape, union
+from stopgo.mission.stages import RoomSpace
+from stopgo.planner.geometry.shapes import polygon_parts, roughly_widened, to_polygons, to_shape, union
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.opening_joins import part_near, threshold
 

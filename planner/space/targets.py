@@ -13,9 +13,9 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import FloatArray, frozen, polyline_length
-from stopgo.mission.planning import Targets
-from stopgo.planner.kept import kept
-from stopgo.planner.shapes import (
+from stopgo.mission.stages import Targets
+from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.shapes import (
     GRID,
     local_origin,
     mended,

@@ -9,10 +9,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from stopgo.mission.console.plugins import Variant, variant
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.geometry import frozen
-from stopgo.mission.planning import Candidates, Visibility
-from stopgo.mission.plugins import Variant, variant
+from stopgo.mission.stages import Candidates, Visibility
 from stopgo.planner.visibility.bresenham import bresenham
 from stopgo.planner.visibility.exact_sight import exact
 from stopgo.planner.visibility.headings import with_headings

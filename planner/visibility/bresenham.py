@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.geometry import BoolArray, IntArray
-from stopgo.mission.planning import Candidates, Visibility
-from stopgo.planner.compiling import compiled
-from stopgo.planner.shapes import SLACK, local_origin
+from stopgo.mission.stages import Candidates, Visibility
+from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.shapes import SLACK, local_origin
 from stopgo.planner.visibility.raster import Raster, raster_of
-from stopgo.planner.visibility.runs import visibility_of
+from stopgo.planner.visibility.unit_ranges import visibility_of
 
 COMPILE_ABOVE = 10_000_000
 """Cells to be walked, were all units as far away as the range, above which compiling pays."""

@@ -6,11 +6,11 @@ import numpy as np
 import shapely
 
 from stopgo.mission.geometry import FloatArray, IntArray, bounds, frozen
-from stopgo.mission.planning import Candidates, NavigableSpace, Visibility
-from stopgo.planner.shapes import local_origin, to_grid, whole_steps_of
-from stopgo.planner.sight.mesh import Mesh, mesh_of
-from stopgo.planner.sight.sight import scene_of, sight
+from stopgo.mission.stages import Candidates, NavigableSpace, Visibility
+from stopgo.planner.geometry.shapes import local_origin, to_grid, whole_steps_of
 from stopgo.planner.space.targets import LINE_WALL
+from stopgo.planner.visibility.sight.mesh import Mesh, mesh_of
+from stopgo.planner.visibility.sight.sight import scene_of, sight
 
 BESIDE = 2 * LINE_WALL
 """Distance in metres from a closed door's line at which a scanner in its doorway looks."""
@@ -19,7 +19,7 @@ MARGIN = 1.0
 
 
 def exact(candidates: Candidates) -> Visibility:
-    """Units in range whose midpoint is in sight; `stopgo.planner.sight.kernel` has the rule for corners."""
+    """Units in range whose midpoint is in sight; the rule for corners is that of `sight.kernel`."""
     space, targets = candidates.space, candidates.space.targets
     origin = local_origin(space.floor)
     places, row = viewpoints_of(candidates)

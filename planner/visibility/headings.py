@@ -13,12 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from stopgo.mission.document.specs import rounded
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
-from stopgo.mission.planning import Candidates, Visibility
-from stopgo.mission.specs import rounded
-from stopgo.planner.room_grid import main_axes
-from stopgo.planner.shapes import local_origin, to_shape
-from stopgo.planner.visibility.runs import visibility_of
+from stopgo.mission.stages import Candidates, Visibility
+from stopgo.planner.geometry.room_grid import main_axes
+from stopgo.planner.geometry.shapes import local_origin, to_shape
+from stopgo.planner.visibility.unit_ranges import visibility_of
 
 FEWEST = 8
 """Headings of each position, at least; more where the field of view is below 90°."""

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from stopgo.mission.document.limits import ViewLimits, limits_in_words, limits_of
+from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.geometry import frozen
-from stopgo.mission.limits import ViewLimits, limits_in_words, limits_of
-from stopgo.mission.planning import Visibility
 from stopgo.mission.settings import Settings
-from stopgo.mission.specs import limits_spec_of
-from stopgo.planner.shapes import local_origin, to_grid
-from stopgo.planner.sight.well_seen import SeenSegments, clipped
+from stopgo.mission.stages import Visibility
+from stopgo.planner.geometry.shapes import local_origin, to_grid
+from stopgo.planner.visibility.sight.well_seen import SeenSegments, clipped
 
 
 def within_limits(in_sight: Visibility) -> Visibility:

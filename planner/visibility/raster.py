@@ -8,9 +8,9 @@ import numpy as np
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
-from stopgo.mission.planning import Candidates
-from stopgo.planner.room_grid import main_axes
-from stopgo.planner.shapes import local_origin, segments_of, to_shape
+from stopgo.mission.stages import Candidates
+from stopgo.planner.geometry.room_grid import main_axes
+from stopgo.planner.geometry.shapes import local_origin, segments_of, to_shape
 
 MARGIN = 2.25
 """Free cells around everything; the quarter keeps faces and units, which often lie on multiples of half

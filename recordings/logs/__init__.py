@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from stopgo.mission.console.plugins import Variant
 from stopgo.mission.errors import InputError
-from stopgo.mission.plugins import Variant
 from stopgo.recordings.logs.field_log import FieldLog, Reading
 from stopgo.recordings.logs.files import head, must_be_readable
 from stopgo.recordings.logs.foreign_logs import foreign_formats, sound_log

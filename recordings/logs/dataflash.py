@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from stopgo.mission.mavlink.autopilots.kind import Mode
 from stopgo.mission.mavlink.items import Command, Item
-from stopgo.mission.transform import SiteOrigin
 from stopgo.recordings.logs.field_log import (
     Channel,
     FieldLog,

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stopgo.mission.document import Mission
-from stopgo.mission.events import AnyEvent
-from stopgo.mission.geodesy import Geodetic, from_geodetic
+from stopgo.mission.frames.geodesy import Geodetic, from_geodetic
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.mavlink.items import Item
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.run.events import AnyEvent
 
 Stamps = Literal["header", "log"]
 RemarkKind = Literal["mode", "command", "trigger", "reached", "text"]
@@ -69,7 +69,7 @@ class Poses:
     origin: SiteOrigin | None = None
     """Where on earth (0, 0) is, where the source tells that; x is then east and y north."""
     rule: str = "wgs84"
-    """One of `stopgo.mission.geodesy.RULES`: how whoever measured them turns degrees into metres."""
+    """One of `stopgo.mission.frames.geodesy.RULES`: how whoever measured them turns degrees into metres."""
     truth: bool = False
     """From a simulator, which knows where the robot was; never taken for what the robot knew."""
     oddities: tuple[str, ...] = ()

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from stopgo.mission.plugins import Variant, installed, variant
+from stopgo.mission.console.plugins import Variant, installed, variant
 from stopgo.recordings.logs.field_log import FieldLog
 
 CLOCKS = ("wall", "since boot", "simulated")

@@ -6,7 +6,7 @@ from collections import Counter
 from datetime import UTC, datetime
 from typing import Any
 
-from stopgo.mission.table import duration, table
+from stopgo.mission.console.table import duration, table
 from stopgo.recordings.logs.field_log import FieldLog, Poses
 
 SHOWN = 12

@@ -12,11 +12,11 @@ from tempfile import TemporaryDirectory
 import msgspec
 import numpy as np
 
-from stopgo.mission.decoding import one_decode_error
 from stopgo.mission.document import Mission
+from stopgo.mission.document.decoding import one_decode_error
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import AnyEvent, event_of
 from stopgo.mission.geometry import frozen
+from stopgo.mission.run.events import AnyEvent, event_of
 from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, poses_of
 from stopgo.recordings.logs.files import digest_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from stopgo.mission.errors import InputError
-from stopgo.recordings.carried.reading import read_recording
+from stopgo.recordings.embedded.reading import read_recording
 from stopgo.recordings.logs.field_log import FieldLog, Reading, poses_of
 from stopgo.recordings.logs.own import SITE, own_log, poses_of_events
 

@@ -21,11 +21,11 @@ os.environ.setdefault("MAVLINK20", "1")
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.mavlink.autopilots import autopilot_named, autopilot_of
 from stopgo.mission.mavlink.autopilots.kind import ROVERS
 from stopgo.mission.mavlink.items import Command, Item
-from stopgo.mission.transform import SiteOrigin
 from stopgo.recordings.logs.field_log import (
     Channel,
     FieldLog,

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.mavlink.autopilots.kind import Mode
 from stopgo.mission.mavlink.autopilots.px4 import PX4
 from stopgo.mission.mavlink.items import Item
-from stopgo.mission.transform import SiteOrigin
 from stopgo.recordings.logs.field_log import Channel, FieldLog, Poses, Reading, Remark, fixes_of, poses_of
 from stopgo.recordings.logs.files import digest_of
 

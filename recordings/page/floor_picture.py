@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from stopgo.mission.comparison import Comparison
+from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.events import Held, LinkLost, Paused
 from stopgo.mission.files.svg import text_width
 from stopgo.mission.geometry import BoolArray, FloatArray, bounds
-from stopgo.mission.planning import Targets
-from stopgo.mission.run.way import legs_of
-from stopgo.mission.seen import runs_of
+from stopgo.mission.run.events import Held, LinkLost, Paused
+from stopgo.mission.run.route_position import legs_of
+from stopgo.mission.stages import Targets
+from stopgo.mission.stages.covered_intervals import runs_of
 from stopgo.recordings.page.style import BLUE, GREY, INK, PALE, PURPLE, VERMILION, YELLOW
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import shown, tag

@@ -7,15 +7,15 @@ from hashlib import file_digest
 from typing import Any
 
 from stopgo.mission.errors import InputError
-from stopgo.mission.run_log import LogSource
-from stopgo.mission.stop_reasons import StopReason
-from stopgo.recordings.carried.findings import CarriedFindings, findings_in
-from stopgo.recordings.carried.floor_lines import FloorLines, floor_lines
-from stopgo.recordings.carried.plan import origin_in
-from stopgo.recordings.carried.reading import Recording
-from stopgo.recordings.carried.reasons import reasons_in
+from stopgo.mission.run.run_log import LogSource
+from stopgo.mission.stages.stop_reasons import StopReason
+from stopgo.recordings.embedded.findings import CarriedFindings, findings_in
+from stopgo.recordings.embedded.floor_lines import FloorLines, floor_lines
+from stopgo.recordings.embedded.plan import origin_in
+from stopgo.recordings.embedded.reading import Recording
+from stopgo.recordings.embedded.reasons import reasons_in
+from stopgo.recordings.page.reviewed import RecordingReview, Review, missions_of, sights_of, what_next
 from stopgo.recordings.page.subject import ReportSubject
-from stopgo.recordings.review import RecordingReview, Review, missions_of, sights_of, what_next
 
 
 def subject_of(review: Review) -> ReportSubject:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stopgo.mission.comparison import Comparison
-from stopgo.mission.events import Scanned
+from stopgo.mission.comparing.comparison import Comparison
+from stopgo.mission.console.table import duration
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.table import duration
+from stopgo.mission.run.events import Scanned
 from stopgo.recordings.page.style import BLUE, GREY, PURPLE, VERMILION
 from stopgo.recordings.page.words import shown, tag
 

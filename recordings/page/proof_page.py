@@ -6,12 +6,19 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from stopgo.mission.figures import percent
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.plan_proof import CloudQuality, PlanProof, PromisedShare, ScanPair
-from stopgo.mission.proof_text import assumed_words, coverage_words, missed_words, network_words, verdict
-from stopgo.recordings.carried.floor_lines import FloorLines
+from stopgo.mission.proof.plan_proof import CloudQuality, PlanProof, PromisedShare, ScanPair
+from stopgo.mission.proof.proof_text import (
+    assumed_words,
+    coverage_words,
+    missed_words,
+    network_words,
+    verdict,
+)
+from stopgo.mission.stages.figures import percent
+from stopgo.recordings.drawing.strokes import name_point, outlines
+from stopgo.recordings.embedded.floor_lines import FloorLines
 from stopgo.recordings.page import whole_page
 from stopgo.recordings.page.floor_picture import (
     PictureFrame,
@@ -24,7 +31,6 @@ from stopgo.recordings.page.floor_picture import (
 from stopgo.recordings.page.style import ANSWERS, BLUE, GREEN, GREY, VERMILION
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.page.words import grid, number, row, section, shown, tag, tile
-from stopgo.recordings.strokes import name_point, outlines
 
 UNMET_SHOWN = 12
 """Sentences of what is not met that stand in the band; the tables have all."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from stopgo.mission.acquired import Acquired
-from stopgo.mission.comparison import Comparison, StopComparison
+from stopgo.mission.comparing.acquired import Acquired
+from stopgo.mission.comparing.comparison import Comparison, StopComparison
+from stopgo.mission.console.table import duration
 from stopgo.mission.document import Stop
-from stopgo.mission.events import Scanned
-from stopgo.mission.figures import Share, percent
-from stopgo.mission.page import route_length
-from stopgo.mission.schedule import schedule
-from stopgo.mission.table import duration
+from stopgo.mission.document.schedule import schedule
+from stopgo.mission.files.mission_text import route_length
+from stopgo.mission.run.events import Scanned
+from stopgo.mission.stages.figures import Share, percent
 from stopgo.recordings.page.floor_picture import legend, line_sample, plan_picture
 from stopgo.recordings.page.plots import plots
 from stopgo.recordings.page.stop_table import stop_table

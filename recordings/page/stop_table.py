@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stopgo.mission.figures import percent
-from stopgo.mission.stop_reasons import LEAST_TOLD, StopReason
+from stopgo.mission.stages.figures import percent
+from stopgo.mission.stages.stop_reasons import LEAST_TOLD, StopReason
 from stopgo.recordings.page.words import grid, number, row, section, shown
 
 

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from stopgo.mission.comparing.judging import Judgement, judge
-from stopgo.mission.comparison import Comparison
+from stopgo.mission.comparing.comparison import Comparison
+from stopgo.mission.comparing.run_verdict import Judgement, judge
 from stopgo.mission.document import Mission
-from stopgo.mission.run_log import LogSource
-from stopgo.mission.sight import Sight
-from stopgo.mission.stop_reasons import StopReason
-from stopgo.recordings.carried.findings import CarriedFindings
-from stopgo.recordings.carried.floor_lines import FloorLines
+from stopgo.mission.run.run_log import LogSource
+from stopgo.mission.stages.sight import Sight
+from stopgo.mission.stages.stop_reasons import StopReason
+from stopgo.recordings.embedded.findings import CarriedFindings
+from stopgo.recordings.embedded.floor_lines import FloorLines
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from stopgo.mission.console.table import printable
 from stopgo.mission.files.svg import clean
-from stopgo.mission.table import printable
 
 
 def shown(content: object) -> str:

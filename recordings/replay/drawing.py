@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from stopgo.mission.events import AnyEvent, Pose, PoseReport, StateReport
-from stopgo.recordings.field import FieldRecording
+from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, StateReport
 from stopgo.recordings.replay.replayed import Replay
+from stopgo.recordings.runs.field import FieldRecording
 
 STEP_M, STEP_RAD, STEP_S = 0.02, math.radians(2.0), 2.0
 """A pose that is as near as this to the one before is left out."""

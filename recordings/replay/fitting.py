@@ -11,7 +11,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.geometry import FloatArray
 from stopgo.recordings.replay.matching import matched, reaches
-from stopgo.recordings.replay.standing import Standing
+from stopgo.recordings.replay.standstills import Standing
 
 LOOK_AHEAD = 4
 """Stops up to this many places apart are tried as pairs: between them some may be skipped."""

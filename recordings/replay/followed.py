@@ -6,12 +6,12 @@ from pathlib import Path
 
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import AnyEvent, Arrived
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.following.followed_run import FollowedRun
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.recognise import recognise
+from stopgo.mission.run.events import AnyEvent, Arrived
 from stopgo.recordings.logs.field_log import FieldLog, LoggedMission
 from stopgo.recordings.logs.telemetry_log import FORMAT, messages_of
 from stopgo.recordings.replay.log_placing import PlacedLog

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.events import (
+from stopgo.mission.run.events import (
     AnyEvent,
     Arrived,
     Failed,
@@ -25,10 +25,10 @@ from stopgo.mission.events import (
     Started,
     Unconfirmed,
 )
-from stopgo.mission.run_log import Track
+from stopgo.mission.run.run_log import Track
 from stopgo.recordings.logs.field_log import Remark
 from stopgo.recordings.replay.matching import Match, long_enough
-from stopgo.recordings.replay.standing import Standing
+from stopgo.recordings.replay.standstills import Standing
 
 
 @dataclass(frozen=True)

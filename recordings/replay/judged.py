@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from stopgo.mission.acquired import Certainty
-from stopgo.mission.comparing.judging import Judgement, named
-from stopgo.mission.comparison import DONE, StopComparison
-from stopgo.mission.figures import percent
+from stopgo.mission.comparing.acquired import Certainty
+from stopgo.mission.comparing.comparison import DONE, StopComparison
+from stopgo.mission.comparing.run_verdict import Judgement, named
+from stopgo.mission.stages.figures import percent
 from stopgo.recordings.replay.replayed import Replay
 
 

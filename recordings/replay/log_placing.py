@@ -10,15 +10,15 @@ import numpy as np
 
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
-from stopgo.mission.geodesy import Geodetic, from_geodetic
+from stopgo.mission.frames.geodesy import Geodetic, from_geodetic
+from stopgo.mission.frames.transform import Transform
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.mavlink.local_frame import is_elsewhere
-from stopgo.mission.run_log import Alignment, Track
-from stopgo.mission.transform import Transform
+from stopgo.mission.run.run_log import Alignment, Track
 from stopgo.recordings.logs.field_log import FieldLog, Poses
 from stopgo.recordings.logs.own import AT_EVENTS, SITE
 from stopgo.recordings.replay.fitting import Fit, fitted, turning
-from stopgo.recordings.replay.standing import standings
+from stopgo.recordings.replay.standstills import standings
 
 Align = Literal["first", "stops"]
 FAR_M = 20_000.0

@@ -15,8 +15,8 @@ import numpy as np
 
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.run_log import Track
-from stopgo.recordings.replay.standing import Standing
+from stopgo.mission.run.run_log import Track
+from stopgo.recordings.replay.standstills import Standing
 
 HaltKind = Literal["visit", "again", "back", "extra"]
 EXTRA, SKIP, PASSED, AGAIN, BACK = 1.0, 0.4, 0.1, 0.05, 0.6

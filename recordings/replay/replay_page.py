@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from stopgo.mission.comparison import Comparison
-from stopgo.mission.figures import percent
+from stopgo.mission.comparing.comparison import Comparison
+from stopgo.mission.stages.figures import percent
 from stopgo.recordings.page.from_recordings import subject_of
+from stopgo.recordings.page.reviewed import Review
 from stopgo.recordings.page.subject import ReportSubject
 from stopgo.recordings.replay.judged import judged, missing, outside
 from stopgo.recordings.replay.replay_text import measured_lines, notes_of, truth_lines, way_lines
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.way_and_time import lost_times, way_track
-from stopgo.recordings.review import Review
 
 RunLines = tuple[str, tuple[str, ...]]
 """A title and its lines."""

@@ -7,12 +7,12 @@ import io
 import math
 from typing import Any
 
-from stopgo.mission.as_driven import AsDriven
-from stopgo.mission.comparing.telling import comparison_json, comparison_table
-from stopgo.mission.figures import percent
-from stopgo.mission.measured import Measured
-from stopgo.mission.run_log import Alignment
-from stopgo.mission.table import printable, table
+from stopgo.mission.comparing.as_driven import AsDriven
+from stopgo.mission.comparing.comparison_text import comparison_json, comparison_table
+from stopgo.mission.comparing.measured import Measured
+from stopgo.mission.console.table import printable, table
+from stopgo.mission.run.run_log import Alignment
+from stopgo.mission.stages.figures import percent
 from stopgo.recordings.logs.field_log import FieldLog
 from stopgo.recordings.replay.judged import judged
 from stopgo.recordings.replay.replayed import Replay

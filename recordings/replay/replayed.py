@@ -8,13 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from stopgo.mission.as_driven import AsDriven
-from stopgo.mission.comparison import Comparison
+from stopgo.mission.comparing.as_driven import AsDriven
+from stopgo.mission.comparing.comparison import Comparison
+from stopgo.mission.comparing.measured import Measured
 from stopgo.mission.document import Mission
-from stopgo.mission.events import Scanned, Unconfirmed
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.measured import Measured
-from stopgo.mission.run_log import RunLog
+from stopgo.mission.run.events import Scanned, Unconfirmed
+from stopgo.mission.run.run_log import RunLog
 from stopgo.recordings.logs.field_log import FieldLog
 from stopgo.recordings.replay.log_placing import PlacedLog
 from stopgo.recordings.replay.matching import Match

@@ -12,18 +12,18 @@ import numpy as np
 from stopgo.mission.comparing.compare import compare
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import AnyEvent
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.run.way import legs_of
-from stopgo.mission.run_log import LogSource, RunLog, Track
-from stopgo.mission.sight import Sight
+from stopgo.mission.run.events import AnyEvent
+from stopgo.mission.run.route_position import legs_of
+from stopgo.mission.run.run_log import LogSource, RunLog, Track
+from stopgo.mission.stages.sight import Sight
 from stopgo.recordings.logs.field_log import FieldLog, Remark
 from stopgo.recordings.replay.followed import followed_events
 from stopgo.recordings.replay.inferring import events_of
 from stopgo.recordings.replay.log_placing import PlacedLog, Placing, placed
 from stopgo.recordings.replay.matching import Match, matched, reaches
 from stopgo.recordings.replay.replayed import Replay
-from stopgo.recordings.replay.standing import Standing, standings
+from stopgo.recordings.replay.standstills import Standing, standings
 from stopgo.recordings.replay.told_visits import told_visits
 from stopgo.recordings.replay.uploaded import differences_of
 

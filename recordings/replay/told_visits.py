@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate, groupby
 
 from stopgo.mission.document import Mission
-from stopgo.mission.events import AnyEvent, Arrived, Homing, Pose
+from stopgo.mission.run.events import AnyEvent, Arrived, Homing, Pose
 from stopgo.recordings.replay.matching import HaltKind, Match
-from stopgo.recordings.replay.standing import Standing
+from stopgo.recordings.replay.standstills import Standing
 
 
 def told_visits(events: Sequence[AnyEvent], mission: Mission, halts: Iterable[Standing]) -> tuple[Match, ...]:

@@ -11,11 +11,11 @@ from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports.assembling import mission_of
 from stopgo.mission.files.imports.item_track import Listed, track_of
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.recognise import PLACES, recognise
 from stopgo.mission.mavlink.recognised_tour import RecognisedStop, recognised_tour
 from stopgo.mission.settings import Settings
-from stopgo.mission.transform import SiteOrigin
 from stopgo.recordings.logs.field_log import FieldLog, LoggedMission
 
 SAME_M, SAME_S = 0.02, 0.05

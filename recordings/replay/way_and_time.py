@@ -9,8 +9,8 @@ import numpy as np
 
 from stopgo.mission.document import Mission
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.run.way import legs_of
-from stopgo.mission.run_log import Track
+from stopgo.mission.run.route_position import legs_of
+from stopgo.mission.run.run_log import Track
 from stopgo.recordings.replay.matching import Match
 from stopgo.recordings.replay.replayed import Replay
 

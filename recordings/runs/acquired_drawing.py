@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from stopgo.mission.events import Aborted, AnyEvent, Finished, Scanned, Skipped
-from stopgo.mission.figures import percent
 from stopgo.mission.geometry import BoolArray, FloatArray
-from stopgo.mission.seen import runs_of
-from stopgo.mission.sight import SeenFrom, Sight
-from stopgo.recordings import entities, palette
-from stopgo.recordings.canvas import Canvas, on_screen
-from stopgo.recordings.pens import ORDER, Pen, style
-from stopgo.recordings.robot import Draw
+from stopgo.mission.run.events import Aborted, AnyEvent, Finished, Scanned, Skipped
+from stopgo.mission.stages.covered_intervals import runs_of
+from stopgo.mission.stages.figures import percent
+from stopgo.mission.stages.sight import SeenFrom, Sight
+from stopgo.recordings.drawing import entities, palette
+from stopgo.recordings.drawing.canvas import Canvas, on_screen
+from stopgo.recordings.drawing.pens import ORDER, Pen, style
+from stopgo.recordings.drawing.robot import Draw
 
 BOLD_PX, THICK_PX = 2.5, 5.0
 """Radii in points of the screen of what was seen and of what was lost."""

@@ -10,9 +10,10 @@ import msgspec
 import numpy as np
 import rerun as rr
 
-from stopgo.mission.comparing.late_beside import LateBeside
+from stopgo.mission.comparing.delayed_deviation import LateBeside
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.events import (
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.run.events import (
     Aborted,
     AnyEvent,
     Arrived,
@@ -30,19 +31,18 @@ from stopgo.mission.events import (
     StateReport,
     Unconfirmed,
 )
-from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.mission.run_log import Track
-from stopgo.mission.sight import Sight
-from stopgo.mission.tolerance import deviation, scanned_beside
-from stopgo.recordings import entities, palette, strokes
-from stopgo.recordings.canvas import Canvas, on_screen
-from stopgo.recordings.pens import ORDER, Pen, style
-from stopgo.recordings.robot import Draw, draw_robot, quaternions
+from stopgo.mission.run.run_log import Track
+from stopgo.mission.run.tolerance import deviation, scanned_beside
+from stopgo.mission.stages.sight import Sight
+from stopgo.recordings.drawing import entities, palette, strokes
+from stopgo.recordings.drawing.canvas import Canvas, on_screen
+from stopgo.recordings.drawing.pens import ORDER, Pen, style
+from stopgo.recordings.drawing.robot import Draw, draw_robot, quaternions
+from stopgo.recordings.plan.mission import ABOVE_FLOOR, state_colours
 from stopgo.recordings.runs.acquired_drawing import AcquiredDrawing
 from stopgo.recordings.runs.report import StopRecord, run_report
 from stopgo.recordings.runs.revision import change_between, draw_change
 from stopgo.recordings.runs.trail import Thinner, Trail
-from stopgo.recordings.stages.mission import ABOVE_FLOOR, state_colours
 
 SOLID_S = 0.5
 """How often the robot moves in 3D."""

@@ -7,8 +7,17 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.events import Aborted, AnyEvent, Arrived, Failed, Finished, Scanned, Skipped, Unconfirmed
-from stopgo.mission.tolerance import deviation, scanned_beside
+from stopgo.mission.run.events import (
+    Aborted,
+    AnyEvent,
+    Arrived,
+    Failed,
+    Finished,
+    Scanned,
+    Skipped,
+    Unconfirmed,
+)
+from stopgo.mission.run.tolerance import deviation, scanned_beside
 
 
 @dataclass(frozen=True)

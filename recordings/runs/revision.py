@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import rerun as rr
 
 from stopgo.mission.document import Mission, Stop
-from stopgo.recordings import entities, palette
-from stopgo.recordings.canvas import Canvas
-from stopgo.recordings.palette import Colour
-from stopgo.recordings.robot import Draw
-from stopgo.recordings.stages.mission import Leg, StopMarks, legs_of, route_lines, stop_marks
+from stopgo.recordings.drawing import entities, palette
+from stopgo.recordings.drawing.canvas import Canvas
+from stopgo.recordings.drawing.palette import Colour
+from stopgo.recordings.drawing.robot import Draw
+from stopgo.recordings.plan.mission import Leg, StopMarks, legs_of, route_lines, stop_marks
 
 STEP = 0.02
 """How far what a revision changes lies above what was drawn before, as a share of a step of ORDER."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
-from stopgo.mission.run_log import Track
+from stopgo.mission.run.run_log import Track
 
 SAME_M, SAME_RAD, SAME_S = 0.001, math.radians(0.1), 1.0
 """A pose this near to the last one is left out, but for one each second."""

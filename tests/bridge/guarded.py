@@ -11,7 +11,7 @@ from stopgo.bridge.link.keys import HolderRole, now_utc, read_keys
 from stopgo.bridge.link.memory_link import SealedMessage, Switchboard
 from stopgo.bridge.link.seals import KeySeals
 from stopgo.bridge.station.station import Station
-from stopgo.mission.events import StateReport
+from stopgo.mission.run.events import StateReport
 from tests.bridge.world import Field
 
 HOLDERS: tuple[tuple[HolderRole, str], ...] = (

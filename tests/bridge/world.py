@@ -16,10 +16,10 @@ from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import Commit, KeyExpressions, Manifest
 from stopgo.bridge.link.seals import NO_SEALS, Seals
 from stopgo.bridge.robot.agent import Agent
-from stopgo.bridge.robot.bodies import pose_of
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
 from stopgo.bridge.robot.journal import Journal, memory_journal
+from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.runner import state_report
 from stopgo.bridge.robot.simulator import NO_FAULTS, Faults, SimulatedBase, SimulatedScanner, Wear
 from stopgo.bridge.station.station import Station
@@ -37,7 +37,7 @@ from stopgo.mission.document import (
     Stop,
     sealed,
 )
-from stopgo.mission.events import StateReport
+from stopgo.mission.run.events import StateReport
 from stopgo.mission.run.orders import Answer, Order, Verb
 from stopgo.mission.run.revision import RevisionPolicy
 from stopgo.mission.run.states import Run

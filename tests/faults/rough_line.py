@@ -23,7 +23,7 @@ from pathlib import Path
 
 from stopgo.bridge.commands.spawn import end_robot, start_robot
 from stopgo.bridge.station.station import Station, connect
-from stopgo.mission.events import PoseReport, StateReport
+from stopgo.mission.run.events import PoseReport, StateReport
 from tests.bridge.world import corridor
 
 TUNSETIFF, IFF_TUN, IFF_NO_PI, CLONE_NEWNET = 0x400454CA, 0x0001, 0x1000, 0x40000000

@@ -22,15 +22,15 @@ from stopgo.bridge.link.protocol import KeyExpressions, Rejected
 from stopgo.bridge.link.seals import KeySeals
 from stopgo.bridge.robot import agent as agents
 from stopgo.bridge.robot.agent import Agent
-from stopgo.bridge.robot.bodies import pose_of
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
 from stopgo.bridge.robot.journal import memory_journal
+from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import AnswerIsNo, InputError
-from stopgo.mission.events import AnyEvent, Finished, PoseReport, Scanned, StateReport
+from stopgo.mission.run.events import AnyEvent, Finished, PoseReport, Scanned, StateReport
 from stopgo.mission.run.lease import lasting_ns
 from stopgo.mission.run.orders import Answer, Verb
 from tests.bridge.guarded import GuardedField, keys_of_site

@@ -17,7 +17,7 @@ import pytest
 from stopgo.bridge.link.link import Request
 from stopgo.bridge.link.protocol import encode
 from stopgo.mission.document import Mission
-from stopgo.mission.events import Event, Finished, Scanned, Started
+from stopgo.mission.run.events import Event, Finished, Scanned, Started
 from stopgo.mission.run.orders import Answer, Order, Verb
 from stopgo.mission.run.states import Run
 from tests.bridge.robot.test_push import manifest_of

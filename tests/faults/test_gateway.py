@@ -17,8 +17,8 @@ from stopgo.bridge.mavlink.simulated.vehicle_scanner import ScanEnd, VehicleScan
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import AnswerIsNo
-from stopgo.mission.events import Pose, PoseReport, Scanned, StateReport
-from stopgo.mission.run.way import foot
+from stopgo.mission.run.events import Pose, PoseReport, Scanned, StateReport
+from stopgo.mission.run.route_position import foot
 from tests.bridge.mavlink.driving.world import (
     Operator,
     Rover,

@@ -30,7 +30,7 @@ from stopgo.bridge.robot.journal import open_journal
 from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.document import Mission, Scan
 from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
-from stopgo.mission.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started
+from stopgo.mission.run.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started
 from stopgo.mission.run.orders import Order
 from tests.bridge.world import corridor
 from tests.faults.sizes import size

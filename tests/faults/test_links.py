@@ -16,7 +16,7 @@ from stopgo.bridge.link.protocol import KeyExpressions, encode
 from stopgo.bridge.station.follow import Report
 from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
-from stopgo.mission.events import Finished, PoseReport, Scanned, StateReport
+from stopgo.mission.run.events import Finished, PoseReport, Scanned, StateReport
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor
 from tests.ports import free_port

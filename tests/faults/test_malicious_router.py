@@ -22,8 +22,8 @@ from stopgo.bridge.link.protocol import encode
 from stopgo.bridge.link.seals import OLDEST_S
 from stopgo.bridge.station import station as stations
 from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
-from stopgo.mission.events import Scanned, Started, StateReport
 from stopgo.mission.run.decision import STATES
+from stopgo.mission.run.events import Scanned, Started, StateReport
 from stopgo.mission.run.orders import FREE_VERBS, Answer, Order, Verb
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import corridor

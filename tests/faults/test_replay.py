@@ -12,7 +12,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.recordings.replay.fitting import fitted
 from stopgo.recordings.replay.matching import Match, long_enough, matched
-from stopgo.recordings.replay.standing import standings
+from stopgo.recordings.replay.standstills import standings
 from tests.faults.sizes import size
 from tests.recordings.replay.driving import BEGIN_NS, Drive, Odd, Senses, driven, logged, wandering
 

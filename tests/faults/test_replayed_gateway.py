@@ -14,13 +14,13 @@ import pytest
 from stopgo.bridge.mavlink.simulated.rover import Rover as Wheels
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
 from stopgo.mission.document import Mission
-from stopgo.mission.events import AnyEvent, Pose, PoseReport, StateReport
-from stopgo.recordings.field import FieldRecording
+from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, StateReport
 from stopgo.recordings.logs import read_log
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
 from stopgo.recordings.replay.way_and_time import way_of
+from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.mavlink.driving.world import SITE, gateway, rover, site_mission
 from tests.faults.sizes import size
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from stopgo.mission.comparing.compare import arriving
-from stopgo.mission.comparison import StopComparison
+from stopgo.mission.comparing.comparison import StopComparison
 from stopgo.mission.document import Stop
 from stopgo.recordings.logs import read_log
 from stopgo.recordings.replay.log_placing import Placing

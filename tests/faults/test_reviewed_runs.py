@@ -20,16 +20,16 @@ from msgspec.structs import replace
 
 from stopgo.command_line import main
 from stopgo.mission.comparing.compare import arriving
-from stopgo.mission.comparing.telling import HEADER, comparison_json, comparison_text
+from stopgo.mission.comparing.comparison_text import HEADER, comparison_json, comparison_text
+from stopgo.mission.comparing.run_collector import HeardRun
+from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission, Stop, sealed
-from stopgo.mission.events import Held, RevisionTaken
-from stopgo.mission.figures import percent
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.geometry import frozen
-from stopgo.mission.heard_run import HeardRun
-from stopgo.mission.schedule import schedule
-from stopgo.mission.sight import SeenFrom, Sight
-from stopgo.mission.table import duration
-from stopgo.recordings.carried import reading
+from stopgo.mission.run.events import Held, RevisionTaken
+from stopgo.mission.stages.figures import percent
+from stopgo.mission.stages.sight import SeenFrom, Sight
+from stopgo.recordings.embedded import reading
 from stopgo.recordings.plan import PlanRecording
 from tests.faults.sizes import size
 from tests.mission.comparing.test_compare import planned

@@ -15,11 +15,11 @@ import msgspec
 import pytest
 
 from stopgo.bridge.link.clock import SimulatedClock
-from stopgo.bridge.robot.bodies import pose_of
 from stopgo.bridge.robot.journal import Journal, open_journal
 from stopgo.bridge.robot.program import clocks
+from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import Fault, Faults
-from stopgo.mission.events import Aborted, Finished, Scanned, Skipped, Started
+from stopgo.mission.run.events import Aborted, Finished, Scanned, Skipped, Started
 from tests.bridge.world import Field, corridor
 from tests.faults.sizes import size
 

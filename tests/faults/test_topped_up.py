@@ -11,7 +11,7 @@ import pytest
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
 from stopgo.mission.files.mission_json import read
-from stopgo.planner.further import as_driven, planned_floor
+from stopgo.planner.pipeline.follow_up_mission import as_driven, planned_floor
 from tests.planner.test_command import drawn
 from tests.recordings.replay.witnessed import Troubles, Witness, run_of
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from stopgo.mission.files import mission_json
-from stopgo.recordings.read import check
+from stopgo.recordings.rrd.read import check
 from tests.journeys.readme import PRINTED, blocks, commands, robot, run, with_output, workplace
 from tests.ports import free_port
 

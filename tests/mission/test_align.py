@@ -15,8 +15,8 @@ from stopgo.bridge.commands.robot_commands import read_map
 from stopgo.command_line import main
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import read, write
-from stopgo.mission.rigid_fit import rigid_fit
-from stopgo.mission.turning import turned
+from stopgo.mission.frames.frame_transform import turned
+from stopgo.mission.frames.rigid_fit import rigid_fit
 from tests.mission.worlds import square_tour
 
 CORNERS = np.array([(0.0, 0.0), (8.0, 0.0), (8.0, 6.0)])
@@ -37,7 +37,7 @@ numbers = st.floats(-1e3, 1e3)
 
 @given(x=numbers, y=numbers, heading=st.floats(-3.1, 3.1), far=numbers)
 def test_any_turn_and_shift_is_found(x: float, y: float, heading: float, far: float) -> None:
-    from stopgo.mission.transform import Transform
+    from stopgo.mission.frames.transform import Transform
 
     wanted = Transform(x=x, y=y, heading=heading)
     site = CORNERS + far

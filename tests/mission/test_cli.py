@@ -12,9 +12,9 @@ import msgspec
 import pytest
 
 from stopgo.command_line import main
+from stopgo.mission.console.table import duration, table
 from stopgo.mission.document import Mission, Sees
 from stopgo.mission.files.mission_json import write
-from stopgo.mission.table import duration, table
 from tests.mission.worlds import square_tour
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from stopgo.mission.files.coverage_json import coverage_json, write_coverage
 from stopgo.mission.geometry import frozen
-from stopgo.mission.seen import runs_of
+from stopgo.mission.stages.covered_intervals import runs_of
 from tests.mission.worlds import room_floor, room_mission, room_route, room_targets
 
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from stopgo.mission.geodesy import (
+from stopgo.mission.frames.geodesy import (
     RULES,
     STEPS_PER_DEGREE,
     Geodetic,
@@ -15,7 +15,7 @@ from stopgo.mission.geodesy import (
     heading_of,
     to_geodetic,
 )
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.transform import SiteOrigin
 
 SITES = [
     SiteOrigin(lat=47.3769, lon=8.5417, alt=408.0, heading_deg=30.0),

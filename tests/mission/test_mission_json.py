@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from stopgo.mission.document import Mission, canonical, digest_of, sealed
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import encode, next_revision, parse, read, write
-from stopgo.mission.transform import Transform
+from stopgo.mission.frames.transform import Transform
 from tests.mission.worlds import mission_of, square_tour, stop
 
 DOCUMENT: dict[str, Any] = json.loads(encode(square_tour()))

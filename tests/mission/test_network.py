@@ -6,9 +6,9 @@ import msgspec
 import pytest
 
 from stopgo.mission.document import Overlap, digest_of, sealed, stop_names
+from stopgo.mission.document.problems import problems_of
 from stopgo.mission.files.mission_json import encode, parse
-from stopgo.mission.network import Network, apart_in_words, network_lines, network_of, network_table
-from stopgo.mission.problems import problems_of
+from stopgo.mission.stages.network import Network, apart_in_words, network_lines, network_of, network_table
 from tests.mission.worlds import square_tour as a_mission
 
 

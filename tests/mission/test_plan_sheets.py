@@ -9,11 +9,11 @@ import zlib
 import numpy as np
 import pytest
 
-from stopgo.mission.figures import Figures, Share, Unreached
 from stopgo.mission.files import plan_sheets
 from stopgo.mission.files.pdf import PdfPage, pdf_of
 from stopgo.mission.files.plan_sheets import plan_pdf, rooms_of, sheets_of, tiles_of
 from stopgo.mission.files.svg import SMALLEST_TEXT
+from stopgo.mission.stages.figures import Figures, Share, Unreached
 from tests.mission.worlds import room_mission, room_route
 
 DATE = "2026-11-22"

@@ -21,7 +21,7 @@ from stopgo.mission.files.sheet import MARGIN, PAPERS, PaperBox, PaperSheet, She
 from stopgo.mission.files.svg import SMALLEST_TEXT, shortened, text_width
 from stopgo.mission.floor import Room
 from stopgo.mission.geometry import Polygon
-from stopgo.mission.planning import Route
+from stopgo.mission.stages import Route
 from tests.mission.worlds import box, mission_of, room_mission, room_route, stop
 
 SVG = "{http://www.w3.org/2000/svg}"

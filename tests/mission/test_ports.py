@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from stopgo.mission.ports import free_port
+from stopgo.mission.console.ports import free_port
 from tests import ports
 
 

@@ -9,8 +9,8 @@ import msgspec
 import pytest
 
 from stopgo.mission.document import Mission
-from stopgo.mission.problems import problems_of
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.document.problems import problems_of
+from stopgo.mission.frames.transform import SiteOrigin
 from tests.mission.worlds import room_mission, square_tour, stop
 
 change = msgspec.structs.replace

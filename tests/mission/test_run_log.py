@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stopgo.mission.events import AnyEvent, Finished, Started
-from stopgo.mission.run_log import Alignment, LogSource, RunLog, Track
+from stopgo.mission.run.events import AnyEvent, Finished, Started
+from stopgo.mission.run.run_log import Alignment, LogSource, RunLog, Track
 
 SOURCE = LogSource(name="field.rrd", format="rrd", digest="", messages=3)
 SECOND = 1_000_000_000

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stopgo.mission.document import Mission
-from stopgo.mission.schedule import schedule, straight_time, straight_times, turn_time
+from stopgo.mission.document.schedule import schedule, straight_time, straight_times, turn_time
 from tests.mission.worlds import mission_of, square_tour, stop
 
 

@@ -8,8 +8,8 @@ import msgspec
 import pytest
 
 from stopgo.mission.geometry import frozen
-from stopgo.mission.planning import Route, Visibility
-from stopgo.mission.stop_reasons import StopReason, driven_coverage, stop_reasons
+from stopgo.mission.stages import Route, Visibility
+from stopgo.mission.stages.stop_reasons import StopReason, driven_coverage, stop_reasons
 from tests.recordings import world
 
 

@@ -20,10 +20,12 @@ from stopgo.mission.document import (
     sealed,
 )
 from stopgo.mission.floor import Element, FloorPlan, Opening, Room
-from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import Polygon, frozen
-from stopgo.mission.kinds import KINDS
-from stopgo.mission.planning import (
+from stopgo.mission.settings import Settings
+from stopgo.mission.settings.element_kinds import KINDS
+from stopgo.mission.stages import (
     Candidates,
     NavigableSpace,
     OpeningState,
@@ -33,8 +35,6 @@ from stopgo.mission.planning import (
     Targets,
     Visibility,
 )
-from stopgo.mission.settings import Settings
-from stopgo.mission.transform import SiteOrigin
 
 
 def stop(name: str, *approach: tuple[float, float], heading: float = 0.0, units: int = 10) -> Stop:

@@ -10,14 +10,14 @@ import numpy as np
 import shapely
 
 from stopgo.mission.document import Mission, digest_of
+from stopgo.mission.document.problems import problems_of
 from stopgo.mission.files.mission_json import encode, parse
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import Polygon
-from stopgo.mission.planning import Candidates, NavigableSpace, Route, Selection, Visibility
-from stopgo.mission.problems import problems_of
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
+from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps_of
 from stopgo.planner.routing.roadmap import ways_between
-from stopgo.planner.shapes import GRID, local_origin, to_grid, whole_steps_of
 from stopgo.planner.space.targets import face_segments
 from tests.faults.sizes import FULL
 from tests.planner.oracle import visible_pairs

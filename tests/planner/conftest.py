@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-import stopgo.planner.sight.sight
+import stopgo.planner.visibility.sight.sight
 from tests.alone import first_alone
 from tests.faults.sizes import FULL
 from tests.planner.worlds import hall, planned
@@ -20,7 +20,7 @@ def _compiled() -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         if not FULL:
-            patch.setattr(stopgo.planner.sight.sight, "COMPILE_ABOVE", -1)
+            patch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", -1)
             with first_alone("kernel"):
                 planned(hall())
         yield

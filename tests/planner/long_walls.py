@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import shapely
 
-import stopgo.planner.sight.sight
-from stopgo.planner.shapes import GRID
+import stopgo.planner.visibility.sight.sight
+from stopgo.planner.geometry.shapes import GRID
 from tests.planner.sight.test_sight import World
 
 RANGES = (2.5, 5.0, 10.0, 30.0, 60.0, 100.0)
@@ -32,7 +32,7 @@ def told(seed: int, *, reach: float, places: int, monkeypatch: pytest.MonkeyPatc
     truth = world.by_force(reach)
     wrong = []
     for above in (-1, math.inf):
-        monkeypatch.setattr(stopgo.planner.sight.sight, "COMPILE_ABOVE", above)
+        monkeypatch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", above)
         wrong.append(int((world.by_kernel(reach) != truth).sum()))
     return Told(_looked_at(world, reach), *wrong)
 

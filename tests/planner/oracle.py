@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from stopgo.planner.sight.sightlines import Midpoints, sees
+from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
 
 
 def visible_pairs(viewpoints, edges, a, b, units, is_face, *, reach):

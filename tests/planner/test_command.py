@@ -13,10 +13,10 @@ import ezdxf
 import pytest
 
 from stopgo.command_line import main
+from stopgo.commands.plan_commands import plan_files
 from stopgo.mission.files.mission_json import read
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.settings import Settings
-from stopgo.planner.cli import plan_files
 from tests.disk import small_disk
 from tests.planner.worlds import FLOORS, SHARED
 
@@ -561,7 +561,7 @@ def test_a_plan_that_ends_in_the_middle_changes_nothing(
 
 INTERRUPTED = """
 import os, signal, sys
-import stopgo.planner.assemble
+import stopgo.planner.routing.assemble
 from stopgo.command_line import main
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background process inherits that it is ignored
@@ -569,7 +569,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a background process
 def interrupt(*_, **__):
     os.kill(os.getpid(), signal.SIGINT)
 
-stopgo.planner.assemble.assemble = interrupt
+stopgo.planner.routing.assemble.assemble = interrupt
 sys.exit(main(sys.argv[1:]))
 """
 

@@ -11,14 +11,14 @@ from pickle import UnpicklingError
 
 import pytest
 
-from stopgo.planner.compiling import anew_if_not_kept
+from stopgo.planner.geometry.compiling import anew_if_not_kept
 
 ROOT = Path(__file__).parents[2]
 NO_FILE_GROWS = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
 CALL = """
-import stopgo.planner.compiling, stopgo.planner.sight.kernel as kernel
-tell = stopgo.planner.compiling.compiled(kernel.within_reach)
-print(stopgo.planner.compiling.__file__, tell(3, 4, 3, 4, 1, 2, 5), tell(3, 4, 3, 4, 1, 2, 4))
+import stopgo.planner.geometry.compiling, stopgo.planner.visibility.sight.kernel as kernel
+tell = stopgo.planner.geometry.compiling.compiled(kernel.within_reach)
+print(stopgo.planner.geometry.compiling.__file__, tell(3, 4, 3, 4, 1, 2, 5), tell(3, 4, 3, 4, 1, 2, 4))
 """
 
 

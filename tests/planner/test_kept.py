@@ -7,7 +7,7 @@ import weakref
 from dataclasses import replace
 
 from stopgo.mission.settings import Settings
-from stopgo.planner.shapes import local_origin
+from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.space.reach import reach_of
 from tests.planner.worlds import two_rooms

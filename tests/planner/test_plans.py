@@ -14,8 +14,8 @@ from stopgo.mission.document import Mission
 from stopgo.mission.files.mission_json import encode
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import polyline_length
-from stopgo.mission.planning import Candidates, NavigableSpace, Selection
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Candidates, NavigableSpace, Selection
 from stopgo.planner import plan
 from stopgo.planner.appraisal.unreached import unreached
 from stopgo.planner.candidates import candidates

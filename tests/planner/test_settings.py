@@ -13,11 +13,11 @@ import pytest
 
 import stopgo
 from stopgo.command_line import main
+from stopgo.mission.document.specs import robot_of
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.plan_toml import read_settings, settings_toml
-from stopgo.mission.scanners import SCANNERS, ScannerName
 from stopgo.mission.settings import PARAMETERS, Settings, check_settings, told_of
-from stopgo.mission.specs import robot_of
+from stopgo.mission.settings.scanners import SCANNERS, ScannerName
 
 OTHER: dict[str, Any] = {
     "overlap": 0.25,

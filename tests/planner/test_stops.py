@@ -12,13 +12,13 @@ import pytest
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import Polygon
-from stopgo.mission.planning import DROP_REASONS, KEPT, Candidates
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import DROP_REASONS, KEPT, Candidates
 from stopgo.planner.appraisal.unreached import unreached
 from stopgo.planner.candidates import STRATEGIES, candidates
-from stopgo.planner.candidates.place import Place
 from stopgo.planner.routing.roadmap import ways_between
 from stopgo.planner.space.navigable import navigable
+from stopgo.planner.space.place import Place
 from tests.planner.worlds import (
     box,
     column,

@@ -15,15 +15,15 @@ from ezdxf.math import Matrix44
 
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, frozen
-from stopgo.mission.planning import KEPT, Candidates, NavigableSpace
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import KEPT, Candidates, NavigableSpace
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors.dxf import floor_in
-from stopgo.planner.shapes import GRID, local_origin, to_grid, to_shape
-from stopgo.planner.sight.sight import Scene, scene_of, sight
+from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, to_shape
 from stopgo.planner.space.connected import parts_of
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility.exact_sight import open_space
+from stopgo.planner.visibility.sight.sight import Scene, scene_of, sight
 
 POSITIONS = 24
 """Scan positions that look on every floor."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stopgo.recordings.palette import Colour
+from stopgo.recordings.drawing.palette import Colour
 
 EYES = {
     "all colours": np.eye(3),

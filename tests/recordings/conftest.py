@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from stopgo.mission.document import Mission
-from stopgo.mission.events import PoseReport, StateReport
-from stopgo.recordings.carried import reading
-from stopgo.recordings.field import FieldRecording
+from stopgo.mission.run.events import PoseReport, StateReport
+from stopgo.recordings.embedded import reading
 from stopgo.recordings.plan import PlanRecording
+from stopgo.recordings.runs.field import FieldRecording
 from tests.faults.sizes import FULL
 from tests.mission.comparing.test_compare import planned
 from tests.recordings import run, world

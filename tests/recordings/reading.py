@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from stopgo.recordings.read import chunks
+from stopgo.recordings.rrd.read import chunks
 
 Cell = tuple[dict[str, int], Any]
 """Index values by timeline (nothing for a static cell), and the list of values."""

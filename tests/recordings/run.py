@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import msgspec
 
 from stopgo.mission.document import Mission
-from stopgo.mission.events import (
+from stopgo.mission.run.events import (
     AnyEvent,
     Arrived,
     Event,
@@ -24,7 +24,7 @@ from stopgo.mission.events import (
     StateReport,
     StopState,
 )
-from stopgo.recordings.stages.drive import planned_drive
+from stopgo.recordings.plan.drive import planned_drive
 
 BEGAN_NS = 1_795_000_000_000_000_000
 RUN = "run-1"

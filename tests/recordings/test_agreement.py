@@ -7,15 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from stopgo.mission.plan import PartPlan
-from stopgo.mission.planning import Selection
+from stopgo.mission.stages import Selection
 from stopgo.planner.appraisal.figures_of_route import figures_of
-from stopgo.planner.report import PlanReport
-from stopgo.recordings.carried.reading import read_recording
+from stopgo.planner.commands.plan_report import PlanReport
+from stopgo.recordings.embedded.reading import read_recording
 from stopgo.recordings.page import report_html
 from stopgo.recordings.page.from_recordings import subject_of
+from stopgo.recordings.page.reviewed import reviewed
 from stopgo.recordings.plan import PlanRecording
-from stopgo.recordings.read import check
-from stopgo.recordings.review import reviewed
+from stopgo.recordings.rrd.read import check
 from tests.mission.comparing.test_compare import planned
 from tests.recordings import world
 from tests.recordings.reading import cells, static

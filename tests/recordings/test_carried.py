@@ -11,12 +11,12 @@ from rerun.chunk import RrdReader
 
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import PoseReport, StateReport
-from stopgo.mission.sight import Sight
-from stopgo.recordings.canvas import Sheet, open_canvas
-from stopgo.recordings.carried.reading import Recording, read_recording
-from stopgo.recordings.carried.sight import carry_sight, sights_in
-from stopgo.recordings.carried.values import Values
+from stopgo.mission.run.events import PoseReport, StateReport
+from stopgo.mission.stages.sight import Sight
+from stopgo.recordings.drawing.canvas import Sheet, open_canvas
+from stopgo.recordings.embedded.reading import Recording, read_recording
+from stopgo.recordings.embedded.sight import carry_sight, sights_in
+from stopgo.recordings.embedded.values import Values
 from tests.mission.comparing.test_compare import planned
 from tests.recordings import run, world
 

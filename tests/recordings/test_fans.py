@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from stopgo.recordings.fans import sight_outline
+from stopgo.recordings.drawing.fans import sight_outline
 
 EYE = np.array([2.0, 1.0])
 ROOM = [[(0, 0), (4, 0)], [(4, 0), (4, 3)], [(4, 3), (0, 3)], [(0, 3), (0, 0)]]

@@ -16,12 +16,13 @@ import pytest
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import Pose, PoseReport, Scanned, StateReport
-from stopgo.mission.run_log import Track
-from stopgo.recordings import entities, pieces
-from stopgo.recordings.compact import compact
-from stopgo.recordings.field import FieldRecording
-from stopgo.recordings.read import check
+from stopgo.mission.run.events import Pose, PoseReport, Scanned, StateReport
+from stopgo.mission.run.run_log import Track
+from stopgo.recordings.drawing import entities
+from stopgo.recordings.rrd import pieces
+from stopgo.recordings.rrd.compact import compact
+from stopgo.recordings.rrd.read import check
+from stopgo.recordings.runs.field import FieldRecording
 from stopgo.recordings.runs.report import run_report
 from stopgo.recordings.runs.trail import Trail
 from tests.disk import ROOMY, small_disk
@@ -326,7 +327,7 @@ def test_a_recording_that_was_cut_is_left_under_its_partial_name(tmp_path: Path,
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from stopgo.recordings.field import FieldRecording
+from stopgo.recordings.runs.field import FieldRecording
 from tests.recordings import run, world
 from tests.recordings.conftest import tell
 mission = world.nouns_at()[-1]

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from stopgo.recordings import headless, palette
-from stopgo.recordings.headless import has_vulkan
+from stopgo.recordings.drawing import palette
+from stopgo.recordings.viewing import headless
+from stopgo.recordings.viewing.headless import has_vulkan
 from tests.called import stopgo
 from tests.recordings import world
 from tests.recordings.conftest import write_plan

@@ -8,14 +8,14 @@ import pytest
 
 from stopgo.bridge.commands.watch_commands import tell_compared
 from stopgo.bridge.station.watch import hand_over
+from stopgo.mission.comparing.run_collector import HeardRun
 from stopgo.mission.document import Mission
-from stopgo.mission.events import StateReport
-from stopgo.mission.heard_run import HeardRun
-from stopgo.mission.sight import Sight
-from stopgo.recordings import entities
-from stopgo.recordings.carried.reading import read_recording
-from stopgo.recordings.field import FieldRecording
-from stopgo.recordings.read import check
+from stopgo.mission.run.events import StateReport
+from stopgo.mission.stages.sight import Sight
+from stopgo.recordings.drawing import entities
+from stopgo.recordings.embedded.reading import read_recording
+from stopgo.recordings.rrd.read import check
+from stopgo.recordings.runs.field import FieldRecording
 from tests.mission.comparing.test_compare import planned
 from tests.recordings import run
 

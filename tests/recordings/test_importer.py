@@ -14,9 +14,9 @@ from rerun.chunk import RrdReader
 import stopgo
 from stopgo.mission.document import Mission
 from stopgo.mission.files.mission_json import write
-from stopgo.recordings import entities
-from stopgo.recordings.importer import NOT_OURS
-from stopgo.recordings.read import MARK, Contents, check
+from stopgo.recordings.drawing import entities
+from stopgo.recordings.rrd.read import MARK, Contents, check
+from stopgo.recordings.viewing.importer import NOT_OURS
 from tests.recordings import world
 
 ROOT = Path(__file__).parents[2]

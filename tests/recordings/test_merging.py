@@ -8,9 +8,9 @@ import pytest
 
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
-from stopgo.recordings import entities
-from stopgo.recordings.carried.checking import problems_of
-from stopgo.recordings.carried.reading import read_recording
+from stopgo.recordings.drawing import entities
+from stopgo.recordings.embedded.checking import problems_of
+from stopgo.recordings.embedded.reading import read_recording
 from tests.recordings import run
 from tests.recordings.conftest import write_field
 from tests.recordings.test_views import assert_shown

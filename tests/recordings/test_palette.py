@@ -6,8 +6,8 @@ from itertools import combinations
 
 import pytest
 
-from stopgo.recordings import palette
-from stopgo.recordings.layout import BACKGROUND
+from stopgo.recordings.drawing import palette
+from stopgo.recordings.drawing.blueprint import BACKGROUND
 from stopgo.recordings.page import style
 from tests.recordings.colours import EYES, contrast, distance
 

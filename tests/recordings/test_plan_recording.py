@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from stopgo.mission.geometry import frozen
-from stopgo.mission.kinds import KINDS
-from stopgo.mission.planning import DROP_REASONS
-from stopgo.recordings import entities, palette
+from stopgo.mission.settings.element_kinds import KINDS
+from stopgo.mission.stages import DROP_REASONS
+from stopgo.recordings.drawing import entities, palette
 from stopgo.recordings.plan import PlanRecording
-from stopgo.recordings.read import check
+from stopgo.recordings.rrd.read import check
 from tests.recordings import world
 from tests.recordings.conftest import write_plan
 from tests.recordings.reading import cells, components, everything, on, static

@@ -10,10 +10,10 @@ import pytest
 import rerun as rr
 
 from stopgo.mission.errors import InputError
-from stopgo.recordings import read_apart
-from stopgo.recordings.carried import reading
-from stopgo.recordings.carried.reading import read_each, read_recording
-from stopgo.recordings.read import check
+from stopgo.recordings.embedded import reading
+from stopgo.recordings.embedded.reading import read_each, read_recording
+from stopgo.recordings.rrd import subprocess_read
+from stopgo.recordings.rrd.read import check
 
 BROKEN = {
     "empty": lambda data: b"",
@@ -26,7 +26,7 @@ BROKEN = {
 
 @pytest.fixture(autouse=True)
 def _another_process_reads_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reading, "fatal_faults", read_apart.fatal_faults)
+    monkeypatch.setattr(reading, "fatal_faults", subprocess_read.fatal_faults)
 
 
 @pytest.mark.parametrize("how", BROKEN)
@@ -69,7 +69,7 @@ def test_a_file_that_ends_its_reader_hides_no_other(
     started = []
     run = subprocess.run
     monkeypatch.setattr(subprocess, "run", lambda *a, **k: started.append(a) or run(*a, **k))
-    monkeypatch.setattr(read_apart, "CHILD", ENDING)
+    monkeypatch.setattr(subprocess_read, "CHILD", ENDING)
     names = ("a.rrd", "fatal-1.rrd", "unforeseen.rrd", "fatal-2.rrd", "c.rrd")
     for name in names:
         shutil.copy(plan, tmp_path / name)

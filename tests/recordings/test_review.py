@@ -13,9 +13,9 @@ import pytest
 
 from stopgo.command_line import main
 from stopgo.mission.document import Mission, sealed
-from stopgo.recordings.carried.checking import problems_of
-from stopgo.recordings.carried.reading import read_recording
-from stopgo.recordings.compact import VIEWER
+from stopgo.recordings.embedded.checking import problems_of
+from stopgo.recordings.embedded.reading import read_recording
+from stopgo.recordings.rrd.compact import VIEWER
 from tests.recordings import run, world
 
 

@@ -12,14 +12,14 @@ import pytest
 
 from stopgo.command_line import main
 from stopgo.mission.comparing.compare import compare
-from stopgo.mission.comparing.telling import comparison_table
+from stopgo.mission.comparing.comparison_text import comparison_table
+from stopgo.mission.comparing.run_collector import SOURCE
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.events import AnyEvent, Arrived, PoseReport, StateReport
-from stopgo.mission.heard_run import SOURCE
-from stopgo.mission.run_log import RunLog
-from stopgo.recordings import entities, palette
-from stopgo.recordings.field import FieldRecording
-from stopgo.recordings.read import check
+from stopgo.mission.run.events import AnyEvent, Arrived, PoseReport, StateReport
+from stopgo.mission.run.run_log import RunLog
+from stopgo.recordings.drawing import entities, palette
+from stopgo.recordings.rrd.read import check
+from stopgo.recordings.runs.field import FieldRecording
 from tests.recordings import run, world
 from tests.recordings.conftest import tell
 from tests.recordings.reading import cells, on, static

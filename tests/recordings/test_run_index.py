@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from stopgo.command_line import main
-from stopgo.recordings import run_index
-from stopgo.recordings.run_index import INDEX, index_of, index_text
+from stopgo.recordings.catalog import run_index
+from stopgo.recordings.catalog.run_index import INDEX, index_of, index_text
 from tests.recordings import run, world
 
 

@@ -16,9 +16,9 @@ import pytest
 from rerun.chunk import RrdReader
 
 from stopgo.command_line import main
-from stopgo.recordings.read import check
-from stopgo.recordings.run_index import INDEX, VERSION, IndexedFile, IndexedPlan, RunIndex, stamp_of
-from stopgo.recordings.run_site import RunSite, listening, name_of
+from stopgo.recordings.catalog.run_index import INDEX, VERSION, IndexedFile, IndexedPlan, RunIndex, stamp_of
+from stopgo.recordings.catalog.run_site import RunSite, listening, name_of
+from stopgo.recordings.rrd.read import check
 from tests.ports import free_port
 from tests.recordings import run, world
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.geometry import Polygon, ring_area
-from stopgo.mission.schedule import schedule
-from stopgo.recordings import strokes
-from stopgo.recordings.stages.drive import planned_drive
+from stopgo.recordings.drawing import strokes
+from stopgo.recordings.plan.drive import planned_drive
 from tests.recordings import world
 
 SQUARE = Polygon.of([(0, 0), (4, 0), (4, 4), (0, 4)], [[(1, 1), (3, 1), (3, 3), (1, 3)]])

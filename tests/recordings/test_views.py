@@ -16,10 +16,10 @@ from rerun.experimental import View, ViewerClient
 
 from stopgo.bridge.station.watch import hand_over
 from stopgo.mission.document import Mission
-from stopgo.recordings import palette
-from stopgo.recordings.carried.reading import read_recording
-from stopgo.recordings.field import FieldRecording
-from stopgo.recordings.viewer import Viewed
+from stopgo.recordings.drawing import palette
+from stopgo.recordings.embedded.reading import read_recording
+from stopgo.recordings.runs.field import FieldRecording
+from stopgo.recordings.viewing.viewer import Viewed
 from tests.recordings import run, world
 from tests.recordings.conftest import write_field, write_plan
 from tests.recordings.pictures import LIMIT, WRONG, difference, fields, kept

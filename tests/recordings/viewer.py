@@ -8,7 +8,7 @@ from typing import Any
 
 from rerun.experimental import View, ViewerClient
 
-from stopgo.recordings.headless import (
+from stopgo.recordings.viewing.headless import (
     PATIENCE_S,
     REDRAW_S,
     container,

@@ -18,11 +18,13 @@ from stopgo.mission.document import (
     Stop,
     sealed,
 )
-from stopgo.mission.events import Pose
+from stopgo.mission.document.schedule import Schedule
 from stopgo.mission.floor import Element, Finding, FloorPlan, Opening, Room
-from stopgo.mission.floor_source import FloorSource
+from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.geometry import Polygon, frozen
-from stopgo.mission.planning import (
+from stopgo.mission.run.events import Pose
+from stopgo.mission.settings import Settings
+from stopgo.mission.stages import (
     Candidates,
     NavigableSpace,
     OpeningState,
@@ -32,8 +34,6 @@ from stopgo.mission.planning import (
     Targets,
     Visibility,
 )
-from stopgo.mission.schedule import Schedule
-from stopgo.mission.settings import Settings
 
 MISSION_ID = "0123456789abcdef0123456789abcdef"
 FLOOR_DIGEST = "f" * 64

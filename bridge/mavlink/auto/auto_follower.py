@@ -12,7 +12,6 @@ from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered, PendingCommand
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
-from stopgo.mission.events import Arrived
 from stopgo.mission.mavlink.autopilots.kind import AUTO
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.following import steps as progress
@@ -31,6 +30,7 @@ from stopgo.mission.mavlink.following.steps import (
 from stopgo.mission.mavlink.read_back import differences
 from stopgo.mission.mavlink.telemetry import began_again
 from stopgo.mission.run import states as runs
+from stopgo.mission.run.events import Arrived
 from stopgo.mission.run.states import Change, Run
 
 SETTLED_NS = 1_500_000_000

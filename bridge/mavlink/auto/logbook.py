@@ -24,11 +24,11 @@ from stopgo.bridge.link.protocol import CHUNK_BYTES, Manifest
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.robot.journal import Journal, shared_journal
 from stopgo.mission.document import Mission
-from stopgo.mission.events import Aborted
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.telemetry import BACK_MS
 from stopgo.mission.run import states as runs
+from stopgo.mission.run.events import Aborted
 from stopgo.mission.run.states import Change, Run
 
 REBOOT_NS = 5 * 10**9

@@ -6,7 +6,7 @@ from stopgo.bridge.mavlink.auto.logbook import Logbook
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.mission.errors import AnswerIsNo
-from stopgo.mission.tolerance import told_outside
+from stopgo.mission.run.tolerance import told_outside
 
 
 def check_run_over(peer: Peer, url: Url, book: Logbook, what: str) -> None:

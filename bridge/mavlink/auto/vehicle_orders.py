@@ -18,7 +18,6 @@ from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.robot.answers import answer_to, answered, remember_answer, situation_of
-from stopgo.mission.events import Pose
 from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, why_no_rover
 from stopgo.mission.mavlink.following import steps as progress
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
@@ -29,6 +28,7 @@ from stopgo.mission.mavlink.local_frame import apart
 from stopgo.mission.mavlink.read_back import differences
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.decision import Decision, decide, handed_over
+from stopgo.mission.run.events import Pose
 from stopgo.mission.run.lease import Lease
 from stopgo.mission.run.orders import DRIVING, FREE_VERBS, Answer, Order, Refused
 from stopgo.mission.run.states import Change, Run

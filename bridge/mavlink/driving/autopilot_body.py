@@ -12,7 +12,7 @@ from stopgo.bridge.mavlink.driving.mavlink_base import MavlinkBase
 from stopgo.bridge.mavlink.driving.mavlink_scanner import MavlinkScanner, ScanTrigger
 from stopgo.bridge.mavlink.driving.onboard_autopilot import on_board
 from stopgo.bridge.mavlink.line.wire import read_line
-from stopgo.bridge.robot.bodies import Body
+from stopgo.bridge.robot.robot_hardware import Body
 from stopgo.mission.document import Mission
 
 

@@ -17,11 +17,11 @@ from stopgo.bridge.mavlink.driving.onboard_autopilot import ORDER_S, OnboardAuto
 from stopgo.bridge.mavlink.driving.straight_drive import NEAR_M, Ability, Patience, StraightDrive
 from stopgo.bridge.robot.base import BaseHealth, Outcome, Rest
 from stopgo.mission.document import Mission, Point, RobotSpec
-from stopgo.mission.events import Pose
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.local_frame import UNPLACED, LocalFrame, VehicleOrigin, apart, local_frame
+from stopgo.mission.run.events import Pose
+from stopgo.mission.run.route_position import foot, legs_of
 from stopgo.mission.run.scans import needs_heading, turned_away
-from stopgo.mission.run.way import foot, legs_of
-from stopgo.mission.transform import SiteOrigin
 
 TICK_S = 0.1
 AGAIN_S = 1.0

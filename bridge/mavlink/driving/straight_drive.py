@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from stopgo.mission.document import Point
-from stopgo.mission.events import Pose
-from stopgo.mission.run.way import foot
+from stopgo.mission.run.events import Pose
+from stopgo.mission.run.route_position import foot
 
 DriveVerdict = Literal["going", "arrived", "blocked"]
 DrivePhase = Literal["turning", "driving", "stopping"]

@@ -7,7 +7,7 @@ from typing import Any
 from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.mission.document import Point
-from stopgo.mission.geodesy import to_steps
+from stopgo.mission.frames.geodesy import to_steps
 from stopgo.mission.mavlink.enums import Firmware, VehicleType
 from stopgo.mission.mavlink.items import Command, Item
 from stopgo.mission.mavlink.local_frame import VehicleOrigin

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.local_frame import VehicleOrigin, how_far_off
-from stopgo.mission.transform import SiteOrigin
 
 
 def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> VehicleOrigin:

@@ -6,7 +6,7 @@ import math
 
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.mission.document import Point
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 
 COASTS_M_S = 0.01
 """Slower than this, wheels that stick stand."""

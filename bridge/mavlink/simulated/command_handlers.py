@@ -12,12 +12,12 @@ from stopgo.bridge.mavlink.simulated import vehicle_telemetry as telemetry
 from stopgo.bridge.mavlink.simulated.rover import FAR_M
 from stopgo.bridge.mavlink.simulated.steering import Course
 from stopgo.bridge.mavlink.simulated.vehicle import Handlers, Vehicle
-from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.kind import Mode, ModeName
 from stopgo.mission.mavlink.enums import CommandResult, MessageId, ModeFlag
 from stopgo.mission.mavlink.items import Command, MavFrame
 from stopgo.mission.mavlink.telemetry import Message
-from stopgo.mission.transform import SiteOrigin
 
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 REJECTED, UNSUPPORTED = CommandResult.TEMPORARILY_REJECTED, CommandResult.UNSUPPORTED

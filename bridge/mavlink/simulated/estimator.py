@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from stopgo.bridge.mavlink.simulated.chassis import Chassis
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 
 WANDERS_S = 20.0
 """How long an estimate's error stays about the same."""

@@ -8,7 +8,7 @@ from stopgo.bridge.mavlink.simulated.estimator import Estimate
 from stopgo.bridge.mavlink.simulated.steering import Course
 from stopgo.bridge.robot.motion import Brake, Motion, along
 from stopgo.mission.document import Point, RobotSpec
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 
 LIMITS = RobotSpec(radius=0.35, speed=0.5, turn_rate=1.0, acceleration=0.5)
 

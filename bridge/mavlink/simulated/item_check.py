@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from stopgo.bridge.mavlink.simulated.vehicle_store import FENCE, MISSION
-from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.enums import MissionResult
 from stopgo.mission.mavlink.fields import PLACED

@@ -9,7 +9,7 @@ from stopgo.bridge.mavlink.simulated.estimator import Estimate, Estimator
 from stopgo.bridge.mavlink.simulated.steering import LAWS, Course, RunningStraight
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.mission.document import Point
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 
 STEP_NS = 20_000_000
 """Fifty times a second, as ArduPilot Rover runs its loops."""

@@ -9,7 +9,7 @@ from typing import Any
 from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.mavlink.line.messages import item_of
 from stopgo.bridge.mavlink.line.wire import Who
-from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
 from stopgo.mission.mavlink.fields import PLACED
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.telemetry import Message

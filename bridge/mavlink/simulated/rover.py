@@ -10,9 +10,9 @@ from stopgo.bridge.mavlink.simulated.real_drive import RealDrive
 from stopgo.bridge.mavlink.simulated.steering import Course
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
 from stopgo.mission.document import Point
-from stopgo.mission.events import Pose
-from stopgo.mission.geodesy import STEPS_PER_DEGREE, from_geodetic, from_steps, to_geodetic
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE, from_geodetic, from_steps, to_geodetic
+from stopgo.mission.frames.transform import SiteOrigin
+from stopgo.mission.run.events import Pose
 
 STANDING = Pose(x=0.0, y=0.0, heading=math.pi / 2)
 """Where a vehicle is that was never driven: at the origin, to the north."""

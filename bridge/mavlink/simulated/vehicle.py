@@ -23,13 +23,13 @@ from stopgo.bridge.mavlink.simulated.transfers import Transfers
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.bridge.mavlink.simulated.vehicle_faults import NO_FAULTS, Mishaps, VehicleFaults
 from stopgo.bridge.mavlink.simulated.vehicle_store import MISSION, Store
-from stopgo.mission.events import Pose
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.kind import Autopilot, ModeName
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from stopgo.mission.mavlink.read_back import home_item
 from stopgo.mission.mavlink.telemetry import Message
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.run.events import Pose
 
 BOOT_NS = KEEP_NS = 1_000_000_000
 FOREVER_NS = 2**63

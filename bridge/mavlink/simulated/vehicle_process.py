@@ -22,10 +22,10 @@ from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.bridge.mavlink.simulated.vehicle import Setting, Vehicle
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import Pose
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.enums import Component
 from stopgo.mission.mavlink.telemetry import Message
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.run.events import Pose
 
 OPTION = "--mavlink"
 VEHICLE = Who(1, 1)

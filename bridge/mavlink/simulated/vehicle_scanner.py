@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from stopgo.bridge.mavlink.simulated.vehicle_faults import Mishaps
 from stopgo.bridge.robot.simulator import BYTES_PER_POINT, POINTS_PER_S
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 
 DEFAULT_S = 3.0
 LONGEST_S = 3600.0

@@ -8,8 +8,8 @@ from pathlib import Path
 import msgspec
 
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import Pose
 from stopgo.mission.mavlink.items import Item
+from stopgo.mission.run.events import Pose
 
 KeptItems = tuple[Item, ...]
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from stopgo.bridge.console import Progress
 from stopgo.bridge.mavlink.line.messages import result_name
 from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.bridge.mavlink.transfer.after_failure import cancel, emptied, left_on, own_items, unknown
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.flow_control import window_for
 from stopgo.bridge.mavlink.transfer.sending import TransferEnd, send_items
+from stopgo.bridge.mavlink.transfer.upload_recovery import cancel, emptied, left_on, own_items, unknown
 from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.enums import MissionResult

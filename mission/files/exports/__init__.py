@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
+from stopgo.mission.console.plugins import Variant, variant
 from stopgo.mission.document import Mission, Point
 from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.files.exports import (
@@ -20,7 +21,6 @@ from stopgo.mission.files.exports import (
     vda5050,
 )
 from stopgo.mission.files.exports.format import Format, Supplements
-from stopgo.mission.plugins import Variant, variant
 
 QUANTUM = 0.008
 """Metres by which 1e-7 degrees move a place at most."""

@@ -11,9 +11,9 @@ import msgspec
 
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
-from stopgo.mission.geodesy import Geodetic, bearing_deg, from_geodetic, to_geodetic
+from stopgo.mission.frames.geodesy import Geodetic, bearing_deg, from_geodetic, to_geodetic
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.geometry import FloatArray, frozen, polyline_length
-from stopgo.mission.transform import SiteOrigin
 
 DIGITS = 9
 """Decimals of degrees: 0.1 mm."""

@@ -10,11 +10,11 @@ import math
 import re
 from collections.abc import Sequence
 
+from stopgo.mission.console.table import printable
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.waypoints import frame_name, mapped
-from stopgo.mission.table import printable
-from stopgo.mission.turning import SAME, turned_back
+from stopgo.mission.frames.frame_transform import SAME, turned_back
 
 _NUMBER = r"(-?\d+\.\d+)"
 _POSE = re.compile(rf"^    pose: \[{_NUMBER}, {_NUMBER}, {_NUMBER}\]$", re.MULTILINE)

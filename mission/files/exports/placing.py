@@ -7,12 +7,12 @@ import math
 import msgspec
 
 from stopgo.mission.document import Frame, Mission
+from stopgo.mission.document.problems import FAR
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.plan_toml import read_settings
-from stopgo.mission.parameter import numbers
-from stopgo.mission.problems import FAR
+from stopgo.mission.frames.transform import SiteOrigin, Transform
 from stopgo.mission.settings import PARAMETERS
-from stopgo.mission.transform import SiteOrigin, Transform
+from stopgo.mission.settings.parameter import numbers
 
 MAP = "write X,Y,HEADING in metres and degrees, such as 1.5,2,90"
 

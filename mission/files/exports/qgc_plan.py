@@ -12,7 +12,7 @@ from stopgo.mission.document import Mission, Point
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.imports import qgc_plan
 from stopgo.mission.files.imports.track import ImportOptions
-from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
 from stopgo.mission.mavlink.fields import PLACED
 from stopgo.mission.mavlink.items import Command, Item, ItemList, MavFrame
 from stopgo.mission.mavlink.translate import translate

@@ -12,7 +12,7 @@ import math
 
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
-from stopgo.mission.geodesy import bearing_deg, to_geodetic
+from stopgo.mission.frames.geodesy import bearing_deg, to_geodetic
 from stopgo.mission.geometry import frozen, polyline_length
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'")

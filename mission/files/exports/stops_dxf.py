@@ -17,10 +17,10 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from stopgo.mission.console.table import printable
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.files.exports.format import Supplements
-from stopgo.mission.table import printable
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from stopgo.mission.document import Mission
+from stopgo.mission.document.problems import FAR
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.coverage_json import CoverageSegment, read_coverage
 from stopgo.mission.geometry import FloatArray, frozen
-from stopgo.mission.problems import FAR
 
 Fraction = tuple[float, float]
 

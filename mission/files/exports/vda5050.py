@@ -18,7 +18,7 @@ from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.nav2_yaml import unmapped
 from stopgo.mission.files.exports.waypoints import Waypoint, frame_name, mapped, way
-from stopgo.mission.turning import SAME, turned_back
+from stopgo.mission.frames.frame_transform import SAME, turned_back
 
 
 @dataclass(frozen=True)

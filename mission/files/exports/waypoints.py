@@ -10,8 +10,8 @@ from itertools import pairwise
 import msgspec
 
 from stopgo.mission.document import Frame, Mission, Point, Stop
-from stopgo.mission.transform import Transform
-from stopgo.mission.turning import turned
+from stopgo.mission.frames.frame_transform import turned
+from stopgo.mission.frames.transform import Transform
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ import hashlib
 from pathlib import Path
 
 from stopgo.mission.document import Mission
+from stopgo.mission.document.specs import site_origin_of
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports import qgc_plan, qgc_waypoints, stops_csv
 from stopgo.mission.files.imports.assembling import mission_of
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions, MissionReader
 from stopgo.mission.settings import Settings
-from stopgo.mission.specs import site_origin_of
 
 READERS: dict[str, MissionReader] = {
     "plan": qgc_plan.read,

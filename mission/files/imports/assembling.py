@@ -20,12 +20,20 @@ from stopgo.mission.document import (
     mission_id,
     sealed,
 )
+from stopgo.mission.document.problems import problems_of
+from stopgo.mission.document.specs import (
+    origin_of,
+    policy_of,
+    robot_of,
+    rounded,
+    scan_of,
+    scanner_of,
+    site_origin_of,
+)
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports.track import ImportedRoute, Visit
-from stopgo.mission.floor_source import FloorSource
-from stopgo.mission.problems import problems_of
+from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.settings import Settings
-from stopgo.mission.specs import origin_of, policy_of, robot_of, rounded, scan_of, scanner_of, site_origin_of
 
 
 def mission_of(track: ImportedRoute, settings: Settings, *, name: str, file: str, digest: str) -> Mission:

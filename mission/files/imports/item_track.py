@@ -14,13 +14,13 @@ from itertools import takewhile
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports import track
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions
-from stopgo.mission.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.items import NAMES, Command, Item, Placed
 from stopgo.mission.mavlink.recognise import GLOBAL_FRAMES, PLACES, TRIGGERS, WAITS, recognise
 from stopgo.mission.mavlink.recognised_tour import RecognisedStop, RecognisedTour, recognised_tour
 from stopgo.mission.mavlink.writing import SCAN_MESSAGE
-from stopgo.mission.transform import SiteOrigin
 
 MOST = 65_535
 """Items a mission may have by the protocol."""

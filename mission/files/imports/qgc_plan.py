@@ -10,7 +10,7 @@ from typing import Any
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports.item_track import Listed, assumptions, autopilot_for, track_of
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.transform import SiteOrigin
 
 NAN = float("nan")
 LARGEST_CODE = 65_535

@@ -9,7 +9,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports.item_track import Listed, assumptions, autopilot_for, track_of
 from stopgo.mission.files.imports.qgc_plan import LARGEST_CODE
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.transform import SiteOrigin
 
 HEAD = "QGC WPL 110"
 COLUMNS = 12

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 from stopgo.mission.document import OnFailure, Point
+from stopgo.mission.document.problems import JOIN
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions, Visit
-from stopgo.mission.geodesy import Geodetic, from_geodetic, heading_of
-from stopgo.mission.problems import JOIN
+from stopgo.mission.frames.geodesy import Geodetic, from_geodetic, heading_of
 
 METRES = ("x_m", "y_m")
 DEGREES = ("lat_deg", "lon_deg")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from stopgo.mission.document import OnFailure, Point
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.transform import SiteOrigin
 
 
 @dataclass(frozen=True)

@@ -201,7 +201,7 @@ class Autopilot:
     firmware: int
     """MAV_AUTOPILOT."""
     rule: str
-    """How it turns degrees into metres, one of `stopgo.mission.geodesy.RULES`."""
+    """How it turns degrees into metres, one of `stopgo.mission.frames.geodesy.RULES`."""
 
     # Items
 

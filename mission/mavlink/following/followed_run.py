@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stopgo.mission.document import Mission, Stop
-from stopgo.mission.events import AnyEvent, Arrived
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.captures import NEAR_M, Picture
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
@@ -27,6 +26,7 @@ from stopgo.mission.mavlink.following.steps import (
 )
 from stopgo.mission.mavlink.telemetry import Message, began_again
 from stopgo.mission.run import states as runs
+from stopgo.mission.run.events import AnyEvent, Arrived
 from stopgo.mission.run.states import Change, Run, changed, told_of
 
 

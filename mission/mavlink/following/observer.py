@@ -7,8 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from stopgo.mission.events import Arrived, Pose
-from stopgo.mission.geodesy import heading_of
+from stopgo.mission.frames.geodesy import heading_of
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.captures import STEPS_M, Capture, Picture, capture_of
@@ -27,6 +26,7 @@ from stopgo.mission.mavlink.telemetry import (
     place_of,
     stands_still,
 )
+from stopgo.mission.run.events import Arrived, Pose
 from stopgo.mission.run.states import Run
 
 CAPTURES_KEPT = 100

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 from stopgo.mission.document import Point
-from stopgo.mission.events import Pose
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.steps import Observation, passed_by
 from stopgo.mission.mavlink.read_back import point_at
+from stopgo.mission.run.events import Pose
+from stopgo.mission.run.route_position import foot
 from stopgo.mission.run.states import Run
-from stopgo.mission.run.way import foot
 
 PASSED = frozenset({"corner", "stop", "return"})
 """Roles of waypoints."""

@@ -15,12 +15,12 @@ from functools import partial
 import msgspec
 
 from stopgo.mission.document import Stop
-from stopgo.mission.events import Pose, Settled, Unconfirmed
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, StopItems
 from stopgo.mission.run import states as runs
+from stopgo.mission.run.events import Pose, Settled, Unconfirmed
 from stopgo.mission.run.scans import ScanFailed, ScanResult, turned_away
 from stopgo.mission.run.states import Change, Run, changed
-from stopgo.mission.tolerance import deviation, is_outside
+from stopgo.mission.run.tolerance import deviation, is_outside
 
 SOMEBODY = "the vehicle's operator"
 """Who gives orders that were not given here."""

@@ -9,7 +9,7 @@ from dataclasses import replace
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import bounds
-from stopgo.mission.kinds import KINDS
+from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.planner.floors.ifc.levels import Level, chosen_level, levels_of, standing_at, walked, with_uses
 from stopgo.planner.floors.ifc.loading import load
 from stopgo.planner.floors.ifc.model import Model

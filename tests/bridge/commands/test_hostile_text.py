@@ -14,9 +14,9 @@ from stopgo.bridge.station import station as stations
 from stopgo.bridge.station.station import Station
 from stopgo.command_line import main
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.events import Scanned
 from stopgo.mission.files.file_name import file_name
 from stopgo.mission.files.mission_json import write
+from stopgo.mission.run.events import Scanned
 from tests.bridge.world import Field, corridor
 
 FORGED = "r1: FINISHED; forged"

@@ -23,13 +23,13 @@ from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_v
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.command_line import main
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.events import Aborted
 from stopgo.mission.files.imports import qgc_plan, qgc_waypoints
 from stopgo.mission.files.imports.track import ImportOptions
 from stopgo.mission.files.mission_json import write
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.events import Aborted
 from stopgo.mission.run.states import started
-from stopgo.mission.transform import SiteOrigin
 from tests.bridge.mavlink.lists import held, stops
 from tests.bridge.mavlink.scripted import Scripted
 from tests.mission.mavlink.following.worlds import tour

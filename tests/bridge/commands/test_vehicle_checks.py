@@ -17,9 +17,9 @@ from stopgo.bridge.mavlink.simulated.vehicle import Setting
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.command_line import main
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from stopgo.mission.mavlink.autopilots.px4 import PX4
-from stopgo.mission.transform import SiteOrigin
 from tests.ports import free_port
 
 INDOORS = {

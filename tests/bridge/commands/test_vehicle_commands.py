@@ -14,9 +14,9 @@ import pytest
 
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.mission.document import Scan
-from stopgo.mission.events import Finished, Scanned, Unconfirmed
 from stopgo.mission.files.mission_json import write
-from stopgo.recordings.carried.reading import read_recording
+from stopgo.mission.run.events import Finished, Scanned, Unconfirmed
+from stopgo.recordings.embedded.reading import read_recording
 from tests.bridge.mavlink.auto.site import real_tour
 from tests.called import stopgo
 from tests.ports import free_port

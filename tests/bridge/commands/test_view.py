@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.bridge.cli import recording
+from stopgo.commands.bridge_commands import recording
 from stopgo.mission.errors import InputError
-from stopgo.recordings import viewer
-from stopgo.recordings.field import FieldRecording
-from stopgo.recordings.viewer import Viewed, open_viewer
+from stopgo.recordings.runs.field import FieldRecording
+from stopgo.recordings.viewing import viewer
+from stopgo.recordings.viewing.viewer import Viewed, open_viewer
 from tests.bridge.world import corridor
 
 

@@ -30,7 +30,7 @@ from stopgo.bridge.robot.inbox import Inbox
 from stopgo.bridge.robot.recorder import RunRecorder
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import StateReport, TakenOver
+from stopgo.mission.run.events import StateReport, TakenOver
 from stopgo.mission.run.lease import Lease
 from stopgo.mission.run.orders import FREE_VERBS, Answer, Order
 from tests.bridge.conform.robot_under_test import RobotUnderTest, booted, failed, verdicts

@@ -23,7 +23,7 @@ from stopgo.bridge.link.zenoh_link import Guard, check_endpoint, connecting
 from stopgo.bridge.robot.agent import check_ordering
 from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.errors import AnswerIsNo, InputError, RobotUnreachable
-from stopgo.mission.events import PoseReport, Scanned
+from stopgo.mission.run.events import PoseReport, Scanned
 from tests.bridge.station.test_fleet import router
 from tests.bridge.world import corridor
 from tests.called import stopgo

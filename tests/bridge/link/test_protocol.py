@@ -13,7 +13,7 @@ from msgspec import Struct
 from stopgo.bridge.link import protocol
 from stopgo.bridge.link.protocol import Info, KeyExpressions, Tagged, decode, encode
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import AnyEvent, State, StopState, UnknownKind
+from stopgo.mission.run.events import AnyEvent, State, StopState, UnknownKind
 from stopgo.mission.run.orders import Answer, Order, Reason
 from tests.bridge.world import Field
 

@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from stopgo.bridge.link.protocol import Commit, KeyExpressions, Manifest, Reply, encode
-from stopgo.mission.events import AnyEvent, PoseReport, StateReport
+from stopgo.mission.run.events import AnyEvent, PoseReport, StateReport
 from stopgo.mission.run.orders import Order
 
 TEXT = (Path(__file__).parents[3] / "docs" / "reference" / "protocol.md").read_text(encoding="utf-8")

@@ -16,7 +16,7 @@ from stopgo.bridge.link.protocol import Malformed, Reply, Tagged, decode, encode
 from stopgo.bridge.link.protocol_schema import protocol_schema
 from stopgo.bridge.link.seals import Seal
 from stopgo.mission.errors import AnswerIsNo
-from stopgo.mission.events import KINDS, AnyEvent, Pose, PoseReport, StateReport, UnknownKind, event_of
+from stopgo.mission.run.events import KINDS, AnyEvent, Pose, PoseReport, StateReport, UnknownKind, event_of
 from stopgo.mission.run.orders import Answer, Order
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import corridor

@@ -18,7 +18,7 @@ from stopgo.bridge.station.follow import Followed
 from stopgo.bridge.station.station import connect
 from stopgo.mission.document import sealed
 from stopgo.mission.errors import InputError, RobotUnreachable
-from stopgo.mission.events import Event, Finished, PoseReport, Scanned, StateReport
+from stopgo.mission.run.events import Event, Finished, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor
 from tests.called import stopgo
 from tests.ports import free_port

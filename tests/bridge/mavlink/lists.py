@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from stopgo.bridge.mavlink.line.messages import item_message
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.items import Command, Item, ItemList, MavFrame, Placed
 from stopgo.mission.mavlink.read_back import upload_of
 from stopgo.mission.mavlink.telemetry import Message
-from stopgo.mission.transform import SiteOrigin
 from tests.bridge.mavlink.scripted import VEHICLE
 
 SITE = SiteOrigin(lat=47.0, lon=8.0, alt=0.0, heading_deg=0.0)

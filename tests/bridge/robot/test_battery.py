@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from stopgo.bridge.robot.simulator import Fault, Faults
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.run.battery import time_left, what_is_missing
-from stopgo.mission.schedule import schedule
 from tests.bridge.world import EXACT, Field, corridor
 
 TOTAL_S = schedule(corridor()).total_s

@@ -15,7 +15,7 @@ from stopgo.bridge.console import carried_out, refusals_in, tell
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import encode
 from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
-from stopgo.mission.events import STOPS_LISTED, TakenOver
+from stopgo.mission.run.events import STOPS_LISTED, TakenOver
 from stopgo.mission.run.lease import LEASE_S, Lease, claimed
 from stopgo.mission.run.orders import Answer, Refused, Verb
 from tests.bridge.world import Field, corridor

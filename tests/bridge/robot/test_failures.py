@@ -14,7 +14,7 @@ from stopgo.bridge.robot.base import Rest
 from stopgo.bridge.robot.simulator import Fault, Faults, read_fault
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.errors import AnswerIsNo, InputError
-from stopgo.mission.events import Pose, Scanned
+from stopgo.mission.run.events import Pose, Scanned
 from stopgo.mission.run.orders import Verb
 from stopgo.mission.run.scans import ScanFailed
 from tests.bridge.world import Field, corridor

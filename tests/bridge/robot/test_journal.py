@@ -26,7 +26,7 @@ from stopgo.bridge.robot.reserve import LEAST_FREE_BYTES, RESERVE_BYTES, Reserve
 from stopgo.bridge.robot.sealed_rows import SEALED, put
 from stopgo.bridge.station.watch import event_line
 from stopgo.mission.errors import AnswerIsNo, InputError
-from stopgo.mission.events import Started, UnknownKind, event_of
+from stopgo.mission.run.events import Started, UnknownKind, event_of
 from stopgo.mission.run.orders import Verb
 from tests.bridge.world import Field, corridor
 

@@ -17,8 +17,8 @@ from stopgo.bridge.robot.journal import memory_journal
 from stopgo.bridge.robot.map_frame import OnMap, turned, turned_back, turned_point
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from stopgo.mission.document import Frame, sealed
-from stopgo.mission.events import Pose
-from stopgo.mission.transform import Transform
+from stopgo.mission.frames.transform import Transform
+from stopgo.mission.run.events import Pose
 from tests.bridge.world import EXACT, Field, corridor
 from tests.called import stopgo
 

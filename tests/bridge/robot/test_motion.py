@@ -12,7 +12,7 @@ from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.robot.motion import Straight, along
 from stopgo.bridge.robot.simulator import SimulatedBase, read_world
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 
 ORIGIN = Pose(x=0.0, y=0.0, heading=0.0)
 

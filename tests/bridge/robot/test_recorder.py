@@ -12,7 +12,7 @@ from stopgo.bridge.robot.base import BaseHealth
 from stopgo.bridge.robot.pages import POSES_KEPT
 from stopgo.bridge.robot.recorder import RETIRED, RunRecorder
 from stopgo.bridge.robot.run_record import ANEW, DAMAGED, UNSEEN
-from stopgo.mission.events import Pose, PoseReport, PosesMissing
+from stopgo.mission.run.events import Pose, PoseReport, PosesMissing
 from tests.disk import small_disk
 from tests.faults.sizes import some
 

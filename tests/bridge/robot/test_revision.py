@@ -9,8 +9,8 @@ import pytest
 
 from stopgo.mission.document import Mission, Scan, sealed
 from stopgo.mission.errors import AnswerIsNo
-from stopgo.mission.events import RevisionTaken, Scanned
-from stopgo.mission.transform import Transform
+from stopgo.mission.frames.transform import Transform
+from stopgo.mission.run.events import RevisionTaken, Scanned
 from tests.bridge.world import Field, corridor
 from tests.faults.test_crashes import Mains, PowerCut
 

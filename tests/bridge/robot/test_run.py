@@ -7,7 +7,7 @@ import math
 import pytest
 
 from stopgo.mission.document import Mission
-from stopgo.mission.schedule import schedule
+from stopgo.mission.document.schedule import schedule
 from tests.bridge.world import Field, corridor
 
 

@@ -10,8 +10,8 @@ import pytest
 from stopgo.bridge.commands.order_commands import state_line, status_json
 from stopgo.bridge.commands.watch_commands import tell_compared
 from stopgo.bridge.station.watch import EventObjects, Lines, event_line, table_lines, watch_showing
-from stopgo.mission.events import Scanned
-from stopgo.mission.heard_run import HeardRun
+from stopgo.mission.comparing.run_collector import HeardRun
+from stopgo.mission.run.events import Scanned
 from tests.bridge.world import Field, corridor
 
 BESIDE = "120 mm beside its place (50 mm are tolerated)"

@@ -14,7 +14,7 @@ import pytest
 from stopgo.bridge.commands.spawn import end_robot, start_robot
 from stopgo.bridge.station.station import connect
 from stopgo.mission.errors import RobotUnreachable
-from stopgo.mission.events import Finished, PoseReport, Scanned
+from stopgo.mission.run.events import Finished, PoseReport, Scanned
 from tests.bridge.world import corridor
 from tests.called import stopgo
 from tests.ports import free_port

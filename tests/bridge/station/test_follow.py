@@ -9,7 +9,7 @@ from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import POSE_PAGE, KeyExpressions, PosePage, encode
 from stopgo.bridge.station.follow import PoseHistory, RunFollower
 from stopgo.bridge.station.record import Past
-from stopgo.mission.events import Health, Pose, PoseReport
+from stopgo.mission.run.events import Health, Pose, PoseReport
 from tests.bridge.world import Field, corridor
 
 

@@ -16,7 +16,7 @@ from stopgo.bridge.robot.recorder import RunRecorder
 from stopgo.bridge.robot.run_record import ANEW
 from stopgo.bridge.station import record
 from stopgo.bridge.station.record import Past, Recorded, RecordHistory, past_run
-from stopgo.mission.events import Health, PoseReport, PosesMissing
+from stopgo.mission.run.events import Health, PoseReport, PosesMissing
 from tests.bridge.robot.test_recorder import BEGAN_NS, idle, ns, pose
 
 FAR = 5000

@@ -11,7 +11,7 @@ from stopgo.bridge.link.protocol import LogPage, Malformed, RecordPage, encode
 from stopgo.bridge.station.record import past_run, read_index
 from stopgo.bridge.station.station import Station
 from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
-from stopgo.mission.events import Started
+from stopgo.mission.run.events import Started
 from tests.bridge.world import Field, corridor
 
 READS: dict[str, Callable[[Station], object]] = {

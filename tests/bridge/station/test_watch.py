@@ -18,14 +18,14 @@ from stopgo.bridge.link.memory_link import Switchboard
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.robot import agent as agents
 from stopgo.bridge.robot.agent import Agent
-from stopgo.bridge.robot.bodies import pose_of
 from stopgo.bridge.robot.controller import Controller
 from stopgo.bridge.robot.inbox import Inbox
 from stopgo.bridge.robot.journal import memory_journal
 from stopgo.bridge.robot.recorder import RunRecorder
+from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
+from stopgo.bridge.station.finished_run import past_reports
 from stopgo.bridge.station.follow import Report, Silence
-from stopgo.bridge.station.past import past_reports
 from stopgo.bridge.station.station import Station
 from stopgo.bridge.station.watch import (
     HINT,
@@ -39,8 +39,9 @@ from stopgo.bridge.station.watch import (
 )
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
-from stopgo.mission.events import (
+from stopgo.mission.run.events import (
     AnyEvent,
     Event,
     Health,
@@ -50,7 +51,6 @@ from stopgo.mission.events import (
     Scanned,
     StateReport,
 )
-from stopgo.mission.schedule import schedule
 from tests.bridge.world import Field, corridor
 from tests.disk import small_disk
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stopgo.mission.comparing.beside import WayFollower, beside
-from stopgo.mission.comparing.late_beside import LateBeside
+from stopgo.mission.comparing.delayed_deviation import LateBeside
+from stopgo.mission.comparing.path_deviation import WayFollower, beside
 from stopgo.mission.document import Mission
-from stopgo.mission.events import Arrived, Finished, Homing, Scanned, Skipped, Started
-from stopgo.mission.run_log import RunLog
+from stopgo.mission.run.events import Arrived, Finished, Homing, Scanned, Skipped, Started
+from stopgo.mission.run.run_log import RunLog
 from tests.mission.comparing.told import SCAN, at, told
 from tests.mission.worlds import mission_of, stop
 

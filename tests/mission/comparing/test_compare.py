@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from stopgo.mission.comparing.compare import compare
-from stopgo.mission.comparing.judging import judge
+from stopgo.mission.comparing.comparison import Comparison
+from stopgo.mission.comparing.comparison_text import comparison_json, comparison_text
+from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.comparing.spans import stood_s
-from stopgo.mission.comparing.telling import comparison_json, comparison_text
-from stopgo.mission.comparison import Comparison
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.events import (
+from stopgo.mission.run.events import (
     Aborted,
     Arrived,
     Failed,
@@ -31,11 +31,11 @@ from stopgo.mission.events import (
     Started,
     Unconfirmed,
 )
-from stopgo.mission.figures import Figures, worst_first
-from stopgo.mission.ledger import ledger_of
-from stopgo.mission.planning import Route
-from stopgo.mission.run_log import RunLog
-from stopgo.mission.sight import Sight, sight_of
+from stopgo.mission.run.run_log import RunLog
+from stopgo.mission.stages import Route
+from stopgo.mission.stages.coverage_totals import ledger_of
+from stopgo.mission.stages.figures import Figures, worst_first
+from stopgo.mission.stages.sight import Sight, sight_of
 from tests.mission.comparing.told import SCAN, at, told
 from tests.mission.worlds import square_tour
 from tests.recordings import world

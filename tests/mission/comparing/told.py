@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from stopgo.mission.comparing.run_collector import SOURCE
 from stopgo.mission.document import Mission
-from stopgo.mission.events import AnyEvent, Pose
-from stopgo.mission.heard_run import SOURCE
-from stopgo.mission.run_log import RunLog, Track
+from stopgo.mission.run.events import AnyEvent, Pose
+from stopgo.mission.run.run_log import RunLog, Track
 
 NS = 1_000_000_000
 BEGAN_NS = 1_795_000_000 * NS

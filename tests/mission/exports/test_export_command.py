@@ -14,7 +14,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.files import mission_json
 from stopgo.mission.files.exports import FORMATS
 from stopgo.mission.files.mission_json import read
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.transform import SiteOrigin
 from tests.mission.exports.worlds import laboratory
 
 Captured = pytest.CaptureFixture[str]

@@ -7,14 +7,14 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from stopgo.mission.cli import FORMAT_NAMES, export
+from stopgo.commands.document_commands import FORMAT_NAMES, export
 from stopgo.mission.document import Frame, Mission, digest_of
 from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.files import exports
 from stopgo.mission.files.exports import FORMATS, exported, format_named
 from stopgo.mission.files.exports.format import Format, Supplements
 from stopgo.mission.files.exports.waypoints import mapped
-from stopgo.mission.transform import Transform
+from stopgo.mission.frames.transform import Transform
 from tests.mission.exports.worlds import surveyed
 from tests.mission.worlds import square_tour
 

@@ -17,7 +17,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.files.exports import FORMATS, exported
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.stretches import Stretches
-from stopgo.mission.geodesy import Geodetic, from_geodetic, to_geodetic
+from stopgo.mission.frames.geodesy import Geodetic, from_geodetic, to_geodetic
 from tests.mission.exports.worlds import across_the_date_line, from_the_first_stop, laboratory
 from tests.mission.worlds import square_tour
 

@@ -15,7 +15,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.files.exports import exported
 from stopgo.mission.files.exports.format import Supplements
-from stopgo.mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
+from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
 from stopgo.mission.mavlink.autopilots import AUTOPILOTS
 from stopgo.mission.mavlink.items import Command
 from stopgo.mission.mavlink.read_back import home_item

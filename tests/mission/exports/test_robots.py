@@ -21,8 +21,8 @@ from stopgo.mission.document import Mission, OnFailure
 from stopgo.mission.files.exports import FORMATS, exported, format_named
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.waypoints import mapped, way
-from stopgo.mission.transform import Transform
-from stopgo.mission.turning import turned, turned_back
+from stopgo.mission.frames.frame_transform import turned, turned_back
+from stopgo.mission.frames.transform import Transform
 from tests.mission.exports.vda5050_order import ORDERS
 from tests.mission.exports.worlds import MAP, laboratory, on_a_map
 from tests.mission.worlds import mission_of, square_tour, stop

@@ -7,7 +7,7 @@ import math
 import msgspec
 
 from stopgo.mission.document import Frame, Mission, sealed
-from stopgo.mission.transform import SiteOrigin, Transform
+from stopgo.mission.frames.transform import SiteOrigin, Transform
 from tests.mission.worlds import mission_of, room_mission, square_tour, stop
 
 ZURICH = SiteOrigin(lat=47.3769, lon=8.5417, alt=408.0, heading_deg=30.0)

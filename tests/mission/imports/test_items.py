@@ -10,7 +10,7 @@ import pytest
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.imports import qgc_plan, qgc_waypoints
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.transform import SiteOrigin
 from tests.mission.imports.worlds import CAPTURE, SPEED, Row, command, delay, plan, waypoint, waypoints
 
 Write = Callable[..., bytes]

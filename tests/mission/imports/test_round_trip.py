@@ -11,16 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stopgo.mission.document import Mission, Stop, sealed
+from stopgo.mission.document.problems import problems_of
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.exports import exported
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.imports import READERS, read_mission
 from stopgo.mission.files.imports.assembling import mission_of
 from stopgo.mission.files.imports.track import ImportOptions
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import AUTOPILOTS
-from stopgo.mission.problems import problems_of
 from stopgo.mission.settings import Settings
-from stopgo.mission.transform import SiteOrigin
 from tests.mission.exports.worlds import laboratory
 from tests.mission.worlds import mission_of as mission_over
 from tests.mission.worlds import stop

@@ -11,7 +11,7 @@ from stopgo.mission.files.exports import exported
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.imports.stops_csv import read
 from stopgo.mission.files.imports.track import ImportedRoute, ImportOptions
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.transform import SiteOrigin
 from tests.mission.exports.worlds import laboratory
 
 ZURICH = SiteOrigin(lat=47.3769, lon=8.5417, alt=408.0, heading_deg=0.0)

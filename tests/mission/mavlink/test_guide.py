@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from stopgo.mission.files import mission_json
-from stopgo.mission.geodesy import from_geodetic, to_geodetic
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.geodesy import from_geodetic, to_geodetic
+from stopgo.mission.frames.transform import SiteOrigin
 from tests.mission.worlds import square_tour
 
 GUIDE = (Path(__file__).parents[3] / "docs" / "reference" / "mavlink-items.md").read_text(encoding="utf-8")

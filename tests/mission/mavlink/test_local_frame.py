@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.local_frame import LocalFrame, VehicleOrigin, apart, local_frame
-from stopgo.mission.transform import SiteOrigin
 
 SITE = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=30.0)
 

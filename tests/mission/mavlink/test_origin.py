@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from stopgo.mission.geodesy import Geodetic
+from stopgo.mission.frames.geodesy import Geodetic
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.local_frame import how_far_off
-from stopgo.mission.transform import SiteOrigin
 
 SITE = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=0.0)
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 import pytest
 
 from stopgo.mission.errors import InputError
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from stopgo.mission.mavlink.recognise import recognise, stop_of_trigger, stops_of
 from stopgo.mission.mavlink.recognised_tour import RecognisedTour, recognised_tour
 from stopgo.mission.mavlink.translate import translate
-from stopgo.mission.transform import SiteOrigin
 from tests.mission.mavlink.worlds import NAMES, corner_tour, read_back
 from tests.mission.worlds import mission_of, square_tour, stop
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.ardupilot import keeps as ardupilot_keeps
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from stopgo.mission.mavlink.recognise import recognise
 from stopgo.mission.mavlink.recognised_tour import recognised_tour
-from stopgo.mission.transform import SiteOrigin
 
 LOG = Path(__file__).parents[3].parent / "shared" / "data" / "logs" / "rover-stop-and-go.BIN"
 # Where the log's ORGN message says that the vehicle's origin is.

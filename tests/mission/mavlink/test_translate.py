@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stopgo.mission.errors import AnswerIsNo, InputError
-from stopgo.mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
+from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import AUTOPILOTS
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from stopgo.mission.mavlink.translate import translate
-from stopgo.mission.transform import SiteOrigin
 from tests.mission.mavlink.worlds import (
     NAMES,
     changed,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import get_args
 
-from stopgo.mission.events import Pose
 from stopgo.mission.run.decision import Decision, Situation, decide
+from stopgo.mission.run.events import Pose
 from stopgo.mission.run.orders import FREE_VERBS, Order, Verb
 from stopgo.mission.run.states import DetailedState, Run
 from tests.bridge.world import corridor

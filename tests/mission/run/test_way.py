@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from stopgo.mission.run.way import foot
+from stopgo.mission.run.route_position import foot
 
 
 @pytest.mark.parametrize(("here", "metres"), [((2.0, 1.0), 1.0), ((-3.0, 4.0), 5.0), ((7.0, 4.0), 5.0)])

@@ -11,16 +11,16 @@ import pytest
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import BoolArray, IntArray
-from stopgo.mission.planning import Candidates, Visibility
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Candidates, Visibility
 from stopgo.planner import plan
-from stopgo.planner.anywhere.cells import Overlook, PlaceCells
 from stopgo.planner.candidates import candidates, judged
-from stopgo.planner.candidates.place import Place
+from stopgo.planner.geometry.shapes import local_origin, to_grid
+from stopgo.planner.selection.continuous_selection.cells import Overlook, PlaceCells
 from stopgo.planner.selection.cover import cover_of
 from stopgo.planner.selection.demands import Demands, demands_of
-from stopgo.planner.shapes import local_origin, to_grid
 from stopgo.planner.space.navigable import navigable
+from stopgo.planner.space.place import Place
 from stopgo.planner.visibility import visibility
 from tests.faults.sizes import size
 from tests.planner.worlds import column, hall, two_rooms

@@ -10,10 +10,10 @@ import ezdxf
 import pytest
 
 from stopgo.command_line import main
-from stopgo.mission.figures import Figures, percent
 from stopgo.mission.floor import FloorPlan, IgnoredLine, Rank
 from stopgo.mission.geometry import frozen
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages.figures import Figures, percent
 from stopgo.planner.appraisal.figures_of_route import ranked
 from tests.planner.worlds import (
     box,

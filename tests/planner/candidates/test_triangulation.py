@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import Polygon
-from stopgo.mission.planning import DROP_REASONS, KEPT, SLIVER, TOO_SMALL, Candidates
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import DROP_REASONS, KEPT, SLIVER, TOO_SMALL, Candidates
 from stopgo.planner.candidates import candidates
-from stopgo.planner.candidates.place import Place
 from stopgo.planner.candidates.triangulation import (
     LEAST_ANGLE,
     DrawnBoundary,
@@ -27,8 +26,9 @@ from stopgo.planner.candidates.triangulation import (
     triangulated,
     voronoi_points,
 )
-from stopgo.planner.shapes import segments_of
+from stopgo.planner.geometry.shapes import segments_of
 from stopgo.planner.space.navigable import navigable
+from stopgo.planner.space.place import Place
 from tests.faults.sizes import size
 from tests.planner.worlds import (
     SHARED,

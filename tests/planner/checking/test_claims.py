@@ -14,14 +14,14 @@ import pytest
 
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
-from stopgo.mission.figures import percent
 from stopgo.mission.files.coverage_json import Coverage, coverage_json
 from stopgo.mission.files.mission_json import read, write
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.planning import NavigableSpace, Route, Selection
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import NavigableSpace, Route, Selection
+from stopgo.mission.stages.figures import percent
 from stopgo.planner.checking.claims import Recount, overclaims, recount
-from stopgo.planner.sight.sight import sight
+from stopgo.planner.visibility.sight.sight import sight
 from tests.journeys.test_base import without_extras
 from tests.planner.test_command import drawn
 from tests.planner.worlds import (

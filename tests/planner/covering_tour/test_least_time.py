@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 
 import stopgo.planner.covering_tour.problem
-from stopgo.mission.planning import Route
-from stopgo.mission.schedule import leg_times, schedule, turn_time
+from stopgo.mission.document.schedule import leg_times, schedule, turn_time
+from stopgo.mission.document.specs import robot_of
 from stopgo.mission.settings import Settings
-from stopgo.mission.specs import robot_of
-from stopgo.planner.assemble import assemble
+from stopgo.mission.stages import Route
 from stopgo.planner.covering_tour import in_least_time
 from stopgo.planner.covering_tour.leg_table import MICROSECONDS
 from stopgo.planner.covering_tour.problem import problem_of
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, points_and_ends, rank_at_door
+from stopgo.planner.routing.assemble import assemble
 from stopgo.planner.selection import posed
 from stopgo.planner.selection.separators import pieces_of
 from tests.faults.sizes import size, some

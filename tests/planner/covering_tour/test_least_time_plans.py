@@ -15,16 +15,16 @@ import pytest
 
 from stopgo.command_line import main
 from stopgo.mission.document import mission_id
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.plan import Plan
-from stopgo.mission.planning import Route
-from stopgo.mission.schedule import schedule
 from stopgo.mission.settings import Settings, told_of
+from stopgo.mission.stages import Route
 from stopgo.planner import plan
-from stopgo.planner.further import PlannedFloor, top_up
-from stopgo.planner.sharing.dividing import taken_by
-from stopgo.recordings.report import plan_results
+from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, top_up
+from stopgo.planner.task_allocation.dividing import taken_by
+from stopgo.recordings.drawing.markdown import plan_results
 from tests.planner.worlds import box, column, floor_of, hall, shell
 
 SAMPLE = Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf"
@@ -67,7 +67,7 @@ def test_a_plan_for_the_least_time_passes_its_check(
 
 
 def test_a_person_reads_both_numbers() -> None:
-    from stopgo.planner.report import time_lines
+    from stopgo.planner.commands.plan_report import time_lines
 
     found = made(minimise="time").route
     assert found.time is not None
@@ -110,7 +110,7 @@ def test_a_floor_where_nothing_is_to_be_seen_is_told_as_ever(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("changes", [{"robots": 2}, {"shift": 300.0}], ids=str)
 def test_shared_out_it_is_never_slower_either(changes: dict[str, Any]) -> None:
-    from stopgo.mission.division import DividedRoute
+    from stopgo.mission.stages.division import DividedRoute
 
     def worth(found: Plan) -> tuple[float, float]:
         shared = found.divided

@@ -15,7 +15,7 @@ from floor_drawings import codes, new_drawing, rectangle
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.layer_kinds import entries_in, kinds_by_name
+from stopgo.mission.settings.layer_kinds import entries_in, kinds_by_name
 from stopgo.planner.floors import FloorOptions, read_floor, survey_floor
 from stopgo.planner.floors.layer_map import layer_map
 

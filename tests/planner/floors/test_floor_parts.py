@@ -13,7 +13,7 @@ from ezdxf.xclip import XClip
 from floor_drawings import Read, codes, rectangle
 
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.kinds import KINDS
+from stopgo.mission.settings.element_kinds import KINDS
 
 
 def lines_around(model: Modelspace, layer: str, corners: list[tuple[float, float]]) -> None:

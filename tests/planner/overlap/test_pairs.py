@@ -9,8 +9,8 @@ import pytest
 
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import frozen
-from stopgo.mission.planning import KEPT, OUTSIDE, Candidates
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import KEPT, OUTSIDE, Candidates
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors import read_floor
 from stopgo.planner.overlap import links_of, overlaps_of

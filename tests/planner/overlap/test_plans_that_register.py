@@ -10,15 +10,15 @@ import pytest
 
 from stopgo.mission.document import stop_names
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.network import Network, network_of
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages.network import Network, network_of
 from stopgo.planner import plan
 from stopgo.planner.candidates import candidates
 from stopgo.planner.checking.network_claims import network_overclaims
-from stopgo.planner.further import PlannedFloor, top_up
+from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.overlap import links_of
 from stopgo.planner.overlap.registered import SCANS_APART, registered_pairs
-from stopgo.planner.report import PlanReport
+from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, top_up
 from stopgo.planner.selection.separators import pieces_of
 from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import box, door, floor_of, room, shell, wall

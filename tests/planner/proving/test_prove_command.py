@@ -9,7 +9,7 @@ from pathlib import Path
 import ezdxf
 import pytest
 
-from stopgo.recordings.read import check
+from stopgo.recordings.rrd.read import check
 from tests.called import stopgo
 from tests.disk import small_disk
 

@@ -14,17 +14,17 @@ from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.files.coverage_json import Coverage, coverage_json
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray, frozen
-from stopgo.mission.plan_proof import PlanProof, Simulation
-from stopgo.mission.planning import NavigableSpace
-from stopgo.mission.proof_text import network_words
+from stopgo.mission.proof.plan_proof import PlanProof, Simulation
+from stopgo.mission.proof.proof_text import network_words
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import NavigableSpace
 from stopgo.planner import plan
-from stopgo.planner.proving.casting import RayFan, SolidScene
-from stopgo.planner.proving.extrusion import NONE, extruded
-from stopgo.planner.proving.proving import prove
-from stopgo.planner.proving.registering import off, registered, surface_of
-from stopgo.planner.proving.scanning import Stand, scanned
-from stopgo.planner.proving.strips import strips_of
+from stopgo.planner.scan_simulation.casting import RayFan, SolidScene
+from stopgo.planner.scan_simulation.extrusion import NONE, extruded
+from stopgo.planner.scan_simulation.proving import prove
+from stopgo.planner.scan_simulation.registering import off, registered, surface_of
+from stopgo.planner.scan_simulation.scanning import Stand, scanned
+from stopgo.planner.scan_simulation.strips import strips_of
 from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import box, column, element, hall, two_rooms
 

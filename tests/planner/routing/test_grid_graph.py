@@ -10,8 +10,8 @@ from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import Polygon
 from stopgo.mission.settings import Settings
-from stopgo.planner.assemble import check_legs
 from stopgo.planner.routing import route
+from stopgo.planner.routing.assemble import check_legs
 from stopgo.planner.routing.grid_graph import RESOLUTIONS, grid_ways, ways_on_grids
 from stopgo.planner.routing.roadmap import ways_between
 from stopgo.planner.space.navigable import navigable

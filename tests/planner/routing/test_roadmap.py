@@ -11,12 +11,12 @@ import shapely
 
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import Polygon
-from stopgo.mission.planning import NavigableSpace
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import NavigableSpace
+from stopgo.planner.geometry.shapes import local_origin, snapped, to_shape
 from stopgo.planner.routing import roadmap
 from stopgo.planner.routing.roadmap import outward_corners, ways_between
 from stopgo.planner.routing.ways import Ways
-from stopgo.planner.shapes import local_origin, snapped, to_shape
 from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import PAPER, box, column, element, hall, shared, two_rooms, wall
 

@@ -14,8 +14,8 @@ import shapely
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import frozen
-from stopgo.mission.planning import KEPT, Candidates, NavigableSpace, Route, Selection
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import KEPT, Candidates, NavigableSpace, Route, Selection
 from stopgo.planner.routing import ROUTERS, route
 from stopgo.planner.routing.roadmap import ways_between
 from stopgo.planner.space.navigable import navigable

@@ -12,8 +12,8 @@ from stopgo.mission.geometry import IntArray
 from stopgo.mission.settings import Settings
 from stopgo.planner.selection import EXACT_ROUNDS, ROUNDS, Searches
 from stopgo.planner.selection.bound import lower_bound
+from stopgo.planner.selection.connected_selection import JoinedCover, connected
 from stopgo.planner.selection.cover import Cover
-from stopgo.planner.selection.hanging_together import JoinedCover, connected
 from stopgo.planner.selection.separators import meets, pieces_of
 from tests.faults.sizes import size
 

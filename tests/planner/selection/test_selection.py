@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from stopgo.mission.planning import Selection, weights_of
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Selection, weights_of
 from stopgo.planner.selection import METHODS
 from stopgo.planner.selection.bound import counting_bound, multiplier_bound, relaxation_bound
 from stopgo.planner.selection.cover import Cover, cover_of

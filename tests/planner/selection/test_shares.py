@@ -13,8 +13,8 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import Polygon
-from stopgo.mission.planning import NavigableSpace, Selection, weights_of
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import NavigableSpace, Selection, weights_of
 from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import (
     box,

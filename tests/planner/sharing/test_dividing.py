@@ -15,24 +15,24 @@ import pytest
 
 from stopgo.command_line import main
 from stopgo.mission.document import MissionShare
+from stopgo.mission.document.problems import problems_of
+from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import AnswerIsNo, InputError
 from stopgo.mission.files.coverage_json import coverage_json
 from stopgo.mission.files.plan_svg import plan_svg
 from stopgo.mission.files.plan_toml import read_settings
-from stopgo.mission.network import network_of
-from stopgo.mission.parameter import seconds
 from stopgo.mission.plan import DividedPlan, Plan
-from stopgo.mission.planning import Route
-from stopgo.mission.problems import problems_of
-from stopgo.mission.schedule import schedule
 from stopgo.mission.settings import Settings, told_of
+from stopgo.mission.settings.parameter import seconds
+from stopgo.mission.stages import Route
+from stopgo.mission.stages.network import network_of
 from stopgo.planner import plan
 from stopgo.planner.checking.network_claims import network_overclaims
-from stopgo.planner.further import PlannedFloor, top_up
-from stopgo.planner.report import PlanReport
-from stopgo.planner.sharing.least_times import least_makespan, least_tours
-from stopgo.planner.sharing.shared_report import shared_report
-from stopgo.planner.sharing.tour_times import TourTimes, tour_times
+from stopgo.planner.commands.plan_report import PlanReport
+from stopgo.planner.commands.shared_report import shared_report
+from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, top_up
+from stopgo.planner.task_allocation.least_times import least_makespan, least_tours
+from stopgo.planner.task_allocation.tour_times import TourTimes, tour_times
 from tests.planner.worlds import column, hall, planned, two_rooms
 
 SAMPLE = Path(__file__).parents[3] / "recordings" / "samples" / "office.dxf"

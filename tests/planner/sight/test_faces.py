@@ -12,7 +12,7 @@ import shapely
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import Polygon
-from stopgo.planner.shapes import (
+from stopgo.planner.geometry.shapes import (
     GRID,
     local_origin,
     polygon_parts,
@@ -21,10 +21,10 @@ from stopgo.planner.shapes import (
     snapped_union,
     whole_steps,
 )
-from stopgo.planner.sight.mesh import mesh_of
-from stopgo.planner.sight.sight import scene_of
 from stopgo.planner.space.targets import occluders_of, without_cracks
 from stopgo.planner.visibility.exact_sight import open_space
+from stopgo.planner.visibility.sight.mesh import mesh_of
+from stopgo.planner.visibility.sight.sight import scene_of
 from tests.faults.sizes import some
 from tests.planner.visibility.test_visibility import at, by_force, rows_of
 from tests.planner.worlds import LAYERED, PAPER, box, floor_of, moved, shared, turned, wall

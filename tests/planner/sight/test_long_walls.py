@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from stopgo.mission.errors import InputError
-from stopgo.planner.compiling import compiled
-from stopgo.planner.shapes import GRID, to_grid
-from stopgo.planner.sight.kernel import FARTHEST, MOST_UNITS, not_negative, within_reach
-from stopgo.planner.sight.sight import scene_of, sight
+from stopgo.planner.geometry.compiling import compiled
+from stopgo.planner.geometry.shapes import GRID, to_grid
+from stopgo.planner.visibility.sight.kernel import FARTHEST, MOST_UNITS, not_negative, within_reach
+from stopgo.planner.visibility.sight.sight import scene_of, sight
 from tests.planner.long_walls import RANGES, told
 from tests.planner.sight.test_sight import World
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import shapely
 
-import stopgo.planner.sight.sight
-from stopgo.planner.shapes import GRID, polygon_parts, snapped_union, to_grid, whole_steps
-from stopgo.planner.sight.mesh import containing, mesh_of
-from stopgo.planner.sight.sight import Runs, Scene, scene_of, sight
-from stopgo.planner.sight.sightlines import Midpoints
+import stopgo.planner.visibility.sight.sight
+from stopgo.planner.geometry.shapes import GRID, polygon_parts, snapped_union, to_grid, whole_steps
 from stopgo.planner.space.targets import face_segments, units_on
+from stopgo.planner.visibility.sight.mesh import containing, mesh_of
+from stopgo.planner.visibility.sight.sight import Runs, Scene, scene_of, sight
+from stopgo.planner.visibility.sight.sightlines import Midpoints
 from tests.faults.sizes import size
 from tests.planner.oracle import visible_pairs
 
@@ -115,9 +115,9 @@ def test_the_kernel_agrees_with_brute_force_on_lattice_floors(reach: float | Non
 def test_compiled_and_interpreted_kernels_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in range(20):
         world = lattice_world(1000 + seed)
-        monkeypatch.setattr(stopgo.planner.sight.sight, "COMPILE_ABOVE", np.inf)
+        monkeypatch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", np.inf)
         interpreted = sight(world.scene(), world.viewpoints, reach=2.5)
-        monkeypatch.setattr(stopgo.planner.sight.sight, "COMPILE_ABOVE", -1)
+        monkeypatch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", -1)
         compiled = sight(world.scene(), world.viewpoints, reach=2.5)
         for name in ("pointer", "segment", "low", "high"):
             assert np.array_equal(getattr(interpreted, name), getattr(compiled, name)), (seed, name)
@@ -145,7 +145,7 @@ def test_a_limited_look_sees_what_lies_between_its_limits(
     compile_above: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What lies on a limit may need a ray turned beyond it, so only what lies between is certain."""
-    monkeypatch.setattr(stopgo.planner.sight.sight, "COMPILE_ABOVE", compile_above)
+    monkeypatch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", compile_above)
     for seed in range(20):
         world = lattice_world(6000 + seed)
         random = np.random.default_rng(seed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stopgo.planner.sight.sightlines import Midpoints, sees
+from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
 from tests.planner.oracle import seen_in_fractions
 
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from stopgo.mission.limits import ViewLimits
-from stopgo.planner.shapes import GRID
-from stopgo.planner.sight.well_seen import SeenSegments, clipped, well_seen
+from stopgo.mission.document.limits import ViewLimits
+from stopgo.planner.geometry.shapes import GRID
+from stopgo.planner.visibility.sight.well_seen import SeenSegments, clipped, well_seen
 from tests.faults.sizes import size
 
 STEP = math.radians(0.036)

@@ -11,8 +11,8 @@ import pytest
 
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import Polygon
-from stopgo.mission.planning import NavigableSpace, OpeningState
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import NavigableSpace, OpeningState
 from stopgo.planner.routing.roadmap import ways_between
 from stopgo.planner.space.gaps import Site
 from stopgo.planner.space.navigable import navigable

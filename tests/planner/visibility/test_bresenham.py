@@ -7,10 +7,10 @@ import pytest
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.planning import Candidates, Visibility
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Candidates, Visibility
 from stopgo.planner.candidates import candidates
-from stopgo.planner.compiling import compiled
+from stopgo.planner.geometry.compiling import compiled
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility import visibility
 from stopgo.planner.visibility.bresenham import bresenham, clear_line, clear_lines

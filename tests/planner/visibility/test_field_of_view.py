@@ -9,8 +9,8 @@ import pytest
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.planning import KEPT, Candidates, Route, Visibility
 from stopgo.mission.settings import Settings, check_settings
+from stopgo.mission.stages import KEPT, Candidates, Route, Visibility
 from stopgo.planner.candidates import candidates
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility import visibility

@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 
 from stopgo.mission.document import canonical
+from stopgo.mission.document.problems import problems_of
 from stopgo.mission.errors import AnswerIsNo
 from stopgo.mission.files.mission_json import encode, parse
-from stopgo.mission.planning import NavigableSpace, Selection, Visibility
-from stopgo.mission.problems import problems_of
 from stopgo.mission.settings import Settings
-from stopgo.mission.sight import Sight, sight_of
+from stopgo.mission.stages import NavigableSpace, Selection, Visibility
+from stopgo.mission.stages.sight import Sight, sight_of
 from stopgo.planner import plan
+from stopgo.planner.commands.plan_report import PlanReport
 from stopgo.planner.floors import read_floor
-from stopgo.planner.report import PlanReport
-from stopgo.planner.sight.sightlines import SightLines
+from stopgo.planner.visibility.sight.sightlines import SightLines
 from tests.faults.sizes import FULL
 from tests.planner.worlds import LAYERED, SHARED, box, column, element, hall, planned, two_rooms
 

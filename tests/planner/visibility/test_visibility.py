@@ -13,10 +13,10 @@ import pytest
 from stopgo.mission.errors import StopgoError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import Polygon, frozen
-from stopgo.mission.planning import KEPT, Candidates, Targets, Visibility
 from stopgo.mission.settings import Settings
+from stopgo.mission.stages import KEPT, Candidates, Targets, Visibility
 from stopgo.planner.candidates import candidates
-from stopgo.planner.shapes import GRID, local_origin, to_grid, whole_steps_of
+from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, whole_steps_of
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.space.targets import face_segments
 from stopgo.planner.visibility import visibility

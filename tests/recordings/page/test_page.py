@@ -13,15 +13,15 @@ import pytest
 
 from stopgo.command_line import main
 from stopgo.mission.comparing.compare import compare
-from stopgo.mission.comparing.judging import judge
+from stopgo.mission.comparing.run_verdict import judge
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.events import Finished, Paused, Resumed, Skipped
-from stopgo.mission.run_log import Alignment
-from stopgo.recordings.carried.floor_lines import FloorLines
+from stopgo.mission.run.events import Finished, Paused, Resumed, Skipped
+from stopgo.mission.run.run_log import Alignment
+from stopgo.recordings.embedded.floor_lines import FloorLines
 from stopgo.recordings.page import ReportSubject, report_html
 from stopgo.recordings.page.from_recordings import subject_of
+from stopgo.recordings.page.reviewed import review
 from stopgo.recordings.page.words import number, shown
-from stopgo.recordings.review import review
 from tests.mission.comparing.test_compare import START, planned, run, visit
 from tests.mission.comparing.told import told
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from stopgo.mission.document import Mission, Point
-from stopgo.mission.run_log import Track
+from stopgo.mission.run.run_log import Track
 from tests.mission.worlds import mission_of, stop
 
 HZ = 10

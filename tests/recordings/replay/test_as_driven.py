@@ -13,7 +13,7 @@ from stopgo.command_line import main
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import read, write
 from stopgo.mission.geometry import Polygon
-from stopgo.planner.further import PlannedFloor, as_driven, planned_floor, top_up
+from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, as_driven, planned_floor, top_up
 from tests.planner.test_command import drawn
 from tests.recordings.replay.driving import Odd, driven, logged
 

@@ -14,11 +14,11 @@ from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import Setting
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
 from stopgo.mission.document import Mission
-from stopgo.mission.events import Pose, Scanned, Unconfirmed
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command
 from stopgo.mission.mavlink.read_back import upload_of
 from stopgo.mission.mavlink.translate import translate
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.run.events import Pose, Scanned, Unconfirmed
 from stopgo.recordings.logs import read_log
 from stopgo.recordings.replay.judged import judged
 from stopgo.recordings.replay.log_placing import Placing

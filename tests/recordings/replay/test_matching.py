@@ -10,10 +10,10 @@ import pytest
 
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import AnswerIsNo
-from stopgo.mission.run_log import Track
+from stopgo.mission.run.run_log import Track
 from stopgo.recordings.replay.fitting import fitted
 from stopgo.recordings.replay.matching import Match, matched
-from stopgo.recordings.replay.standing import standings
+from stopgo.recordings.replay.standstills import standings
 from tests.mission.worlds import mission_of, stop
 from tests.recordings.replay.driving import BEGIN_NS, Odd, Senses, driven, logged, wandering
 

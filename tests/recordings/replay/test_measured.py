@@ -15,14 +15,14 @@ import shapely
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
 from stopgo.mission.files.mission_json import read
-from stopgo.planner.further import PlannedFloor, planned_floor, top_up
-from stopgo.planner.measuring import measured
+from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, planned_floor, top_up
+from stopgo.planner.pipeline.measuring import measured
 from stopgo.recordings.logs.field_log import FieldLog, Sweep
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.placed_sweeps import placed_sweeps
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
-from stopgo.recordings.replay.standing import standings
+from stopgo.recordings.replay.standstills import standings
 from tests.planner.test_command import drawn
 from tests.recordings.replay.driving import driven, logged
 from tests.recordings.replay.test_as_driven import PLAN

@@ -11,14 +11,14 @@ import pytest
 from stopgo.bridge.robot.journal import open_journal
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import InputError
-from stopgo.mission.events import Arrived, Finished, Scanned, Skipped, Started
-from stopgo.mission.run_log import RunLog
-from stopgo.recordings.field import FieldRecording
+from stopgo.mission.run.events import Arrived, Finished, Scanned, Skipped, Started
+from stopgo.mission.run.run_log import RunLog
 from stopgo.recordings.logs import read_log
 from stopgo.recordings.replay.judged import judged
 from stopgo.recordings.replay.log_placing import Placing
 from stopgo.recordings.replay.replayed import Replay
 from stopgo.recordings.replay.replaying import replay
+from stopgo.recordings.runs.field import FieldRecording
 from tests.mission.comparing.told import SCAN, at, told
 from tests.recordings.replay.driving import wandering
 

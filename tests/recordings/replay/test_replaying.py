@@ -18,8 +18,8 @@ from stopgo.command_line import main
 from stopgo.mission.document import Frame, Mission, sealed
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import write
-from stopgo.mission.run_log import Track
-from stopgo.mission.transform import SiteOrigin, Transform
+from stopgo.mission.frames.transform import SiteOrigin, Transform
+from stopgo.mission.run.run_log import Track
 from stopgo.recordings.logs.field_log import FieldLog, Poses, Remark, poses_of
 from stopgo.recordings.replay.judged import judged
 from stopgo.recordings.replay.log_placing import Placing
@@ -218,7 +218,7 @@ def test_the_command_reads_a_bag_and_writes_table_and_recording(
     assert "scan it again" in page
     assert "coverage acquired" not in page
     assert len((tmp_path / "stops.csv").read_text().splitlines()) == 1 + len(MISSION.stops)
-    from stopgo.recordings.review import review
+    from stopgo.recordings.page.reviewed import review
 
     (run,) = review([tmp_path / "replay.rrd"]).comparisons
     assert run.log.ended

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stopgo.mission.events import Arrived, Failed, Homing, Scanned
+from stopgo.mission.run.events import Arrived, Failed, Homing, Scanned
 from stopgo.recordings.replay.told_visits import told_visits
 from tests.mission.comparing.told import SCAN, at, told
 from tests.mission.worlds import square_tour

@@ -18,11 +18,11 @@ from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.robot.base import Outcome
 from stopgo.bridge.robot.journal import open_journal
 from stopgo.bridge.robot.simulator import SHAKE_M, Fault, Faults, SimulatedBase, Wear
+from stopgo.mission.comparing.run_collector import RunTaker
 from stopgo.mission.document import Mission, Point, Scan, Stop
-from stopgo.mission.events import AnyEvent, Pose, PoseReport, RevisionTaken
-from stopgo.mission.heard_run import RunTaker
+from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, RevisionTaken
 from stopgo.mission.run.scans import ScanFailed, ScanResult
-from stopgo.recordings.field import FieldRecording
+from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.world import Field
 
 GOES_ON = ("resume", "retry", "skip")

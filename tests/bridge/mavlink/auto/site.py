@@ -23,13 +23,13 @@ from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.events import AnyEvent, Pose
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.read_back import upload_of
 from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.events import AnyEvent, Pose
 from stopgo.mission.run.states import Run
-from stopgo.mission.transform import SiteOrigin
 from tests.mission.mavlink.following.worlds import told, tour
 from tests.ports import free_port
 

@@ -7,11 +7,11 @@ from stopgo.bridge.mavlink.auto.auto_follower import AutoFollower
 from stopgo.bridge.mavlink.auto.logbook import Logbook, remember
 from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.robot.journal import memory_journal
-from stopgo.mission.events import Paused
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.telemetry import Message
 from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.events import Paused
 from stopgo.mission.run.states import started
 from tests.mission.mavlink.following.worlds import tour
 

@@ -10,9 +10,9 @@ import pytest
 from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.mavlink.line.peer import reached as found_peer
 from stopgo.mission.document import sealed
-from stopgo.mission.events import Arrived, Failed, Held, PoseReport, Scanned, StateReport, Unconfirmed
-from stopgo.recordings.field import FieldRecording
-from stopgo.recordings.review import review
+from stopgo.mission.run.events import Arrived, Failed, Held, PoseReport, Scanned, StateReport, Unconfirmed
+from stopgo.recordings.page.reviewed import review
+from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
 from tests.mission.mavlink.following.worlds import told
 

@@ -13,8 +13,8 @@ from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.robot.journal import open_journal
 from stopgo.mission.errors import AnswerIsNo, InputError
-from stopgo.mission.events import Aborted, Paused
 from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.events import Aborted, Paused
 from stopgo.mission.run.states import Change, Run, changed, started
 from tests.mission.mavlink.following.worlds import tour
 

@@ -16,13 +16,13 @@ from stopgo.bridge.mavlink.auto.logbook import Logbook, remember
 from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.robot.journal import memory_journal
 from stopgo.mission.document import Mission
-from stopgo.mission.events import AnyEvent, Arrived, Failed
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.items import Command, Item, ItemList
 from stopgo.mission.mavlink.recognise import recognise
+from stopgo.mission.run.events import AnyEvent, Arrived, Failed
 from stopgo.mission.run.states import started
-from stopgo.mission.transform import SiteOrigin
 from tests.mission.mavlink.following.worlds import told
 from tests.mission.worlds import mission_of, stop
 

@@ -15,16 +15,16 @@ from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.line.peer import reached as found_peer
 from stopgo.bridge.mavlink.simulated.estimator import Estimator
 from stopgo.bridge.station.watch import Lines, watch_showing
+from stopgo.mission.comparing.run_collector import HeardRun
 from stopgo.mission.document import Scan
 from stopgo.mission.errors import AnswerIsNo
-from stopgo.mission.events import Failed, Scanned, Unconfirmed
-from stopgo.mission.heard_run import HeardRun
-from stopgo.mission.tolerance import deviation
-from stopgo.recordings.field import FieldRecording
+from stopgo.mission.run.events import Failed, Scanned, Unconfirmed
+from stopgo.mission.run.tolerance import deviation
+from stopgo.recordings.catalog.run_index import index_of, index_text
 from stopgo.recordings.page import report_html
 from stopgo.recordings.page.from_recordings import subject_of
-from stopgo.recordings.review import review
-from stopgo.recordings.run_index import index_of, index_text
+from stopgo.recordings.page.reviewed import review
+from stopgo.recordings.runs.field import FieldRecording
 from tests.bridge.mavlink.auto.site import PATIENCE_S, Site, real_tour, until, watched
 from tests.mission.mavlink.following.worlds import told
 

@@ -14,8 +14,8 @@ from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.line.peer import reached as found_peer
 from stopgo.bridge.station.follow import Silence
 from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown
-from stopgo.mission.events import Arrived, Held, Paused, Resumed, Started
 from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.events import Arrived, Held, Paused, Resumed, Started
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
 from tests.mission.mavlink.following.worlds import told
 

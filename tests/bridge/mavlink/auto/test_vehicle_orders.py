@@ -16,10 +16,10 @@ from stopgo.bridge.mavlink.simulated.vehicle_store import Store
 from stopgo.bridge.robot.answers import answer_to, remember_answer
 from stopgo.mission.document import Scan
 from stopgo.mission.errors import AnswerIsNo, InputError, RobotUnreachable
-from stopgo.mission.events import Aborted, Pose, Resumed, Started
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.events import Aborted, Pose, Resumed, Started
 from stopgo.mission.run.orders import Order
-from stopgo.mission.transform import SiteOrigin
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
 from tests.mission.mavlink.following.worlds import told
 

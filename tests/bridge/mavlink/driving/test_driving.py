@@ -16,11 +16,11 @@ from stopgo.bridge.mavlink.line.wire import read_signing_key
 from stopgo.bridge.mavlink.simulated.chassis import Chassis
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
 from stopgo.bridge.station.watch import Lines, watch_showing
+from stopgo.mission.comparing.run_collector import HeardRun
 from stopgo.mission.document import Scan, sealed
 from stopgo.mission.errors import AnswerIsNo, InputError, RobotUnreachable
-from stopgo.mission.events import Arrived, Finished, Held, PoseReport, Scanned
-from stopgo.mission.heard_run import HeardRun
 from stopgo.mission.mavlink.telemetry import STILL_M_S
+from stopgo.mission.run.events import Arrived, Finished, Held, PoseReport, Scanned
 from tests.bridge.mavlink.driving.world import (
     SITE,
     bearing_of_corridor,

@@ -19,7 +19,7 @@ from stopgo.bridge.mavlink.line.peer import reached
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.station.station import connect
 from stopgo.mission.document import Mission, Scan, sealed
-from stopgo.mission.events import Scanned
+from stopgo.mission.run.events import Scanned
 from tests.bridge.mavlink.driving.world import Operator, is_state, site_mission, until
 from tests.called import stopgo
 from tests.ports import free_port

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from stopgo.bridge.mavlink.driving.straight_drive import CREEP_M_S, Ability, Patience, StraightDrive
-from stopgo.mission.events import Pose
+from stopgo.mission.run.events import Pose
 
 ABILITY = Ability(near_m=0.03, over_m=0.35, speed=0.5, acceleration=0.5, gives_up_s=1.0, reverses=True)
 

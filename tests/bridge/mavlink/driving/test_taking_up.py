@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaultKind, VehicleFaults
-from stopgo.mission.events import Arrived, Held, Pose, PoseReport
-from stopgo.mission.run.way import foot
-from stopgo.mission.schedule import schedule
+from stopgo.mission.document.schedule import schedule
+from stopgo.mission.run.events import Arrived, Held, Pose, PoseReport
+from stopgo.mission.run.route_position import foot
 from tests.bridge.mavlink.driving.world import (
     cornered_mission,
     events_of,

@@ -26,8 +26,8 @@ from stopgo.bridge.robot.program import RobotOptions, robot_on
 from stopgo.bridge.station.follow import Report
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission, Scan, sealed
-from stopgo.mission.events import AnyEvent, Pose, PoseReport, Scanned, StateReport
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.frames.transform import SiteOrigin
+from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, Scanned, StateReport
 from tests.bridge.world import corridor, pose_of
 from tests.ports import free_port
 

@@ -15,10 +15,10 @@ from stopgo.bridge.mavlink.simulated.complete_vehicle import complete_vehicle
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import Setting
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFaults, read_vehicle_fault
-from stopgo.mission.events import Pose
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from stopgo.mission.mavlink.telemetry import Message
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.run.events import Pose
 
 ORIGIN = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=0.0)
 STATION, OTHER = Who(254, 190), Who(253, 190)

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from stopgo.bridge.mavlink.line.frames import dialect
-from stopgo.mission.events import Pose
 from stopgo.mission.mavlink.enums import MessageId
+from stopgo.mission.run.events import Pose
 from tests.bridge.mavlink.simulated.bench import Bench, delay, waypoint
 
 LOG = Path(__file__).parents[4].parent / "shared" / "data" / "logs" / "rover-stop-and-go.BIN"

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from stopgo.mission.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
+from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.read_back import differences, upload_of
 from stopgo.mission.mavlink.stop_numbers import stop_numbered

@@ -303,7 +303,7 @@ def test_every_fault_can_be_written_and_is_in_the_guide() -> None:
 
 
 def test_a_pose_is_said_in_the_sites_frame() -> None:
-    from stopgo.mission.events import Pose
+    from stopgo.mission.run.events import Pose
 
     options = VehicleOptions("udpin:127.0.0.1:1", origin="47,8,0,90", at=Pose(x=1.0, y=2.0, heading=0.0))
     setting = setting_of(options)

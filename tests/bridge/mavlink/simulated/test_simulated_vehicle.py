@@ -14,10 +14,10 @@ from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.rover import to_east
 from stopgo.bridge.mavlink.simulated.vehicle_process import read_origin
 from stopgo.bridge.mavlink.simulated.vehicle_telemetry import MAKERS
-from stopgo.mission.events import Pose
+from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.items import Command, Item, MavFrame
 from stopgo.mission.mavlink.telemetry import Message
-from stopgo.mission.transform import SiteOrigin
+from stopgo.mission.run.events import Pose
 from tests.bridge.mavlink.simulated.bench import (
     OBEYED,
     OTHER,

@@ -12,9 +12,9 @@ from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.simulated.profiles import PROFILES
 from stopgo.bridge.mavlink.simulated.vehicle import Setting
 from stopgo.bridge.mavlink.simulated.vehicle_process import vehicle_on
-from stopgo.bridge.mavlink.transfer.after_failure import own_items
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import clear, upload
+from stopgo.bridge.mavlink.transfer.upload_recovery import own_items
 from tests.bridge.mavlink.hostile import Hostile
 from tests.bridge.mavlink.lists import stops
 from tests.ports import free_port

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from stopgo.mission.events import Arrived, Pose
-from stopgo.mission.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic
+from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE, bearing_deg, to_geodetic
 from stopgo.mission.mavlink.autopilots.ardupilot import ARDUPILOT
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from stopgo.mission.mavlink.following.observer import Observer
 from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.events import Arrived, Pose
 from stopgo.mission.run.scans import ScanFailed, ScanResult
 from stopgo.mission.run.states import Run
 from tests.mission.mavlink.following.worlds import tour

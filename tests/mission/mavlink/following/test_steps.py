@@ -6,11 +6,11 @@ import msgspec
 import pytest
 
 from stopgo.mission.document import ScannerSpec
-from stopgo.mission.events import AnyEvent, Pose
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from stopgo.mission.mavlink.following.resuming import resume_place
 from stopgo.mission.mavlink.following.steps import Observation, held_by_vehicle, passed_by, steps, taken_over
 from stopgo.mission.mavlink.translate import translate
+from stopgo.mission.run.events import AnyEvent, Pose
 from stopgo.mission.run.scans import ScanFailed, ScanResult
 from stopgo.mission.run.states import Run
 from tests.mission.mavlink.following.worlds import told, tour

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from stopgo.mission.document import Mission, Scan, Stop
-from stopgo.mission.events import AnyEvent
+from stopgo.mission.run.events import AnyEvent
 from tests.mission.worlds import mission_of, stop
 
 

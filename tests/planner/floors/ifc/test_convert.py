@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-import stopgo.planner.storeys
+import stopgo.planner.commands.storeys
 from stopgo.command_line import main
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import Polygon
 from stopgo.mission.settings import Settings
+from stopgo.planner.commands.storeys import Planned, folder_names, plan_storeys
 from stopgo.planner.floors import read_floor
-from stopgo.planner.storeys import Planned, folder_names, plan_storeys
 from tests.planner.floors.ifc.conftest import Read
 from tests.planner.floors.ifc.house import two_rooms
 
@@ -80,7 +80,7 @@ class InThisProcess:
 def test_every_storey_that_people_walk_on_is_planned_into_its_folder(
     house_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stopgo.planner.storeys, "ProcessPoolExecutor", InThisProcess)
+    monkeypatch.setattr(stopgo.planner.commands.storeys, "ProcessPoolExecutor", InThisProcess)
     asked: list[tuple[Path, str | None]] = []
 
     def plan_one(floor: Path, folder: Path, settings: Settings) -> Planned:

@@ -1,0 +1,44 @@
+"""What a robot has done and its journal could not take: stored as soon as there is room again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from stopgo.bridge.robot.answers import remember_answer
+from stopgo.bridge.robot.journal import Journal
+from stopgo.mission.run.events import AnyEvent
+from stopgo.mission.run.orders import Answer, Order
+
+
+class Unstored:
+    """Events and answers in the order in which they came to be; gone if the power fails before."""
+
+    def __init__(self) -> None:
+        self._events: list[AnyEvent] = []
+        self._answers: dict[str, tuple[Order, Answer]] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._events or self._answers)
+
+    def add(
+        self, events: Iterable[AnyEvent], order: Order | None = None, answer: Answer | None = None
+    ) -> None:
+        self._events += events
+        if order is not None and answer is not None:
+            self._answers[order.cmd_id] = (order, answer)
+
+    def answered(self, order: Order) -> Answer | None:
+        """The answer that this very order got."""
+        before = self._answers.get(order.cmd_id)
+        return before[1] if before is not None and before[0] == order else None
+
+    def store(self, journal: Journal) -> None:
+        """Write all of it, in the caller's transaction; `clear` once that has come to be."""
+        for event in self._events:
+            journal.append(event)
+        for order, answer in self._answers.values():
+            remember_answer(journal, order, answer)
+
+    def clear(self) -> None:
+        self._events.clear()
+        self._answers.clear()

@@ -1,0 +1,68 @@
+"""A run that is over, told once more: events from the journal, and where the robot was from its record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from stopgo.bridge.link.capabilities import RECORD
+from stopgo.bridge.station.follow import Followed
+from stopgo.bridge.station.record import Past, past_run, read_index
+from stopgo.bridge.station.station import Station
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.run.events import Aborted, AnyEvent, Finished, Scanned, Skipped, StateReport, Unconfirmed
+from stopgo.mission.run.tolerance import stops_outside
+
+
+def past_reports(
+    station: Station, run_id: str, mission_of: Callable[[str, int], Mission | None]
+) -> Iterator[Followed]:
+    """Events, poses and states of a run that is over, in the order of their times; last how it ended.
+
+    `mission_of` knows a mission and revision once an event of it has been told.
+
+    Raises
+    ------
+    AnswerIsNo
+        If the robot has no such run, or it is still under way.
+    OutcomeUnknown
+        If the robot stopped answering.
+    """
+    robot, recorded = station.keys.robot, RECORD in station.info().capabilities
+    events = station.log(run_id=run_id)
+    if not events:
+        raise AnswerIsNo(f"{robot} has no run {run_id}; it has {_runs(station) if recorded else 'others'}")
+    end = events[-1]
+    if not isinstance(end, Finished | Aborted):
+        raise AnswerIsNo(f"run {run_id} of {robot} is still under way; follow it without --run")
+    waiting, battery = list(events), 0.0
+    told = past_run(station.link, station.keys, run_id, patience_s=station.patience_s) if recorded else ()
+    for item in told:
+        if isinstance(item, Past):
+            battery = item.report.battery
+        else:
+            while waiting and waiting[0].robot_ns <= item.robot_ns:
+                yield waiting.pop(0)
+        yield item
+    yield from waiting
+    yield _ended(events, end, battery, tuple(stops_outside(events, mission_of)))
+
+
+def _runs(station: Station) -> str:
+    index = read_index(station.link, station.keys, timeout_s=station.timeout_s)
+    kept = () if index is None else tuple(run.run_id for run in index.runs)
+    return ", ".join(kept) or "none"
+
+
+def _ended(
+    events: tuple[AnyEvent, ...], end: Finished | Aborted, battery: float, outside: tuple[str, ...]
+) -> StateReport:
+    done = tuple(event.stop for event in events if isinstance(event, Scanned | Unconfirmed))
+    skipped = tuple(event.stop for event in events if isinstance(event, Skipped))
+    return StateReport(
+        robot=end.robot, boot_id=end.boot_id, seq=0, robot_ns=end.robot_ns,
+        state="FINISHED" if isinstance(end, Finished) else "ABORTED",
+        run_id=end.run_id, mission_id=end.mission_id, revision=end.revision, stop=None, stop_state=None,
+        done=done, skipped=skipped, battery=battery, last_event=end.number,
+        done_count=len(done), skipped_count=len(skipped), outside=outside, outside_count=len(outside),
+    )  # fmt: skip

@@ -1,0 +1,160 @@
+"""Plan against run: what each stop was planned to be, and what it was."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from stopgo.mission.comparing.acquired import Acquired
+from stopgo.mission.document import Mission
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.mission.run.events import State
+from stopgo.mission.run.run_log import RunLog
+from stopgo.mission.run.tolerance import beside, is_outside
+
+DONE = {"scanned": "scanned", "unconfirmed": "passed"}
+"""Outcomes of a stop that is done, in words."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StopComparison:
+    """One stop; what did not happen is None."""
+
+    stop: str
+    planned_s: float | None = None
+    """Planned arrival, from the start of the mission; None if no plan has this stop."""
+    arrived_s: float | None = None
+    """First arrival in the run, from the start of the run."""
+    deviation_m: float | None = None
+    """Distance of the robot from the stop when it scanned or passed there, else when it last arrived."""
+    along_m: float | None = None
+    """The part of it in the direction in which the robot was to arrive, positive where it went too far."""
+    across_m: float | None = None
+    """The part of it to the left of that direction."""
+    heading_rad: float | None = None
+    """How much farther to the left the robot was turned than planned."""
+    tolerance_m: float | None = None
+    settle_s: float | None = None
+    """How long it stood until it was still, the last time."""
+    tries: int = 0
+    """How often it was ready to scan there."""
+    outcome: str
+    """`scanned`, `unconfirmed`, `skipped`, `failed`, `arrived` or `not reached`; `withdrawn` if a revision
+    dropped it unreached."""
+    reason: str = ""
+    """Why it was not scanned, in the robot's words."""
+    lost: float | None = None
+    """Share of all that is visible that its scan would have added; None where it is not missing."""
+
+    @property
+    def late_s(self) -> float | None:
+        if self.arrived_s is None or self.planned_s is None:
+            return None
+        return self.arrived_s - self.planned_s
+
+    @property
+    def outside_tolerance(self) -> bool:
+        """Whether the robot was farther from the stop than the mission tolerates."""
+        away, limit = self.deviation_m, self.tolerance_m
+        return away is not None and limit is not None and is_outside(away, limit)
+
+    @property
+    def seen_beside(self) -> str:
+        """That it was scanned, or passed, from elsewhere, in words; empty if it was not."""
+        if self.outcome not in DONE or not self.outside_tolerance:
+            return ""
+        return f"{DONE[self.outcome]} {beside(self.deviation_m or 0.0, self.tolerance_m or 0.0)}"
+
+
+@dataclass(frozen=True)
+class Span:
+    """A time during which a run was in one state, in seconds since it began."""
+
+    state: State
+    begin_s: float
+    end_s: float
+    why: str = ""
+
+    @property
+    def seconds(self) -> float:
+        return self.end_s - self.begin_s
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """How far the robot was beside the legs it drove, at every pose of its run."""
+
+    ns: IntArray
+    """When (n,)."""
+    metres: FloatArray
+    """Signed, positive to the left of the driving direction (n,); NaN where there is no leg to drive."""
+    arc: FloatArray
+    """How far along the way since the last stop (n,)."""
+
+    @property
+    def greatest(self) -> int | None:
+        """Index of the pose that was farthest beside the way; None if there is none."""
+        away = np.where(np.isfinite(self.metres), np.abs(self.metres), -1.0)
+        return int(np.argmax(away)) if len(away) and away.max() >= 0 else None
+
+    @property
+    def greatest_m(self) -> float | None:
+        index = self.greatest
+        return None if index is None else float(abs(self.metres[index]))
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A run beside its mission."""
+
+    missions: tuple[Mission, ...]
+    """The revisions that were followed, the last one last."""
+    log: RunLog
+    stops: tuple[StopComparison, ...]
+    spans: tuple[Span, ...]
+    beside: Beside
+    planned_s: float
+    driven_s: float | None
+    """Duration of the run; None if it has not ended."""
+    acquired: Acquired | None = None
+    """None where no plan tells what the stops see."""
+
+    @property
+    def mission(self) -> Mission:
+        return self.missions[-1]
+
+    @property
+    def run_id(self) -> str | None:
+        return self.log.run_id
+
+    @property
+    def scanned(self) -> int:
+        """Number of stops that were scanned."""
+        return sum(item.outcome == "scanned" for item in self.stops)
+
+    @cached_property
+    def asked(self) -> tuple[StopComparison, ...]:
+        """The stops of the revision that was followed last."""
+        ids = {stop.id for stop in self.mission.stops}
+        return tuple(item for item in self.stops if item.stop in ids)
+
+    @cached_property
+    def missing(self) -> tuple[StopComparison, ...]:
+        """Those of them that were not scanned, unless only nobody says so."""
+        return tuple(item for item in self.asked if item.outcome not in DONE)
+
+    @cached_property
+    def outside(self) -> tuple[StopComparison, ...]:
+        """Stops that were scanned, or passed unconfirmed, from elsewhere than the plan reckons with."""
+        return tuple(item for item in self.stops if item.seen_beside)
+
+    @property
+    def greatest_deviation_m(self) -> float | None:
+        """Of all stops where the robot was; None if it was at none."""
+        return max((item.deviation_m for item in self.stops if item.deviation_m is not None), default=None)
+
+    def stood_s(self, *states: State) -> float:
+        """Seconds that the run spent in these states."""
+        return sum(span.seconds for span in self.spans if span.state in states)

@@ -1,0 +1,171 @@
+"""A comparison as a person reads it on a terminal, and as one JSON object."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from stopgo.mission.comparing.acquired import Acquired
+from stopgo.mission.comparing.comparison import Comparison, StopComparison
+from stopgo.mission.comparing.run_verdict import judge
+from stopgo.mission.console.table import duration, printable, table
+from stopgo.mission.run.events import Aborted, Finished
+from stopgo.mission.stages.figures import Share, percent
+from stopgo.mission.stages.network import apart_in_words, network_of
+
+HEADER = (
+    *("stop", "outcome", "planned s", "arrived s", "late s", "along mm", "across mm", "heading °"),
+    *("settle s", "tries", "lost %", "why"),
+)
+MOST_ROOMS = 12
+"""Rooms listed on a terminal; --json has all."""
+
+
+def comparison_text(comparison: Comparison) -> str:
+    """The stops as a table, what was acquired, and the answer."""
+    lines = [comparison_table(comparison), ""]
+    if comparison.acquired is not None:
+        lines += [*_coverage_lines(comparison.acquired), ""]
+    return "\n".join([*lines, *_totals(comparison), printable(judge(comparison).text)])
+
+
+def comparison_table(comparison: Comparison) -> str:
+    """Times in seconds from the run's start, offsets in millimetres against the direction of arrival."""
+    return table(HEADER, [stop_cells(item) for item in comparison.stops])
+
+
+def stop_cells(item: StopComparison) -> tuple[str, ...]:
+    """A row of the table, as HEADER names its columns."""
+    return (
+        *(item.stop, item.outcome, _number(item.planned_s), _number(item.arrived_s)),
+        *(_number(item.late_s, sign="+"), _number(item.along_m, 1000, sign="+")),
+        _number(item.across_m, 1000, sign="+"),
+        _number(item.heading_rad, 180 / math.pi, sign="+"),
+        *(_number(item.settle_s), str(item.tries)),
+        _number(item.lost, 100),
+        "; ".join(why for why in (item.seen_beside, item.reason) if why),
+    )
+
+
+def _number(value: float | None, scale: float = 1.0, *, sign: str = "-") -> str:
+    """A number with one decimal; `-` where there is none, and never a minus before a zero."""
+    if value is None:
+        return "-"
+    return f"{round(value * scale, 1) + 0.0:{sign}.1f}"
+
+
+def _totals(comparison: Comparison) -> list[str]:
+    away, beside = comparison.greatest_deviation_m, comparison.beside.greatest_m
+    driven = "not ended" if comparison.driven_s is None else duration(comparison.driven_s)
+    stood = comparison.stood_s("PAUSED", "HELD")
+    revisions = [str(mission.revision) for mission in comparison.missions]
+    several = [f"revisions {', '.join(revisions)} of the mission, one after another"]
+    return [
+        *(several if len(revisions) > 1 else []),
+        *([printable(apart)] if (apart := apart_in_words(comparison.mission, _made(comparison))) else []),
+        f"run {printable(comparison.run_id or 'without a name')}: {comparison.scanned} of "
+        f"{len(comparison.asked)} stops scanned; planned {duration(comparison.planned_s)}, driven {driven}"
+        + (f", of which paused or held {duration(stood)}" if stood else ""),
+        f"greatest deviation at a stop {_millimetres(away)}, beside the route {_millimetres(beside)}",
+    ]
+
+
+def _made(comparison: Comparison) -> list[str]:
+    """Stops whose scans are there, or may still be made."""
+    ended = _ended(comparison) is not None
+    lost = {"skipped", "failed", "withdrawn", *(("arrived", "not reached") if ended else ())}
+    return [item.stop for item in comparison.stops if item.outcome not in lost]
+
+
+def _millimetres(metres: float | None) -> str:
+    return "-" if metres is None else f"{1000 * metres:.1f} mm"
+
+
+def _coverage_lines(acquired: Acquired) -> list[str]:
+    whole = (acquired.planned.whole, acquired.shares.whole)
+    pairs = [whole, *acquired.kinds, *acquired.rooms[:MOST_ROOMS]]
+    rows = [_share_cells(planned, share) for planned, share in pairs]
+    lines = [table(("coverage", "planned %", "acquired %", "asked %", ""), rows)]
+    rest = len(acquired.rooms) - MOST_ROOMS
+    return [*lines, f"and {rest} rooms of which more was seen"] if rest > 0 else lines
+
+
+def _share_cells(planned: Share, share: Share) -> tuple[str, ...]:
+    shown = (planned.coverage, share.coverage, share.required)
+    cells = (percent(value).removesuffix(" %") for value in shown)
+    return (share.name, *cells, "" if share.met else "too little")
+
+
+def comparison_json(comparison: Comparison) -> dict[str, Any]:
+    """The same and more, for programs: metres, radians and seconds; shares from 0 to 1."""
+    judgement = judge(comparison)
+    return {
+        "run_id": comparison.run_id,
+        "robot": comparison.log.robot,
+        "revisions": [mission.revision for mission in comparison.missions],
+        "ended": _ended(comparison),
+        "answer": judgement.answer,
+        "verdict": judgement.text,
+        "scanned": comparison.scanned,
+        "asked": len(comparison.asked),
+        "planned_s": comparison.planned_s,
+        "driven_s": comparison.driven_s,
+        "paused_s": comparison.stood_s("PAUSED"),
+        "held_s": comparison.stood_s("HELD"),
+        "greatest_deviation_m": comparison.greatest_deviation_m,
+        "greatest_beside_route_m": comparison.beside.greatest_m,
+        "travelled_m": comparison.log.poses.length_m if len(comparison.log.poses) else None,
+        "pieces": _pieces(comparison),
+        "coverage": None if comparison.acquired is None else _acquired_json(comparison.acquired),
+        "stops": [_stop_json(item) for item in comparison.stops],
+        "states": [
+            {"state": span.state, "begin_s": span.begin_s, "end_s": span.end_s, "why": span.why}
+            for span in comparison.spans
+        ],
+    }
+
+
+def _ended(comparison: Comparison) -> str | None:
+    """The event by which the run ended."""
+    ends = [type(event).__name__ for event in comparison.log.events if isinstance(event, Finished | Aborted)]
+    return ends[-1] if ends else None
+
+
+def _pieces(comparison: Comparison) -> list[list[str]] | None:
+    """Scans that hang together, those included that may still be made; None where no network was planned."""
+    network = network_of(comparison.mission)
+    return None if network is None else [list(piece) for piece in network.among(_made(comparison)).pieces]
+
+
+def _stop_json(item: StopComparison) -> dict[str, Any]:
+    keys = (
+        *("stop", "outcome", "reason", "planned_s", "arrived_s", "late_s", "deviation_m", "along_m"),
+        *("across_m", "heading_rad", "tolerance_m", "settle_s", "tries", "lost"),
+    )
+    return {**{key: getattr(item, key) for key in keys}, "outside_tolerance": bool(item.seen_beside)}
+
+
+def _acquired_json(acquired: Acquired) -> dict[str, Any]:
+    return {
+        "rule": acquired.sight.ledger.rule,
+        "asked": acquired.shares.whole.required,
+        "planned": acquired.planned.whole.coverage,
+        "acquired": acquired.shares.whole.coverage,
+        "unknown_stops": list(acquired.unknown),
+        "rooms": [_pair_json(*pair) for pair in acquired.rooms],
+        "kinds": [_pair_json(*pair) for pair in acquired.kinds],
+        "elements": [
+            {"id": item.name, "visible": item.visible, "seen": item.seen} for item in acquired.elements
+        ],
+    }
+
+
+def _pair_json(planned: Share, share: Share) -> dict[str, Any]:
+    seen = {"visible": share.visible, "seen": share.seen, "acquired": share.coverage}
+    return {
+        "name": share.name,
+        **seen,
+        "planned": planned.coverage,
+        "asked": share.required,
+        "met": share.met,
+    }

@@ -1,0 +1,66 @@
+"""What a scanner's points show of a floor: targets that were hit, how far off, and what is unplanned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon
+from stopgo.mission.stages.coverage_totals import Ledger
+from stopgo.mission.stages.figures import Shares
+
+
+@dataclass(frozen=True, eq=False)
+class Unplanned:
+    """Something on the floor that the plan does not know."""
+
+    outline: Polygon
+    """Convex, a little wider than what was hit."""
+    hits: int
+    """In how many sweeps it was hit, at its most visible place."""
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        x, y = self.outline.exterior.mean(axis=0)
+        return (float(x), float(y))
+
+    @property
+    def size_m(self) -> float:
+        """Its greatest width or depth."""
+        return float(np.ptp(self.outline.exterior, axis=0).max())
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Points laid on the floor's targets."""
+
+    ledger: Ledger
+    """The units of the floor, n of them."""
+    hit: BoolArray
+    """Whether a point lies within the tolerance of each unit (n,)."""
+    tolerance_m: float
+    points: int
+    edges_m: FloatArray
+    """Bounds of the histogram of deviations (k + 1,); positive lies outside the element."""
+    histogram: IntArray
+    """Points by element and deviation (elements, k)."""
+    unplanned: tuple[Unplanned, ...]
+
+    @cached_property
+    def shares(self) -> Shares:
+        return self.ledger.shares(self.hit)
+
+    @cached_property
+    def deviations(self) -> tuple[tuple[str, int, float, float], ...]:
+        """Of every element with points: its id, how many, and their mean and rms deviation in metres."""
+        middles = (self.edges_m[1:] + self.edges_m[:-1]) / 2
+        found = []
+        for element, counts in zip(self.ledger.elements, self.histogram, strict=True):
+            many = int(counts.sum())
+            if many:
+                mean = float((counts * middles).sum() / many)
+                rms = float(np.sqrt((counts * middles**2).sum() / many))
+                found.append((element.id, many, mean, rms))
+        return tuple(found)

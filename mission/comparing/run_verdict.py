@@ -1,0 +1,106 @@
+"""Whether a run brought what its plan was made for: one answer, whoever asks, and the words for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from stopgo.mission.comparing.acquired import Acquired, Certainty
+from stopgo.mission.comparing.comparison import Comparison
+from stopgo.mission.run.events import Aborted
+from stopgo.mission.stages.figures import percent
+
+EXIT_CODES: dict[Certainty, int] = {"yes": 0, "no": 1, "unknown": 3}
+HEADLINES: dict[Certainty, str] = {"yes": "Acquired", "no": "Not acquired", "unknown": "Not known"}
+MOST_NAMED = 6
+"""Stops that are named in a sentence; of more, how many."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """An answer, and why in sentences."""
+
+    answer: Certainty
+    sentences: tuple[str, ...]
+
+    @property
+    def headline(self) -> str:
+        return HEADLINES[self.answer]
+
+    @property
+    def exit_code(self) -> int:
+        return EXIT_CODES[self.answer]
+
+    @property
+    def text(self) -> str:
+        return " ".join((f"{self.headline}.", *self.sentences))
+
+
+def judge(comparison: Comparison) -> Judgement:
+    """Whether the scans saw what was asked, each from within its stop's tolerance.
+
+    Where no plan tells what stops see, all of them must have been scanned.
+    """
+    return Judgement(_answer(comparison), tuple(_sentences(comparison)))
+
+
+def _answer(comparison: Comparison) -> Certainty:
+    acquired = comparison.acquired
+    if comparison.outside:
+        return "no"
+    if acquired is not None:
+        return acquired.answer
+    if comparison.missing:
+        return "no"
+    unsure = any(item.outcome == "unconfirmed" for item in comparison.asked)
+    return "unknown" if unsure else "yes"
+
+
+def _sentences(comparison: Comparison) -> Iterator[str]:
+    if comparison.acquired is not None:
+        yield from _coverage(comparison.acquired)
+    else:
+        yield (
+            f"{comparison.scanned} of {len(comparison.asked)} stops were scanned; "
+            "what they saw is not known without the plan's recording."
+        )
+    yield from _outcomes(comparison)
+    for item in comparison.outside:
+        yield f"{item.stop} was {item.seen_beside}."
+    if not comparison.log.ended:
+        yield "The run has not ended."
+    for event in comparison.log.events:
+        if isinstance(event, Aborted):
+            yield f"The run was aborted: {event.reason}."
+
+
+def _coverage(acquired: Acquired) -> Iterator[str]:
+    whole, planned = acquired.shares.whole, acquired.planned.whole
+    asked = "" if whole.required is None else f"{percent(whole.required)} was asked, "
+    least = "at least " if acquired.unknown else ""
+    yield (
+        f"{least}{percent(whole.coverage)} of what is visible was scanned; "
+        f"{asked}{percent(planned.coverage)} planned."
+    )
+    for share in [share for share in acquired.shares.short if share is not whole][:MOST_NAMED]:
+        yield f"Of {share.name}, {percent(share.coverage)} was scanned; {percent(share.required)} was asked."
+    if acquired.unknown:
+        yield f"What {named(acquired.unknown)} saw is not known: no plan of that revision was given."
+
+
+def _outcomes(comparison: Comparison) -> Iterator[str]:
+    for outcome in ("skipped", "failed", "arrived", "not reached", "unconfirmed"):
+        stops = [item.stop for item in comparison.asked if item.outcome == outcome]
+        if stops:
+            yield f"{named(stops)} {'were' if len(stops) > 1 else 'was'} {_WORDS.get(outcome, outcome)}."
+
+
+_WORDS = {"arrived": "reached and not scanned", "unconfirmed": "passed, and nobody says that it was scanned"}
+
+
+def named(stops: Sequence[str]) -> str:
+    """Stops in a sentence: `s04 and s06`."""
+    if len(stops) > MOST_NAMED:
+        return f"{len(stops)} stops ({', '.join(stops[:MOST_NAMED])}, …)"
+    *others, last = stops
+    return f"{', '.join(others)} and {last}" if others else last

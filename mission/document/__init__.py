@@ -1,0 +1,223 @@
+"""A mission: what the robot is sent, exactly as mission.json holds it.
+
+Metres, radians counter-clockwise from +x, seconds; keys that end in `_deg` are degrees.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any, Final, Literal
+
+import msgspec
+from msgspec import UNSET, UnsetType
+
+from stopgo.mission.floor.floor_source import FloorSource
+from stopgo.mission.frames.transform import Point, SiteOrigin, Transform
+from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, told_of
+
+SCHEMA: Final = "stopgo/mission"
+VERSION: Final = 1
+
+OnFailure = Literal["retry", "skip", "ask", "abort", "home"]
+
+
+class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Base of every part of the document: frozen, and strict about unknown keys."""
+
+
+class Frame(Document, frozen=True):
+    name: str
+    to_map: Transform | None = None
+
+
+class RobotSpec(Document, frozen=True):
+    radius: float
+    speed: float
+    turn_rate: float
+    """Radians per second."""
+    acceleration: float
+
+
+class ScannerSpec(Document, frozen=True):
+    profile: str
+    range: float
+    fov_deg: float = 360.0
+    model: str | UnsetType = UNSET
+    """Its name among those that stopgo knows; what follows is left out where nobody tells."""
+    step_deg: float | UnsetType = UNSET
+    """Between neighbouring points."""
+    near: float | UnsetType = UNSET
+    """What is nearer is not measured."""
+    blind_cone_deg: float | UnsetType = UNSET
+    """The cone under the scanner that it does not see, from side to side."""
+    height: float | UnsetType = UNSET
+    """Above the floor."""
+
+
+class LimitsSpec(Document, frozen=True):
+    """When a target counts as seen; what is left out is no limit."""
+
+    max_incidence_deg: float | UnsetType = UNSET
+    """From square on."""
+    near: float | UnsetType = UNSET
+    """Distance from the scanner, of a wall down to its foot."""
+    density_mm: float | UnsetType = UNSET
+    """Between neighbouring points."""
+    wall_height: float | UnsetType = UNSET
+    """Incidence and spacing hold from the floor up to it; absent where only at the scanner's height."""
+    views: int | UnsetType = UNSET
+    """Stops that must see it."""
+
+
+class MissionShare(Document, frozen=True):
+    """Which of the missions that together see a floor this is."""
+
+    kind: Literal["robot", "tour"]
+    """Of robots that drive at the same time, or of tours that one robot drives one after another."""
+    number: int
+    """From 1."""
+    of: int
+
+
+class Start(Document, frozen=True):
+    x: float
+    y: float
+    heading: float
+    reason: str
+
+
+class Scan(Document, frozen=True):
+    profile: str
+    duration_s: float
+    timeout_s: float
+
+
+class Sees(Document, frozen=True):
+    units: int
+    """Target units this stop sees."""
+    new_units: int
+    """Of those, the ones that count as seen from this stop of the route on."""
+
+
+class Stop(Document, frozen=True):
+    id: str
+    x: float
+    y: float
+    heading: float
+    doorway: bool
+    tolerance_m: float
+    settle_s: float
+    scan: Scan
+    on_failure: OnFailure
+    retries: int
+    approach: tuple[Point, ...]
+    """Polyline from the stop before (or the start) to this stop, both ends included."""
+    sees: Sees
+
+
+class Overlap(Document, frozen=True):
+    """Two stops whose scans register with one another, by the boundary that both see."""
+
+    a: str
+    b: str
+    common_m: float
+    """Metres of boundary that both see."""
+    share: float
+    """Of what the one of the two sees that sees less."""
+    hold_m: float
+    """Metres of wall that face the weakest of all small moves in x, y and heading."""
+
+
+class Policy(Document, frozen=True):
+    link_loss: Literal["continue", "finish_stop", "hold", "home"]
+    link_loss_after_s: float
+    battery_min: float
+
+
+class Origin(Document, frozen=True):
+    """What the mission was made from."""
+
+    floor: str
+    floor_digest: str
+    parameters: dict[str, Any]
+    """The plan's settings by name; only a record, so that a robot older than the plan reads it."""
+    stopgo: str
+
+
+class Mission(Document, frozen=True, kw_only=True):
+    """A route of scan stops, in the order of driving."""
+
+    schema: Literal["stopgo/mission"] = SCHEMA
+    version: Literal[1] = VERSION
+    id: str
+    revision: int
+    name: str
+    digest: str
+    frame: Frame
+    georeference: SiteOrigin | None
+    robot: RobotSpec
+    scanner: ScannerSpec
+    limits: LimitsSpec | UnsetType = UNSET
+    """Absent where there are none."""
+    share: MissionShare | UnsetType = UNSET
+    """Absent where this mission alone sees its part of the floor."""
+    start: Start
+    stops: tuple[Stop, ...]
+    return_: tuple[Point, ...] | None = msgspec.field(name="return")
+    policy: Policy
+    origin: Origin
+    network: tuple[Overlap, ...] | msgspec.UnsetType = msgspec.UNSET
+    """Pairs of stops that register with one another; left out where the plan does not ask for it."""
+
+
+def stop_names(count: int) -> list[str]:
+    """The ids of so many stops, in the order of driving."""
+    width = max(2, len(str(count)))
+    return [f"s{number:0{width}d}" for number in range(1, count + 1)]
+
+
+def canonical(document: Any) -> bytes:
+    """Canonical JSON: keys sorted, no spaces, shortest numbers that read back the same."""
+    return msgspec.json.encode(document, order="deterministic")
+
+
+def digest_of(mission: Mission) -> str:
+    """sha256 of the mission's canonical JSON without its `digest`, hexadecimal.
+
+    Stop by stop, so that other threads have their turn meanwhile: a robot's must still hear a stop.
+    """
+    document = msgspec.to_builtins(msgspec.structs.replace(mission, stops=()))
+    del document["digest"]
+    hashed, before = hashlib.sha256(), b"{"
+    for key in sorted(document):
+        hashed.update(before + canonical(key) + b":")
+        if key == "stops":
+            _add_stops(hashed, mission.stops)
+        else:
+            hashed.update(canonical(document[key]))
+        before = b","
+    hashed.update(b"}")
+    return hashed.hexdigest()
+
+
+def _add_stops(hashed: hashlib._Hash, stops: tuple[Stop, ...]) -> None:
+    before = b"["
+    for stop in stops:
+        hashed.update(before + canonical(msgspec.to_builtins(stop)))
+        before = b","
+    hashed.update(b"]" if stops else b"[]")
+
+
+def sealed(mission: Mission) -> Mission:
+    """The same mission with its `digest` set."""
+    return msgspec.structs.replace(mission, digest=digest_of(mission))
+
+
+def mission_id(source: FloorSource, settings: Settings, version: str, part: int = 0) -> str:
+    """Hash of floor, parameters, version and part: known before planning, and the recording id.
+
+    What the settings tell the floor's reader is in the source.
+    """
+    parameters = {key: value for key, value in told_of(settings).items() if key not in FLOOR_PARAMETERS}
+    basis = [source.basis, parameters, version, part]
+    return hashlib.sha256(canonical({"basis": basis})).hexdigest()[:32]

@@ -1,0 +1,206 @@
+"""Whether a well-formed mission makes sense: numbers that mean something, and legs that join up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import msgspec
+from msgspec import UNSET
+
+from stopgo.mission.document import Mission, Point, Start, Stop
+from stopgo.mission.frames.geodesy import out_of_reach
+
+JOIN = 1e-3
+"""Metres within which the ends of two legs are the same place."""
+FAR = 1e8
+"""Metres beyond which no site's coordinates lie."""
+EXTENT = 20_000.0
+"""Metres from its start beyond which no mission on a floor reaches."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Something that makes no sense, at a JSON path."""
+
+    path: str
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.message}"
+
+
+def problems_of(mission: Mission) -> tuple[Problem, ...]:
+    """Everything in the mission that makes no sense, in the order of the document."""
+    return (
+        *_identity(mission),
+        *_georeference(mission),
+        *_machine(mission),
+        *_start(mission.start),
+        *_stops(mission),
+        *_legs(mission),
+        *_policy(mission),
+        *_network(mission),
+    )
+
+
+def _identity(mission: Mission) -> Iterator[Problem]:
+    if not mission.id:
+        yield Problem("$.id", "is empty")
+    if mission.revision < 1:
+        yield Problem("$.revision", f"is {mission.revision}; revisions count from 1")
+
+
+def _georeference(mission: Mission) -> Iterator[Problem]:
+    place = mission.georeference
+    if place is not None and not (abs(place.lat) <= 90 and abs(place.lon) <= 180):
+        yield Problem("$.georeference", f"lat {place.lat}, lon {place.lon} is no place on earth")
+    far = out_of_reach((mission.start.x, mission.start.y))
+    if place is not None and far:
+        yield Problem("$.georeference", f"the start {far}")
+    turn = mission.frame.to_map
+    if turn is not None:
+        yield from _pose("$.frame.to_map", (turn.x, turn.y), turn.heading)
+
+
+def _machine(mission: Mission) -> Iterator[Problem]:
+    robot, scanner = mission.robot, mission.scanner
+    for key in ("radius", "speed", "turn_rate", "acceleration"):
+        yield from _positive(f"$.robot.{key}", getattr(robot, key))
+    yield from _positive("$.scanner.range", scanner.range)
+    if not 0 < scanner.fov_deg <= 360:
+        yield Problem("$.scanner.fov_deg", f"is {scanner.fov_deg}; it must be above 0 and at most 360")
+    known = {f"$.scanner.{key}": getattr(scanner, key) for key in ("step_deg", "height")}
+    limits = ("max_incidence_deg", "density_mm", "wall_height", "views")
+    known |= {f"$.limits.{key}": getattr(mission.limits, key, UNSET) for key in limits}
+    for path, value in known.items():
+        if value is not UNSET:
+            yield from _positive(path, value)
+    near = getattr(mission.limits, "near", UNSET)
+    blind = {"$.scanner.near": scanner.near, "$.scanner.blind_cone_deg": scanner.blind_cone_deg}
+    for path, value in {**blind, "$.limits.near": near}.items():
+        if value is not UNSET:
+            yield from _not_negative(path, value)
+
+
+def _start(start: Start) -> Iterator[Problem]:
+    yield from _pose("$.start", (start.x, start.y), start.heading)
+
+
+def _stops(mission: Mission) -> Iterator[Problem]:
+    if not mission.stops:
+        yield Problem("$.stops", "is empty; a mission has at least one stop")
+    known: dict[str, int] = {}
+    for index, stop in enumerate(mission.stops):
+        path = f"$.stops[{index}]"
+        if stop.id in known:
+            yield Problem(f"{path}.id", f"is {stop.id!r}, which $.stops[{known[stop.id]}] has already")
+        known.setdefault(stop.id, index)
+        yield from _stop(path, stop)
+        yield from _far_off(path, (stop.x, stop.y), mission.start)
+
+
+def _stop(path: str, stop: Stop) -> Iterator[Problem]:
+    if not stop.id:
+        yield Problem(f"{path}.id", "is empty")
+    yield from _pose(path, (stop.x, stop.y), stop.heading)
+    yield from _positive(f"{path}.tolerance_m", stop.tolerance_m)
+    yield from _not_negative(f"{path}.settle_s", stop.settle_s)
+    yield from _not_negative(f"{path}.scan.duration_s", stop.scan.duration_s)
+    if stop.scan.timeout_s < stop.scan.duration_s:
+        yield Problem(f"{path}.scan.timeout_s", f"is {stop.scan.timeout_s}, shorter than the scan itself")
+    yield from _not_negative(f"{path}.retries", stop.retries)
+    if not 0 <= stop.sees.new_units <= stop.sees.units:
+        seen = stop.sees
+        yield Problem(f"{path}.sees", f"{seen.new_units} new units of {seen.units}; they are part of them")
+
+
+def _legs(mission: Mission) -> Iterator[Problem]:
+    here, where = (mission.start.x, mission.start.y), "the start"
+    for index, stop in enumerate(mission.stops):
+        path = f"$.stops[{index}].approach"
+        yield from _leg(path, stop.approach, begin=here, where=where)
+        yield from _strays(path, stop.approach, mission.start)
+        here, where = (stop.x, stop.y), f"stop {stop.id}"
+        if stop.approach and _apart(stop.approach[-1], here):
+            end = len(stop.approach) - 1
+            yield Problem(f"{path}[{end}]", f"{_place(stop.approach[-1])} is not {where} at {_place(here)}")
+    if mission.return_ is not None:
+        yield from _leg("$.return", mission.return_, begin=here, where=where)
+        yield from _strays("$.return", mission.return_, mission.start)
+
+
+def _leg(path: str, leg: tuple[Point, ...], *, begin: Point, where: str) -> Iterator[Problem]:
+    if not leg:
+        yield Problem(path, "is empty; a leg holds both its ends")
+        return
+    if _apart(leg[0], begin):
+        yield Problem(f"{path}[0]", f"{_place(leg[0])} is not {where} at {_place(begin)}")
+    for index, point in enumerate(leg):
+        yield from _near(f"{path}[{index}]", point)
+
+
+def _strays(path: str, leg: tuple[Point, ...], start: Start) -> Iterator[Problem]:
+    for index, point in enumerate(leg):
+        yield from _far_off(f"{path}[{index}]", point, start)
+
+
+def _far_off(path: str, place: Point, start: Start) -> Iterator[Problem]:
+    """Coordinates that are a survey's may be large; how far a mission reaches is another matter."""
+    away = math.dist(place, (start.x, start.y))
+    if EXTENT < away <= FAR:
+        told = f"{_place(place)} is {away / 1000:.1f} km from the start"
+        yield Problem(path, f"{told}; no mission reaches beyond {EXTENT / 1000:g} km")
+
+
+def _apart(one: Point, other: Point) -> bool:
+    return not math.dist(one, other) <= JOIN  # `not <=`, so that NaN is apart
+
+
+def _place(point: Point) -> str:
+    return f"({point[0]:.3f}, {point[1]:.3f})"
+
+
+def _policy(mission: Mission) -> Iterator[Problem]:
+    policy = mission.policy
+    yield from _not_negative("$.policy.link_loss_after_s", policy.link_loss_after_s)
+    if not 0 <= policy.battery_min < 1:
+        yield Problem("$.policy.battery_min", f"is {policy.battery_min}; it must be at least 0 and below 1")
+
+
+def _network(mission: Mission) -> Iterator[Problem]:
+    overlaps = () if isinstance(mission.network, msgspec.UnsetType) else mission.network
+    stops, pairs = {stop.id for stop in mission.stops}, set()
+    for index, item in enumerate(overlaps):
+        path = f"$.network[{index}]"
+        for end in ("a", "b"):
+            if getattr(item, end) not in stops:
+                yield Problem(f"{path}.{end}", f"is {getattr(item, end)!r}, which is no stop")
+        pair = frozenset((item.a, item.b))
+        if len(pair) < 2 or pair in pairs:
+            yield Problem(path, f"{item.a} and {item.b} are {'a pair twice' if pair in pairs else 'no pair'}")
+        pairs.add(pair)
+        for key in ("common_m", "share", "hold_m"):
+            yield from _not_negative(f"{path}.{key}", getattr(item, key))
+
+
+def _pose(path: str, place: Point, heading: float) -> Iterator[Problem]:
+    yield from _near(path, place)
+    if not abs(heading) <= math.tau:
+        yield Problem(f"{path}.heading", f"is {heading}; headings are radians within ±2π")
+
+
+def _near(path: str, place: Point) -> Iterator[Problem]:
+    if not (abs(place[0]) <= FAR and abs(place[1]) <= FAR):
+        yield Problem(path, f"({place[0]:g}, {place[1]:g}) is not within {FAR:g} m of the origin")
+
+
+def _positive(path: str, value: float) -> Iterator[Problem]:
+    if not 0 < value < math.inf:
+        yield Problem(path, f"is {value}; it must be finite and greater than 0")
+
+
+def _not_negative(path: str, value: float) -> Iterator[Problem]:
+    if not 0 <= value < math.inf:
+        yield Problem(path, f"is {value}; it must be finite and not negative")

@@ -1,0 +1,1 @@
+"""Frames of a site: transforms, rigid fits and geodesy."""

@@ -1,0 +1,1 @@
+"""The noun of a simulated scan of a plan, and its text."""

@@ -1,0 +1,187 @@
+"""A proof as a person reads it, and as a program does: what `prove` prints and writes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+
+from stopgo.mission.console.table import printable
+from stopgo.mission.document import MissionShare
+from stopgo.mission.proof.plan_proof import (
+    ALLOWED_SHARE,
+    REGISTERED_DEG,
+    REGISTERED_M,
+    PlanProof,
+    PromisedShare,
+    ScanPair,
+    Simulation,
+)
+from stopgo.mission.stages.figures import percent
+
+SCHEMA = "stopgo/proof"
+VERSION = 1
+
+
+def proof_json(proof: PlanProof) -> dict[str, Any]:
+    """Everything but the points; lengths in metres unless a name says otherwise."""
+    mission, network, quality = proof.mission, proof.network, proof.quality
+    return {
+        "schema": SCHEMA,
+        "version": VERSION,
+        "mission": {"id": mission.id, "revision": mission.revision, "digest": mission.digest},
+        "floor": {"name": mission.origin.floor, "digest": mission.origin.floor_digest},
+        "simulation": msgspec.to_builtins(proof.simulation),
+        "met": proof.met,
+        "unmet": list(proof.unmet),
+        "unit": proof.unit,
+        "total": _share(proof.whole),
+        "rooms": [_share(item) for item in proof.rooms],
+        "kinds": [_share(item) for item in proof.kinds],
+        "missed": proof.missed,
+        "stops": [
+            {
+                "stop": item.stop,
+                "claimed": item.claimed,
+                "sighted": item.sighted,
+                "units": item.units,
+                "points": item.points,
+            }
+            for item in proof.stops
+        ],
+        "surface": {
+            "total_m2": round(quality.total_m2, 3),
+            "seen_m2": round(quality.seen_m2, 3),
+            "spacing_mm": {str(key): round(value, 4) for key, value in quality.by_spacing_mm.items()},
+            "incidence_deg": {str(key): round(value, 4) for key, value in quality.by_incidence_deg.items()},
+            "stops": {str(key): round(value, 4) for key, value in quality.by_stops.items()},
+        },
+        "network": {
+            "closed": network.closed,
+            "pieces": [list(piece) for piece in network.pieces],
+            "registered": network.registered,
+            "closing_m": network.closing_m,
+            "closing_deg": network.closing_deg,
+            "adrift_m": network.adrift_m,
+            "pairs": [_pair(item) for item in network.pairs],
+        },
+    }
+
+
+def _share(item: PromisedShare) -> dict[str, Any]:
+    amounts = {name: round(getattr(item, name), 4) for name in ("promised", "kept", "beyond")}
+    simulated = None if item.simulated is None else round(item.simulated, 6)
+    return {"name": item.name, **amounts, "coverage": item.coverage, "simulated": simulated}
+
+
+def _pair(item: ScanPair) -> dict[str, Any]:
+    return {
+        "a": item.a,
+        "b": item.b,
+        "shared": round(item.shared, 4),
+        "free_deg": None if item.free_deg is None else round(item.free_deg, 1),
+        "error_m": round(item.error_m, 5),
+        "error_deg": round(item.error_deg, 4),
+        "registered": item.registered,
+    }
+
+
+def proof_text(proof: PlanProof) -> str:
+    """A few lines: the answer first, then what it stands on."""
+    lines = [verdict(proof), *(f"  {line}" for line in proof.unmet)]
+    for name, several in _told(proof):
+        lines += [f"{name if not k else '':12}{line}" for k, line in enumerate(several)]
+    return "\n".join(map(printable, lines))
+
+
+def verdict(proof: PlanProof) -> str:
+    """The answer in one sentence."""
+    if not proof.met:
+        return "The plan's promise is not met:"
+    return f"The plan's promise is met: {coverage_words(proof.whole, proof.unit)}."
+
+
+def coverage_words(whole: PromisedShare, unit: str) -> str:
+    """What was promised and what was acquired."""
+    if whole.coverage is None:
+        return f"{whole.promised:.0f} {unit} promised, {whole.kept:.0f} acquired"
+    return f"{percent(whole.coverage)} promised, {percent(whole.simulated)} acquired"
+
+
+def _told(proof: PlanProof) -> Iterator[tuple[str, list[str]]]:
+    yield "acquired", [coverage_words(proof.whole, proof.unit), *missed_words(proof)]
+    yield "surface", surface_words(proof)
+    loose = [pair_words(pair) for pair in proof.network.pairs if not pair.registered]
+    yield "network", [*network_words(proof), *loose]
+    yield "assumed", assumed_words(proof.simulation)
+
+
+def missed_words(proof: PlanProof) -> list[str]:
+    """What of the promise was missed, and why; what nobody promised."""
+    told = [f"{amount:.1f} {proof.unit} missed: {reason}" for reason, amount in proof.missed.items()]
+    beyond = f"{proof.whole.beyond:.1f} {proof.unit} acquired that were not promised"
+    return [*told, beyond] if proof.whole.beyond >= 0.05 else told
+
+
+def surface_words(proof: PlanProof) -> list[str]:
+    """How well the surface is covered with points."""
+    quality = proof.quality
+    spacing = (f"{percent(share)} at {limit} mm" for limit, share in quality.by_spacing_mm.items())
+    angles = (f"{percent(share)} at {limit}°" for limit, share in quality.by_incidence_deg.items())
+    stops = (f"{percent(share)} from {least}" for least, share in quality.by_stops.items() if least > 1)
+    return [
+        f"points on {quality.seen_m2:.0f} of {quality.total_m2:.0f} m² of targets",
+        f"spacing at most: {', '.join(spacing)}",
+        f"incidence at most: {', '.join(angles)}",
+        f"stops at least: {', '.join(stops)}",
+    ]
+
+
+def network_words(proof: PlanProof) -> list[str]:
+    """Whether the scans join, and where they do not."""
+    network = proof.network
+    joins = "all scans join" if network.closed else f"the scans fall into {len(network.pieces)} pieces"
+    if isinstance(share := proof.mission.share, MissionShare):
+        joins = f"of this mission, one of {share.of}, {joins}"
+    told = [f"{joins}: {network.registered} of {len(network.pairs)} pairs that share surfaces register"]
+    if network.closing_m is not None:
+        told.append(
+            f"circles close to {1000 * network.closing_m:.1f} mm and {network.closing_deg or 0.0:.3f}°"
+        )
+    if network.registered:
+        told.append(f"the worst stop ends {1000 * network.adrift_m:.1f} mm off the truth")
+    if not network.closed:
+        told += [f"joined: {', '.join(piece)}" for piece in network.pieces if len(piece) > 1]
+        alone = [piece[0] for piece in network.pieces if len(piece) == 1]
+        told += [f"joined to none: {', '.join(alone)}"] if alone else []
+    return told
+
+
+def pair_words(pair: ScanPair) -> str:
+    """One pair, and what is wrong with it."""
+    name = f"{pair.a} and {pair.b}: {percent(pair.shared)} shared"
+    off = f"{1000 * pair.error_m:.1f} mm and {pair.error_deg:.3f}° off"
+    if pair.free_deg is not None:
+        return f"{name}, free along {pair.free_deg:.0f}°, {off}"
+    return f"{name}, {off}"
+
+
+def assumed_words(simulation: Simulation) -> list[str]:
+    """What was taken for granted."""
+    way = "the ray" if simulation.slant else "the floor"
+    known = "as the model tells" if simulation.ceiling_known else "nominal"
+    start = (
+        f"pairs start {100 * simulation.pose_error_m:g} cm and {simulation.pose_error_deg:g}° off"
+        if simulation.poses
+        else "pairs start without poses"
+    )
+    return [
+        f"rays every {simulation.step_deg:g}° to {simulation.range_m:g} m along {way}, "
+        f"noise {1000 * simulation.noise_m:g} mm",
+        f"for registration points up to {simulation.joining_m:g} m",
+        f"scanner level at {simulation.height_m:g} m, blind below in a cone of {simulation.cone_deg:g}°",
+        f"walls up to {simulation.ceiling_m:g} m ({known}), openings as high; floor and ceiling level",
+        f"{start}; registered: from both sides under {1000 * REGISTERED_M:g} mm and {REGISTERED_DEG:g}°",
+        f"a promise is met within {100 * ALLOWED_SHARE:g} percentage point",
+    ]

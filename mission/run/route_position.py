@@ -1,0 +1,65 @@
+"""The way a mission has laid down, and where on it a robot stands: no path is ever made up.
+
+Leg k leads to stop k; one more leg, if the mission has a return, leads back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from stopgo.mission.document import Mission, Point
+from stopgo.mission.run.events import Pose
+
+
+@dataclass(frozen=True)
+class NearestPoint:
+    """The point of a polyline nearest to a pose."""
+
+    point: Point
+    segment: int
+    distance: float
+
+
+def legs_of(mission: Mission) -> tuple[tuple[Point, ...], ...]:
+    """All legs in the order of driving, the return last."""
+    legs = tuple(stop.approach for stop in mission.stops)
+    return legs if mission.return_ is None else (*legs, mission.return_)
+
+
+def nearest(leg: Sequence[Point], pose: Pose) -> NearestPoint:
+    """Where on `leg` the robot stands; of equally near points the one farthest along."""
+    here = (pose.x, pose.y)
+    places = [NearestPoint(leg[0], 0, math.dist(leg[0], here))]
+    for segment, (a, b) in enumerate(pairwise(leg)):
+        point = foot(a, b, here)
+        places.append(NearestPoint(point, segment, math.dist(point, here)))
+    return min(reversed(places), key=lambda place: place.distance)
+
+
+def forward(leg: Sequence[Point], pose: Pose) -> tuple[Point, ...]:
+    """What is left of `leg` ahead of the robot."""
+    return tuple(leg[nearest(leg, pose).segment + 1 :]) or (leg[-1],)
+
+
+def backward(leg: Sequence[Point], pose: Pose) -> tuple[Point, ...]:
+    """The way back along `leg` to its beginning."""
+    return tuple(reversed(leg[: nearest(leg, pose).segment + 1]))
+
+
+def nearest_leg(mission: Mission, pose: Pose) -> tuple[int, NearestPoint]:
+    """The leg to a stop that passes nearest to the robot, the first of equals."""
+    places = [nearest(stop.approach, pose) for stop in mission.stops]
+    leg = min(range(len(places)), key=lambda index: places[index].distance)
+    return leg, places[leg]
+
+
+def foot(a: Point, b: Point, p: Point) -> Point:
+    """The point of the segment from `a` to `b` that is nearest to `p`."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    square = dx * dx + dy * dy
+    share = 0.0 if square == 0 else ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / square
+    share = max(0.0, min(1.0, share))
+    return (a[0] + share * dx, a[1] + share * dy)

@@ -1,0 +1,166 @@
+"""A run as it was logged: where the robot was and what it told, whatever kind of file it was read from.
+
+Times are nanoseconds on the robot's clock (since 1970 where the clock knows the date), poses are metres and
+radians counter-clockwise from +x, both in the mission's frame: who read the log has brought it there, and
+`RunLog.alignment` says how.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.run.events import Aborted, AnyEvent, Finished, Started
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Poses of a robot, sorted by time; where times are equal, in the order of the log."""
+
+    ns: IntArray
+    """When (n,), nanoseconds on the robot's clock."""
+    xy: FloatArray
+    """Where (n, 2), metres in the mission's frame."""
+    heading: FloatArray
+    """Which way (n,), radians counter-clockwise from +x."""
+
+    @classmethod
+    def of(cls, ns: ArrayLike, xy: ArrayLike, heading: ArrayLike) -> Track:
+        """A track from poses in any order.
+
+        Raises
+        ------
+        ValueError
+            When the arrays differ in length, or a pose is not finite: a reader leaves such poses out and
+            counts them in `LogSource.lost`.
+        """
+        times = np.asarray(ns, dtype=np.int64).reshape(-1)
+        places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+        turns = np.asarray(heading, dtype=np.float64).reshape(-1)
+        if not len(times) == len(places) == len(turns):
+            raise ValueError(f"{len(times)} times, {len(places)} places and {len(turns)} headings")
+        if not (np.isfinite(places).all() and np.isfinite(turns).all()):
+            raise ValueError("a pose is not finite")
+        order = np.argsort(times, kind="stable")
+        return cls(frozen(times[order], np.int64), frozen(places[order]), frozen(turns[order]))
+
+    def __len__(self) -> int:
+        return len(self.ns)
+
+    @property
+    def length_m(self) -> float:
+        """Distance travelled, from pose to pose."""
+        return float(np.hypot(*np.diff(self.xy, axis=0).T).sum()) if len(self) > 1 else 0.0
+
+    def between(self, begin_ns: int, end_ns: int) -> Track:
+        """The poses from `begin_ns` to `end_ns`, both included."""
+        first, behind = np.searchsorted(self.ns, [begin_ns, end_ns + 1]).tolist()
+        return self._rows(slice(first, max(first, behind)))
+
+    def last_until(self, ns: int) -> int | None:
+        """Index of the newest pose at or before `ns`; None if there is none."""
+        found = int(np.searchsorted(self.ns, ns, side="right")) - 1
+        return found if found >= 0 else None
+
+    def _rows(self, rows: slice) -> Track:
+        return Track(frozen(self.ns[rows], np.int64), frozen(self.xy[rows]), frozen(self.heading[rows]))
+
+
+def _no_poses() -> Track:
+    empty: NDArray[Any] = np.empty(0)
+    return Track.of(empty, empty, empty)
+
+
+@dataclass(frozen=True)
+class LogSource:
+    """What a log was read from, and how much of it could not be read."""
+
+    name: str
+    """The file's name, without its folders."""
+    format: str
+    """Such as `journal`, `rrd`, `mcap`, `tlog`."""
+    digest: str
+    """sha256 of the file's bytes, hexadecimal; empty where there is no file."""
+    messages: int
+    """Messages or rows that were read."""
+    lost: int = 0
+    """Those that were cut off, damaged or not finite."""
+    notes: tuple[str, ...] = ()
+    """What a reader of the log should know, a sentence each."""
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """How a log's frame was brought to the mission's: turned by `heading`, then shifted by (x, y)."""
+
+    how: str
+    """In words, such as `given by --map`, `first pose at the start`, `fitted to 9 scanned stops`."""
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+    time_offset_ns: int = 0
+    """Added to the log's times."""
+    residual_rms_m: float | None = None
+    """What is left between the pairs of a fit; None where nothing was fitted."""
+    residual_max_m: float | None = None
+    pairs: int = 0
+    """Pairs of places that were fitted."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunLog:
+    """One run of one robot; what a foreign log does not tell is None."""
+
+    robot: str
+    run_id: str | None
+    mission_id: str | None
+    revision: int | None
+    """The revision that was followed last."""
+    source: LogSource
+    poses: Track = field(default_factory=_no_poses)
+    events: tuple[AnyEvent, ...] = ()
+    """In the order of their numbers."""
+    alignment: Alignment | None = None
+    """None where the log is in the mission's frame already."""
+
+    @property
+    def began_ns(self) -> int | None:
+        """When the run was started; where no event tells, the first moment that anything was logged."""
+        started = [event.robot_ns for event in self.events if isinstance(event, Started)]
+        return started[0] if started else self._edge(0)
+
+    @property
+    def ended_ns(self) -> int | None:
+        """When the run was over; where no event tells, the last moment that anything was logged."""
+        ends = [event.robot_ns for event in self.events if isinstance(event, Finished | Aborted)]
+        return ends[-1] if ends else self._edge(-1)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the log tells how the run ended."""
+        return any(isinstance(event, Finished | Aborted) for event in self.events)
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the begin to the end; 0 where nothing was logged."""
+        begin, end = self.began_ns, self.ended_ns
+        return 0.0 if begin is None or end is None else (end - begin) / 1e9
+
+    @property
+    def revisions(self) -> tuple[int, ...]:
+        """The mission's revisions that the run followed, in this order."""
+        return tuple(dict.fromkeys(event.revision for event in self.events))
+
+    def seconds(self, ns: ArrayLike) -> FloatArray:
+        """Seconds since the run began at times (n,) on the robot's clock."""
+        return frozen((np.asarray(ns, dtype=np.int64) - (self.began_ns or 0)) / 1e9)
+
+    def _edge(self, index: int) -> int | None:
+        """The time of the first (0) or last (-1) thing that was logged."""
+        times = [event.robot_ns for event in (self.events[:1] if index == 0 else self.events[-1:])]
+        times += self.poses.ns[:1].tolist() if index == 0 else self.poses.ns[-1:].tolist()
+        return None if not times else min(times) if index == 0 else max(times)

@@ -1,0 +1,143 @@
+"""What every target unit counts and belongs to: from what is seen, the shares of all, rooms and kinds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
+from stopgo.mission.stages import Visibility, weights_of
+from stopgo.mission.stages.figures import Share, Shares, worst_first
+
+OUTSIDE = "in no room"
+"""The name of what faces no room."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Units of which a share is asked together."""
+
+    name: str
+    required: float | None = None
+    """Least share of what is visible; None where nothing is asked."""
+    why: str = ""
+    """Why the robot does not come there."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """An element that is to be seen."""
+
+    id: str
+    kind: str
+
+
+@dataclass(frozen=True, eq=False)
+class Ledger:
+    """The units of a plan, n of them, in the order of its targets."""
+
+    rule: Literal["length", "paper"]
+    """Whether shares count metres or units."""
+    weight: IntArray
+    """What each unit counts (n,), micrometres or 1."""
+    visible: BoolArray
+    """Whether any candidate sees it (n,)."""
+    room: IntArray
+    """Index into `rooms` (n,); -1 where it faces none."""
+    element: IntArray
+    """Index into `elements` (n,)."""
+    rooms: tuple[Group, ...]
+    elements: tuple[Seen, ...]
+    required: float
+    """Least share of the whole."""
+    kind_required: float | None
+    """Least share of each kind."""
+    asked: IntArray = field(default_factory=lambda: frozen([1], np.int64))
+    """From how many stops each unit must be seen until it counts (n,), or every unit (1,)."""
+
+    def enough(self, views: IntArray) -> BoolArray:
+        """Whether each unit counts as seen (n,), where so many stops see it."""
+        return frozen(views >= self.asked, np.bool_)
+
+    def shares(self, seen: BoolArray) -> Shares:
+        """What a mask of units (n,) comes to; rooms and kinds with targets, the one least seen first."""
+        *rooms, outside = self.rooms_seen(seen)
+        listed = (*worst_first(rooms), outside)
+        return Shares(
+            self.share(Group("all", self.required), np.ones(len(self.weight), dtype=bool), seen),
+            tuple(share for share in listed if share.total),
+            worst_first([share for share in self.kinds_seen(seen) if share.total]),
+        )
+
+    def rooms_seen(self, seen: BoolArray) -> tuple[Share, ...]:
+        """The share of every room, in order, and at last of what faces none."""
+        rooms = [self.share(group, self.room == k, seen) for k, group in enumerate(self.rooms)]
+        return (*rooms, self.share(Group(OUTSIDE), self.room < 0, seen))
+
+    def kinds_seen(self, seen: BoolArray) -> tuple[Share, ...]:
+        """The share of every kind of element, by name."""
+        return tuple(
+            self.share(Group(kind, self.kind_required), self._kind == k, seen)
+            for k, kind in enumerate(self._kinds)
+        )
+
+    def by_element(self, seen: BoolArray) -> tuple[Share, ...]:
+        """The share of every element with targets, in the floor's order."""
+        size = len(self.elements)
+        masks = (None, self.visible, self.visible & seen)
+        sums = [np.bincount(self.element, self._counted(mask), minlength=size) * self.scale for mask in masks]
+        return tuple(
+            Share(item.id, total=float(sums[0][k]), visible=float(sums[1][k]), seen=float(sums[2][k]))
+            for k, item in enumerate(self.elements)
+            if sums[0][k]
+        )
+
+    def share(self, group: Group, member: BoolArray, seen: BoolArray) -> Share:
+        """The share of a mask of units (n,)."""
+        visible = member & self.visible
+        total, could, did = (self.amount(mask) for mask in (member, visible, visible & seen))
+        return Share(group.name, total, could, did, required=group.required, why=group.why)
+
+    def amount(self, units: BoolArray) -> float:
+        """What a mask of units (n,) counts, in metres or units."""
+        return float(int(self.weight[units].sum()) * self.scale)
+
+    @property
+    def scale(self) -> float:
+        """Metres, or units, of a weight of 1."""
+        return 1.0 if self.rule == "paper" else 1e-6
+
+    def _counted(self, mask: BoolArray | None) -> FloatArray:
+        return np.asarray(self.weight if mask is None else np.where(mask, self.weight, 0), dtype=np.float64)
+
+    @cached_property
+    def _kinds(self) -> list[str]:
+        return sorted({item.kind for item in self.elements})
+
+    @cached_property
+    def _kind(self) -> IntArray:
+        """Index of each unit's kind (n,)."""
+        of_element = np.array([self._kinds.index(item.kind) for item in self.elements], dtype=np.int64)
+        return frozen(of_element[self.element], np.int64)
+
+
+def ledger_of(visibility: Visibility, why: Mapping[str, str] | None = None) -> Ledger:
+    """The ledger of a plan; `why` tells by room why the robot does not come there."""
+    space, targets = visibility.candidates.space, visibility.targets
+    settings, told, asked = space.settings, why or {}, space.settings.least_of_room
+    return Ledger(
+        rule=settings.coverage_rule,
+        weight=weights_of(targets, settings),
+        visible=visibility.visible,
+        room=space.unit_room,
+        element=frozen(targets.element[targets.unit_segment], np.int64),
+        rooms=tuple(Group(room.name, asked, told.get(room.name, "")) for room in space.rooms),
+        elements=tuple(Seen(item.id, item.kind) for item in space.floor.elements),
+        required=settings.coverage,
+        kind_required=settings.least_of_kind,
+        asked=visibility.asked,
+    )

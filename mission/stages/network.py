@@ -1,0 +1,170 @@
+"""How a mission's scans hang together: which pairs register with one another, and what joins all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import msgspec
+from msgspec.structs import replace
+
+from stopgo.mission.document import Mission, Overlap
+from stopgo.mission.stages.figures import percent
+
+
+@dataclass(frozen=True)
+class Network:
+    """Stops, and the pairs of them whose scans register with one another."""
+
+    stops: tuple[str, ...]
+    overlaps: tuple[Overlap, ...]
+
+    @cached_property
+    def pieces(self) -> tuple[tuple[str, ...], ...]:
+        """Stops that hang together, the largest piece first; one piece where all do."""
+        return _pieces(self.stops, self.overlaps)
+
+    @cached_property
+    def bridges(self) -> tuple[Overlap, ...]:
+        """Pairs without which the scans would fall into more pieces."""
+        near: dict[str, list[Overlap]] = {}
+        for overlap in self.overlaps:
+            for end in (overlap.a, overlap.b):
+                near.setdefault(end, []).append(overlap)
+        found = _bridges(self.stops, near)
+        return tuple(overlap for overlap in self.overlaps if overlap in found)
+
+    @cached_property
+    def weakest(self) -> Overlap | None:
+        """The weakest pair that cannot be gone round by firmer ones; None where no two scans register."""
+        taken: list[Overlap] = []
+        end_of = {stop: stop for stop in self.stops}
+        for overlap in sorted(self.overlaps, key=lambda item: -item.hold_m):
+            a, b = _last(end_of, overlap.a), _last(end_of, overlap.b)
+            if a != b:
+                end_of[a] = b
+                taken.append(overlap)
+        return taken[-1] if taken else None
+
+    def renamed(self, names: Mapping[str, str]) -> Network:
+        """The same with other names for all stops."""
+        pairs = (replace(item, a=names[item.a], b=names[item.b]) for item in self.overlaps)
+        return Network(tuple(names[stop] for stop in self.stops), tuple(pairs))
+
+    def among(self, stops: Collection[str]) -> Network:
+        """What is left of it where only these stops were scanned."""
+        return Network(
+            tuple(stop for stop in self.stops if stop in stops),
+            tuple(item for item in self.overlaps if item.a in stops and item.b in stops),
+        )
+
+
+def network_of(mission: Mission) -> Network | None:
+    """The mission's network; None where it was planned without one."""
+    if isinstance(mission.network, msgspec.UnsetType):
+        return None
+    return Network(tuple(stop.id for stop in mission.stops), mission.network)
+
+
+def apart_in_words(mission: Mission, acquired: Collection[str]) -> str:
+    """One line where the scans that were made fall into more pieces than planned; else nothing."""
+    planned = network_of(mission)
+    if planned is None or not acquired:
+        return ""
+    left = planned.among(acquired)
+    missing = [stop for stop in planned.stops if stop not in acquired]
+    if len(left.pieces) <= max(1, len(planned.pieces)):
+        return ""
+    told = f" without {', '.join(missing)}" if missing else ""
+    pieces = "; ".join(" ".join(piece) for piece in left.pieces[1:])
+    return f"the scans fall into {len(left.pieces)} pieces{told}: apart from the others {pieces}"
+
+
+def network_table(network: Network | None) -> dict[str, Any]:
+    """The network for JSON, under its key; nothing where there is none."""
+    if network is None:
+        return {}
+    table = {
+        "pieces": network.pieces,
+        "pairs": msgspec.to_builtins(network.overlaps),
+        "weakest": None if network.weakest is None else msgspec.to_builtins(network.weakest),
+        "bridges": [[item.a, item.b] for item in network.bridges],
+    }
+    return {"network": table}
+
+
+def network_lines(network: Network | None) -> list[str]:
+    """The network for a terminal: pieces, the weakest pair, and pairs that nothing stands in for."""
+    if network is None:
+        return []
+    number, pairs = len(network.pieces), len(network.overlaps)
+    lines = [
+        f"  network     {'one piece' if number == 1 else f'{number} PIECES'}: "
+        f"{pairs} pair{'s' * (pairs != 1)} of {len(network.stops)} scans register with one another"
+    ]
+    if network.weakest is not None:
+        lines.append(f"    weakest   {pair_in_words(network.weakest)}")
+    if network.bridges:
+        told = ", ".join(f"{item.a}-{item.b}" for item in network.bridges[:MOST_TOLD])
+        more = f" and {len(network.bridges) - MOST_TOLD} more" if len(network.bridges) > MOST_TOLD else ""
+        lines.append(f"    bridges   {told}{more}: without one of these the scans fall apart")
+    return lines
+
+
+MOST_TOLD = 12
+
+
+def pair_in_words(pair: Overlap) -> str:
+    """One pair and its figures."""
+    return (
+        f"{pair.a}-{pair.b}: {pair.common_m:.1f} m seen by both, {percent(pair.share)} of a scan, "
+        f"held as by {pair.hold_m:.2f} m of wall"
+    )
+
+
+def _last(end_of: dict[str, str], stop: str) -> str:
+    while end_of[stop] != stop:
+        stop = end_of[stop]
+    return stop
+
+
+def _pieces(stops: Iterable[str], overlaps: Iterable[Overlap]) -> tuple[tuple[str, ...], ...]:
+    end_of = {stop: stop for stop in stops}
+    for item in overlaps:
+        end_of[_last(end_of, item.a)] = _last(end_of, item.b)
+    by_end: dict[str, list[str]] = {}
+    for stop in end_of:
+        by_end.setdefault(_last(end_of, stop), []).append(stop)
+    return tuple(tuple(piece) for piece in sorted(by_end.values(), key=lambda piece: -len(piece)))
+
+
+def _bridges(stops: Iterable[str], near: dict[str, list[Overlap]]) -> set[Overlap]:
+    """Pairs that close no ring, found by depth-first search (Tarjan, 1974)."""
+    order: dict[str, int] = {}
+    low: dict[str, int] = {}
+    found: set[Overlap] = set()
+    for root in stops:
+        if root in order:
+            continue
+        order[root] = low[root] = len(order)
+        path: list[tuple[str, Overlap | None, Iterator[Overlap]]] = [(root, None, iter(near.get(root, [])))]
+        while path:
+            stop, came, rest = path[-1]
+            item = next(rest, None)
+            if item is None:
+                path.pop()
+                if path:
+                    before = path[-1][0]
+                    low[before] = min(low[before], low[stop])
+                    if low[stop] > order[before] and came is not None:
+                        found.add(came)
+            elif item is not came:
+                other = item.b if item.a == stop else item.a
+                if other in order:
+                    low[stop] = min(low[stop], order[other])
+                else:
+                    order[other] = low[other] = len(order)
+                    path.append((other, item, iter(near.get(other, []))))
+    return found

@@ -1,0 +1,255 @@
+"""Why each stop of a plan stands where it does: what it sees, what it alone sees, what else was offered."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.stages import Route, Visibility, weights_of
+from stopgo.mission.stages.coverage_totals import OUTSIDE, Ledger, ledger_of
+from stopgo.mission.stages.figures import Share, percent
+
+NEARLY = 0.8
+"""A candidate is a runner-up if it would have seen at least this share of what the chosen one newly saw."""
+SAME = 0.5
+"""… and at least this share of it were the same units: candidates of other rooms stand in for nothing."""
+MOST_RUNNERS = 3
+LEAST_TOLD = 0.05
+"""What would be told as 0.0 is not told."""
+MOST_ROOMS = 4
+"""Rooms and candidates that are told of one stop."""
+
+
+@dataclass(frozen=True)
+class RunnerUp:
+    """A candidate that was not chosen, at the step at which the stop was."""
+
+    candidate: int
+    """Row of `Visibility`."""
+    x: float
+    y: float
+    new: float
+    """What it would have seen that still lacked views, metres or units."""
+
+
+@dataclass(frozen=True)
+class StopReason:
+    """One stop; amounts are metres of boundary, or units by the paper's rule, of what is visible."""
+
+    stop: str
+    step: int
+    """Its place in the order of choice, from 1."""
+    candidate: int
+    """Row of `Visibility`."""
+    units: int
+    """Units that it sees, as the mission tells them."""
+    sees: float
+    new: float
+    """What of it still lacked views when it was chosen: seen by no stop before it, where one is enough."""
+    alone_units: int
+    alone: float
+    """Seen from too few other stops of the plan, none where one is enough: what is lost without it."""
+    visible: float
+    """All that is visible, from any candidate."""
+    coverage: float
+    """Of the whole, once it was chosen."""
+    rooms: tuple[Share, ...]
+    """The rooms that lose without it, as they are seen then; the one that loses most first."""
+    lost: tuple[float, ...]
+    """What each of these rooms loses."""
+    runners: tuple[RunnerUp, ...]
+    """The most gainful first."""
+    unit: str = "m"
+
+    @property
+    def lost_share(self) -> float:
+        """What is lost without it of all that is visible."""
+        return self.alone / self.visible if self.visible else 0.0
+
+    @property
+    def short(self) -> tuple[Share, ...]:
+        """Rooms of which less than asked would be seen without it."""
+        return tuple(room for room in self.rooms if not room.met)
+
+    def sentences(self) -> tuple[str, ...]:
+        """What it is for, in words."""
+        return (self._seen(), self._offered(), self._lost())
+
+    def _seen(self) -> str:
+        new = f"choice {self.step}, when {self.new:.1f} {self.unit} of that were still to be seen"
+        reached = f"coverage came to {percent(self.coverage)}"
+        return f"{self.stop} sees {self.units} units, {self.sees:.1f} {self.unit}; {new} and {reached}."
+
+    def _offered(self) -> str:
+        if not self.runners:
+            return f"No other candidate there would have seen {NEARLY:.0%} as much that was new."
+        told = ", ".join(
+            f"candidate {item.candidate} at ({item.x:.2f}, {item.y:.2f}) {item.new:.1f} {self.unit}"
+            for item in self.runners
+        )
+        return f"Runners-up at that step: {told}."
+
+    def _lost(self) -> str:
+        if not self.alone_units:
+            return "Without it nothing would be lost: other stops see all that it sees."
+        told = [
+            f"{room.name} {lost:.1f} {self.unit}" + ("" if room.met else " (then below what is asked)")
+            for room, lost in zip(self.rooms, self.lost, strict=True)
+            if lost >= LEAST_TOLD
+        ]
+        where = ", ".join(told[:MOST_ROOMS]) or "less than that in any room"
+        more = f" and {len(told) - MOST_ROOMS} more rooms" if len(told) > MOST_ROOMS else ""
+        return (
+            f"It alone sees {self.alone_units} units, {self.alone:.1f} {self.unit} or"
+            f" {percent(self.lost_share)} of what is visible; lost without it: {where}{more}."
+        )
+
+
+def stop_reasons(route: Route, stops: Sequence[str]) -> tuple[StopReason, ...]:
+    """The reasons of a plan's stops, whose names are `stops`, in the order of driving."""
+    selection = route.selection
+    if not len(selection.chosen):
+        return ()
+    visibility = selection.visibility
+    ledger = ledger_of(visibility)
+    sights = [visibility.seen_by(int(row)) for row in selection.chosen]
+    often = np.bincount(np.concatenate(sights), minlength=len(ledger.weight))
+    offers = _Offers(visibility, ledger)
+    steps = [offers.choose(int(row)) for row in selection.chosen]
+    rooms = _Rooms(ledger, ledger.enough(often))
+    visible = ledger.amount(ledger.visible)
+    found = []
+    for name, choice in zip(stops, route.order.tolist(), strict=True):
+        sight = sights[choice]
+        counted = sight[ledger.visible[sight]]
+        alone = counted[often[counted] == visibility.asked[counted]]
+        new, runners = steps[choice]
+        losing, lost = rooms.without(alone)
+        found.append(
+            StopReason(
+                stop=name,
+                step=choice + 1,
+                candidate=int(selection.chosen[choice]),
+                units=len(sight),
+                sees=_amount(ledger, counted),
+                new=new,
+                alone_units=len(alone),
+                alone=_amount(ledger, alone),
+                visible=visible,
+                coverage=float(selection.coverage_steps[choice]),
+                rooms=losing,
+                lost=lost,
+                runners=runners,
+                unit="units" if ledger.rule == "paper" else "m",
+            )
+        )
+    return tuple(found)
+
+
+def driven_coverage(route: Route) -> FloatArray:
+    """Share of what is visible that is seen once each stop has been scanned, in the order of driving (k,)."""
+    visibility = route.selection.visibility
+    weight = weights_of(visibility.targets, visibility.candidates.space.settings)
+    counts = np.where(visibility.visible, weight, 0)
+    lacking, gained = visibility.asked.copy(), []
+    for row in route.selection.chosen[route.order].tolist():
+        sight = visibility.seen_by(row)
+        lacking[sight] -= 1
+        gained.append(int(counts[sight[lacking[sight] == 0]].sum()))
+    return np.asarray(np.cumsum(gained) / max(int(counts.sum()), 1), dtype=np.float64)
+
+
+def _amount(ledger: Ledger, units: IntArray) -> float:
+    return float(int(ledger.weight[units].sum()) * ledger.scale)
+
+
+class _Offers:
+    """What every candidate would newly see, kept up as candidates are chosen."""
+
+    def __init__(self, visibility: Visibility, ledger: Ledger) -> None:
+        self._visibility, self._ledger = visibility, ledger
+        self._row, segment, self._first, self._last = visibility.runs_apart
+        summed = np.concatenate([[0], np.cumsum(np.where(ledger.visible, ledger.weight, 0))])
+        gain = summed[self._last + 1] - summed[self._first]
+        self.gain: IntArray = np.zeros(visibility.rows, dtype=np.int64)
+        np.add.at(self.gain, self._row, gain)
+        self._by_segment = np.argsort(segment, kind="stable")
+        self._segment = segment[self._by_segment]
+        self._lacking: IntArray = np.where(ledger.visible, visibility.asked, 0)
+        """How many more stops must see each unit until it counts."""
+        self._chosen: BoolArray = np.zeros(visibility.rows, dtype=np.bool_)
+
+    def choose(self, row: int) -> tuple[float, tuple[RunnerUp, ...]]:
+        """What the candidate sees that lacks views, and who would have seen nearly as much; it is chosen."""
+        new = int(self.gain[row])
+        sight = self._visibility.seen_by(row)
+        fresh = sight[self._lacking[sight] > 0]
+        self._chosen[row] = True
+        if not len(fresh):
+            return 0.0, ()
+        shared = self._shared(fresh)
+        runners = self._runners(row, shared)
+        self._lacking[fresh] -= 1
+        done = fresh[self._lacking[fresh] == 0]
+        self.gain -= shared if len(done) == len(fresh) else self._shared(done)
+        return new * self._ledger.scale, runners
+
+    def _runners(self, row: int, shared: IntArray) -> tuple[RunnerUp, ...]:
+        candidates, gain = self._visibility.candidates, self.gain
+        alike = (gain >= NEARLY * gain[row]) & (shared >= SAME * gain[row])
+        rows = np.flatnonzero(alike & ~self._chosen)
+        best = rows[np.argsort(-gain[rows], kind="stable")][:MOST_RUNNERS]
+        places = candidates.xy[candidates.kept[best]].tolist()
+        amounts = (gain[best] * self._ledger.scale).tolist()
+        told = zip(best.tolist(), places, amounts, strict=True)
+        return tuple(RunnerUp(row, x, y, new) for row, (x, y), new in told)
+
+    def _shared(self, fresh: IntArray) -> IntArray:
+        """What each candidate sees of some units, ascending."""
+        segments = np.unique(self._visibility.targets.unit_segment[fresh])
+        low, high = (np.searchsorted(self._segment, segments, side=side) for side in ("left", "right"))
+        runs = self._by_segment[_ranges(low, high)]
+        summed = np.concatenate([[0], np.cumsum(self._ledger.weight[fresh])])
+        begin, end = summed[np.searchsorted(fresh, np.stack([self._first[runs], self._last[runs] + 1]))]
+        found: IntArray = np.zeros(len(self.gain), dtype=np.int64)
+        np.add.at(found, self._row[runs], end - begin)
+        return found
+
+
+def _ranges(low: IntArray, high: IntArray) -> IntArray:
+    """The whole numbers from each `low` up to below its `high`, one range after another."""
+    counts = high - low
+    starts = np.repeat(low - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
+    return np.asarray(starts + np.arange(int(counts.sum())), dtype=np.int64)
+
+
+class _Rooms:
+    """What of each room is visible and seen, and what is left of that without some units."""
+
+    def __init__(self, ledger: Ledger, seen: BoolArray) -> None:
+        self._ledger = ledger
+        self._room = ledger.room
+        size = len(ledger.rooms) + 1  # the last one is what faces none
+        weight: FloatArray = ledger.weight.astype(np.float64)
+        masks = (np.ones_like(seen), ledger.visible, ledger.visible & seen)
+        self._sums = [
+            np.bincount(ledger.room % size, np.where(m, weight, 0.0), minlength=size) for m in masks
+        ]
+
+    def without(self, units: IntArray) -> tuple[tuple[Share, ...], tuple[float, ...]]:
+        """The rooms that lose, as they are seen without these units, and what each loses."""
+        size, scale = len(self._sums[0]), self._ledger.scale
+        lost = np.bincount(self._room[units] % size, self._ledger.weight[units], minlength=size)
+        losing = sorted(np.flatnonzero(lost).tolist(), key=lambda k: (-lost[k], k))
+        shares = tuple(self._share(k, float(lost[k])) for k in losing)
+        return shares, tuple(float(lost[k]) * scale for k in losing)
+
+    def _share(self, k: int, lost: float) -> Share:
+        groups, scale = self._ledger.rooms, self._ledger.scale
+        total, visible, seen = (float(column[k]) * scale for column in self._sums)
+        name = groups[k].name if k < len(groups) else OUTSIDE
+        required = groups[k].required if k < len(groups) else None
+        return Share(name, total, visible, max(seen - lost * scale, 0.0), required=required)

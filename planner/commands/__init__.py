@@ -1,0 +1,1 @@
+"""Options, output files and reports of the commands that plan."""

@@ -1,0 +1,80 @@
+"""The options of `stopgo plan` and `stopgo floors`: one for each parameter of mission/settings.py."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any, cast
+
+import typer
+
+from stopgo.mission.settings import PARAMETERS
+from stopgo.mission.settings.parameter import Parameter
+
+
+def with_options(command: Callable[..., int], names: Iterable[str] = PARAMETERS) -> Callable[..., int]:
+    """The command with an option for each parameter in place of its `**given`, after its positional ones."""
+    *own, _ = inspect.signature(command, eval_str=True).parameters.values()
+    first, last = [[p for p in own if (p.kind == p.KEYWORD_ONLY) is late] for late in (False, True)]
+    whole: Any = functools.wraps(command)(functools.partial(command))
+    whole.__signature__ = inspect.Signature(
+        [*first, *(_option(PARAMETERS[name]) for name in names if _own(PARAMETERS[name])), *last]
+    )
+    return cast(Callable[..., int], whole)
+
+
+def values_of(options: dict[str, Any]) -> dict[str, Any]:
+    """The values of the options that were given, by the parameters' names."""
+    values: dict[str, Any] = {}
+    for name, parameter in PARAMETERS.items():
+        if not _own(parameter) or _key(parameter) not in options:
+            continue
+        given = options[_key(parameter)]
+        if parameter.further and given:
+            given, *rest = given
+            values[parameter.further] = tuple(map(parameter.given, rest)) or None
+        values[name] = parameter.given(given or None if parameter.further else given)
+    return values
+
+
+def _own(parameter: Parameter) -> bool:
+    """Whether it has an option of its own, and does not take another's further values."""
+    return parameter.name not in {item.further for item in PARAMETERS.values()}
+
+
+def _key(parameter: Parameter) -> str:
+    return parameter.option or parameter.name
+
+
+def _option(parameter: Parameter) -> inspect.Parameter:
+    kind = list[str] if parameter.repeatable or parameter.further else _plain(parameter)
+    name = "--" + _key(parameter).replace("_", "-")
+    told = typer.Option(
+        *([f"{name}/--no-{name[2:]}"] if parameter.default is None and kind is bool else [name]),
+        metavar=parameter.form.upper() or "|".join(parameter.choices) or None,
+        help=f"{_help(parameter)}  [default: {_default(parameter)}]",
+        show_default=False,
+    )
+    return inspect.Parameter(
+        _key(parameter), inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, told]
+    )
+
+
+def _plain(parameter: Parameter) -> type:
+    """What the command line takes; what has a form of its own is read by the parameter."""
+    return str if parameter.form else parameter.plain
+
+
+def _help(parameter: Parameter) -> str:
+    unit = f", {parameter.unit}" if parameter.unit else ""
+    return f"{parameter.help}{unit}{'; repeatable' * parameter.repeatable}."
+
+
+def _default(parameter: Parameter) -> str:
+    value = parameter.default
+    if value in (None, ()):
+        return parameter.undecided
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,90 @@
+"""Plans every storey of a model, each into a folder of its own, two at a time, and sums them up."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from stopgo.mission.console.table import printable_lines, table
+from stopgo.mission.errors import InputError
+from stopgo.mission.settings import Settings
+from stopgo.planner.floors import options_of, survey_floor
+from stopgo.planner.floors.survey import FloorChoice
+
+Planned = tuple[int, str, list[dict[str, Any]]]
+"""Exit code, what a person reads, and what `--json` tells of each part."""
+PlanOne = Callable[[Path, Path, Settings], Planned]
+AT_ONCE = 2
+
+
+def plan_storeys(floor: Path, out: Path, settings: Settings, plan_one: PlanOne, *, as_json: bool) -> int:
+    """Plan all storeys that people walk on; the exit code is the worst of theirs.
+
+    Raises
+    ------
+    InputError
+        When a storey is named as well, or the file has none.
+    """
+    if settings.storey is not None or settings.level is not None:
+        raise InputError("--all-storeys and a storey are both given; leave one of them out")
+    found = survey_floor(floor, options_of(settings))
+    storeys = [item for item in found.floors if not item.aside and item.option]
+    if not storeys:
+        raise InputError(f"{floor}: has no storeys to plan one by one; leave --all-storeys out")
+    names = [item.name for item in storeys]
+    folders = [out / name for name in folder_names(names)]
+    each = [_of_storey(settings, item, unique=names.count(item.name) == 1) for item in storeys]
+    with ProcessPoolExecutor(AT_ONCE, mp_context=get_context("spawn")) as pool:
+        planned = list(pool.map(plan_one, [floor] * len(storeys), folders, each))
+    _say(list(zip(storeys, folders, planned, strict=True)), as_json=as_json)
+    return max(code for code, _, _ in planned)
+
+
+def _of_storey(settings: Settings, storey: FloorChoice, *, unique: bool) -> Settings:
+    if unique:
+        return replace(settings, storey=storey.name)
+    return replace(settings, level=storey.level_m)
+
+
+def folder_names(storeys: Sequence[str]) -> list[str]:
+    """A folder's name for each storey: what any file system takes, and no name twice."""
+    names: list[str] = []
+    for number, storey in enumerate(storeys, 1):
+        plain = re.sub(r"[^\w+-]+", "-", storey).strip("-")[:60] or f"storey-{number}"
+        taken = {name.casefold() for name in names}
+        names.append(plain if plain.casefold() not in taken else f"{plain}-{number}")
+    return names
+
+
+def _say(done: list[tuple[FloorChoice, Path, Planned]], *, as_json: bool) -> None:
+    if as_json:
+        told = [
+            {"storey": storey.name, "folder": str(folder), "exit_code": code, "parts": parts}
+            | ({} if parts else {"error": text})
+            for storey, folder, (code, text, parts) in done
+        ]
+        typer.echo(json.dumps({"storeys": told}, ensure_ascii=False))
+        return
+    for _, _, (_, text, _) in done:
+        typer.echo(printable_lines(text))
+    typer.echo("")
+    typer.echo(table(("storey", "stops", "route m", "coverage %", "folder"), list(_rows(done))))
+
+
+def _rows(done: list[tuple[FloorChoice, Path, Planned]]) -> Iterator[tuple[str, ...]]:
+    for storey, folder, (_, text, parts) in done:
+        if not parts:
+            yield storey.name, "-", "-", "-", text
+            continue
+        stops = sum(part["selection"]["stops"] for part in parts)
+        length = sum(part["route"]["length_m"] for part in parts)
+        coverage = min(part["selection"]["coverage"] for part in parts)
+        yield storey.name, str(stops), f"{length:.1f}", f"{100 * coverage:.1f}", str(folder)

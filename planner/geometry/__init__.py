@@ -1,0 +1,1 @@
+"""Geometry that every stage shares: shapes, room axes, compiled kernels, and an instance cache."""

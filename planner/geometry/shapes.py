@@ -1,0 +1,228 @@
+"""Between the nouns' arrays and shapely: polygons in a local frame, snapped to a grid of 10 µm.
+
+The local frame begins at the lower left corner of the floor, so that coordinates stay small and a
+floor that is moved is planned the same. On the grid, orientation tests are exact integer arithmetic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from stopgo.mission.document.problems import FAR
+from stopgo.mission.errors import InputError, StopgoError
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.geometry import FloatArray, Polygon, bounds, frozen
+from stopgo.planner.geometry.instance_cache import kept
+
+GRID = 1e-5
+"""Metres per grid step."""
+SLACK = 1e-6
+"""Clearances may fall short by this much, in metres: float noise, far below any drawing's precision."""
+HAIRLINE = 4e-7
+"""Thickness in metres that an obstacle drawn as a single line gets, so that it has an inside."""
+LARGEST = 5000.0
+"""Greatest extent of a floor in metres: with what is drawn round it, within FARTHEST_STEPS."""
+SETTLING = 20
+"""Times an outline is rounded at most until it stays as it is; two or three are enough."""
+FARTHEST_STEPS = 2**29
+"""Grid steps from 0, 0 up to which all integer arithmetic is exact, a little more than 5.3 km."""
+
+
+@kept
+def local_origin(floor: FloorPlan) -> FloatArray:
+    """The lower left corner of everything on the floor (2,); refuses floors too large or too far."""
+    drawn = {"its outline": [ring for polygon in floor.outline for ring in polygon.rings]}
+    drawn |= {room.id: [ring for polygon in room.polygons for ring in polygon.rings] for room in floor.rooms}
+    drawn |= {item.id: [item.line] for item in floor.openings}
+    drawn |= {e.id: [*(ring for solid in e.solids for ring in solid.rings), *e.lines] for e in floor.elements}
+    low_x, low_y, high_x, high_y = bounds(part for parts in drawn.values() for part in parts)
+    extent = max(high_x - low_x, high_y - low_y)
+    if extent > LARGEST:
+        raise InputError(
+            f"{floor.name}: {extent:.0f} m across with {_farthest(drawn)}, more than {LARGEST:.0f} m; "
+            "check it, and the drawing's units"
+        )
+    away = max(-low_x, -low_y, high_x, high_y)
+    if away > FAR:
+        raise InputError(
+            f"{floor.name}: lies {away:.3g} m from its origin, and no mission reaches beyond {FAR:g} m; "
+            "check it, and the drawing's units"
+        )
+    return frozen([low_x, low_y])
+
+
+def _farthest(drawn: Mapping[str, Sequence[FloatArray]]) -> str:
+    """The name of what reaches farthest from the first point of all."""
+    first = next(part[0] for parts in drawn.values() for part in parts if len(part))
+    away = {
+        name: max((float(np.hypot(*(part - first).T).max()) for part in parts if len(part)), default=0.0)
+        for name, parts in drawn.items()
+    }
+    return max(away, key=lambda name: away[name])
+
+
+def to_shape(polygons: Iterable[Polygon], origin: FloatArray) -> BaseGeometry:
+    """The union of `polygons` as one shapely geometry in the local frame."""
+    return union([one_shape(polygon, origin) for polygon in polygons])
+
+
+def union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
+    """The union of shapes, the same to the last bit in whatever order they come.
+
+    Where edges nearly meet, GEOS now and then loses a piece without a word; a union that some corner is not
+    in is made again on a grid far finer than SLACK, on which it is sound.
+    """
+    found = np.array(list(shapes), dtype=object)
+    ordered = found[np.argsort(shapely.to_wkb(found), kind="stable")]
+    whole = shapely.union_all(ordered)
+    if len(found) > 1:
+        shapely.prepare(whole)
+        corners = shapely.points(shapely.get_coordinates(found))
+        if not shapely.dwithin(whole, corners, SLACK).all():
+            whole = shapely.union_all(ordered, grid_size=SLACK / 100)
+    return shapely.normalize(whole)
+
+
+def one_shape(polygon: Polygon, origin: FloatArray) -> BaseGeometry:
+    """One polygon in the local frame, mended where it crosses itself; empty where it has no area."""
+    if len(polygon.exterior) < 3:
+        return shapely.Polygon()
+    holes = [hole - origin for hole in polygon.holes if len(hole) >= 3]
+    drawn = shapely.Polygon(polygon.exterior - origin, holes)
+    return drawn if drawn.is_valid else mended(drawn)
+
+
+def mended(shape: BaseGeometry) -> BaseGeometry:
+    """What is valid of a polygonal geometry; empty where it has no area."""
+    return shapely.union_all(polygon_parts(shapely.make_valid(shape)))
+
+
+def to_polygons(shape: BaseGeometry, origin: FloatArray) -> tuple[Polygon, ...]:
+    """The polygonal parts of `shape` in the drawing's coordinates, in a canonical order."""
+    polygons = [
+        Polygon.of(
+            shapely.get_coordinates(part.exterior) + origin,
+            [shapely.get_coordinates(hole) + origin for hole in part.interiors],
+        )
+        for part in polygon_parts(shape)
+    ]
+    return tuple(sorted(polygons, key=lambda polygon: tuple(polygon.exterior.min(axis=0))))
+
+
+def polygon_parts(shape: BaseGeometry) -> list[shapely.Polygon]:
+    """The polygons of a geometry of any type, empty ones left out."""
+    parts = shapely.get_parts(shapely.get_parts(shape))
+    return [part for part in parts if part.geom_type == "Polygon" and not part.is_empty]
+
+
+def snapped(shape: BaseGeometry) -> BaseGeometry:
+    """The same shape, valid, every vertex on the grid, no line within half a step of another's vertex.
+
+    So snapping it again changes nothing, and operations on its whole steps find no new crossing.
+    """
+    return _in_metres(_settled(_in_steps(shape)))
+
+
+def snapped_union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
+    """The union of shapes, `snapped`, with every crossing a vertex."""
+    found = np.array([_in_steps(snapped(shape)) for shape in shapes], dtype=object)
+    ordered = found[np.argsort(shapely.to_wkb(found), kind="stable")]
+    return shapely.normalize(_in_metres(_settled(shapely.union_all(ordered, grid_size=1.0))))
+
+
+def _in_steps(shape: BaseGeometry) -> BaseGeometry:
+    """The shape in grid steps, not rounded to whole ones."""
+    return shapely.transform(shape, lambda xy: xy / GRID)
+
+
+def _in_metres(steps: BaseGeometry) -> BaseGeometry:
+    return shapely.transform(steps, lambda xy: np.rint(xy) / round(1 / GRID))  # 0.3, not 0.30000000000000004
+
+
+def _settled(steps: BaseGeometry) -> BaseGeometry:
+    """The shape rounded to whole steps, until no line that rounding moves meets one more vertex."""
+    for _ in range(SETTLING):
+        before, steps = steps, shapely.normalize(shapely.set_precision(shapely.set_precision(steps, 1.0), 0))
+        if shapely.equals_exact(before, steps):
+            return steps
+    x, y = shapely.get_coordinates(steps).mean(axis=0) * GRID
+    raise StopgoError(f"outlines near ({x:.3f}, {y:.3f}) cannot be rounded to {GRID:g} m; draw them anew")
+
+
+def whole_steps(shape: BaseGeometry) -> BaseGeometry:
+    """A shape that was `snapped` with its coordinates in whole grid steps: the very same vertices."""
+    return shapely.transform(shape, lambda xy: to_grid(xy).astype(float))
+
+
+def whole_steps_of(polygons: Iterable[Polygon], origin: FloatArray) -> BaseGeometry:
+    """Polygons of a shape that was `snapped`, in the drawing's coordinates, as one in whole grid steps."""
+    parts = [(one.exterior - origin, [hole - origin for hole in one.holes]) for one in polygons]
+    return whole_steps(shapely.MultiPolygon(parts))
+
+
+def to_grid(xy: FloatArray) -> NDArray[np.int64]:
+    """Local coordinates in metres as whole grid steps; refuses those that are too large to be exact."""
+    steps = np.rint(np.asarray(xy) / GRID)
+    if not np.all(np.abs(steps) <= FARTHEST_STEPS):
+        far, most = GRID * float(np.abs(steps).max()), GRID * FARTHEST_STEPS
+        raise InputError(
+            f"something lies {far:.0f} m from the floor's lower left corner, more than {most:.0f} m; "
+            "check the drawing's units"
+        )
+    return steps.astype(np.int64)
+
+
+def widened(
+    lines: NDArray[np.object_],
+    distance: float | FloatArray,
+    *,
+    quad_segs: int,
+    grid_size: float | None = None,
+) -> BaseGeometry:
+    """All points at most `distance` metres (of each line its own) from straight lines.
+
+    Lines are widened one by one: GEOS simplifies a whole outline before it widens it, and at some angles
+    gives a polygon whose rings cross, which no later operation can be asked about.
+    """
+    return shapely.union_all(shapely.buffer(lines, distance, quad_segs=quad_segs), grid_size=grid_size)
+
+
+def roughly_widened(shape: BaseGeometry, distance: float, **style: Any) -> BaseGeometry:
+    """A shape widened as a whole, made sound: quick, and off by up to 1 % of the distance."""
+    wide = shapely.buffer(shape, distance, **style)
+    return shapely.make_valid(wide, method="structure", keep_collapsed=False)
+
+
+def holds(region: BaseGeometry, shape: BaseGeometry, *, slack: float) -> bool:
+    """Whether a point or line lies in a region, or at most `slack` metres beside it."""
+    if region.covers(shape):
+        return True
+    beside = shape.difference(region)
+    edges = boundary_lines(region)
+    near = edges[shapely.dwithin(edges, beside, slack)]
+    return bool(widened(near, slack, quad_segs=QUARTER).covers(beside))
+
+
+QUARTER = 4
+GROWTH = float(1 / np.cos(np.pi / (4 * QUARTER)))
+"""Radius of the polygon round a circle of radius 1 with 4 × QUARTER corners."""
+
+
+def boundary_lines(shape: BaseGeometry) -> NDArray[np.object_]:
+    """All boundary segments of a polygonal geometry as lines."""
+    segments = segments_of(shape)
+    return shapely.linestrings(segments) if len(segments) else np.empty(0, dtype=object)
+
+
+def segments_of(shape: BaseGeometry) -> FloatArray:
+    """All boundary segments (n, 2, 2) of a polygonal geometry, in ring order."""
+    rings = [ring for part in polygon_parts(shape) for ring in (part.exterior, *part.interiors)]
+    coordinates = [shapely.get_coordinates(ring) for ring in rings]
+    pairs = [np.stack([ring[:-1], ring[1:]], axis=1) for ring in coordinates]
+    return np.concatenate(pairs) if pairs else np.empty((0, 2, 2))

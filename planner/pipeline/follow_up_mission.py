@@ -1,0 +1,236 @@
+"""Where a robot stood -> what it saw of the floor, and the smallest further mission that sees the rest."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from msgspec import UNSET
+from msgspec.structs import replace as changed
+
+from stopgo.mission.comparing.as_driven import AsDriven
+from stopgo.mission.document import Mission, sealed
+from stopgo.mission.document.specs import limits_spec_of
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.files.plan_toml import read_settings
+from stopgo.mission.floor import Element, FloorPlan
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
+from stopgo.mission.settings import Settings
+from stopgo.mission.stages import KEPT, Candidates, NavigableSpace, Visibility
+from stopgo.mission.stages.coverage_totals import Ledger, ledger_of
+from stopgo.planner.candidates import candidates
+from stopgo.planner.covering_tour import in_least_time
+from stopgo.planner.floors import options_of, read_floor
+from stopgo.planner.geometry.shapes import local_origin
+from stopgo.planner.routing import route
+from stopgo.planner.routing.assemble import assemble
+from stopgo.planner.selection import select_further
+from stopgo.planner.space.navigable import navigable
+from stopgo.planner.space.reach import reach_of
+from stopgo.planner.visibility import visibility
+from stopgo.planner.visibility.headings import in_view
+from stopgo.planner.visibility.sight.sightlines import SightLines
+from stopgo.planner.visibility.unit_ranges import visibility_of
+
+Places = FloatArray
+"""x, y and heading of each place where a scanner stood (n, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedFloor:
+    """The floor that a mission was planned on, and the mission's settings."""
+
+    floor: FloorPlan
+    settings: Settings
+    mission: Mission
+
+    @cached_property
+    def space(self) -> NavigableSpace:
+        return navigable(self.floor, self.settings)
+
+    @cached_property
+    def seen(self) -> Visibility:
+        """What every place sees where a stop might be, in the mission's part of the floor."""
+        return visibility(candidates(self.space, part=self._part))
+
+    @property
+    def _part(self) -> int:
+        places = np.array([(stop.x, stop.y) for stop in self.mission.stops]).reshape(-1, 2)
+        parts = reach_of(self.space).part_at(places - local_origin(self.floor))
+        counts = Counter(parts[parts >= 0].tolist())
+        if not counts:
+            raise AnswerIsNo(f"{self.floor.name}: no stop of the mission is where the robot gets to")
+        return int(counts.most_common(1)[0][0])
+
+
+def planned_floor(path: Path, mission: Mission) -> PlannedFloor:
+    """The floor in a file, if the mission was planned on it.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, or is another floor than the mission's.
+    """
+    settings = read_settings(None, mission.origin.parameters)
+    floor = read_floor(path, options_of(settings))
+    if floor.digest != mission.origin.floor_digest:
+        raise InputError(
+            f"{path}: is not the floor that {mission.name} was planned on (sha256 {floor.digest[:12]}…, not "
+            f"{mission.origin.floor_digest[:12]}…); give the file it was planned on"
+        )
+    return PlannedFloor(floor, settings, mission)
+
+
+def as_driven(planned: PlannedFloor, places: Places) -> AsDriven:
+    """What is seen from where the robot stood, counted line by line, beside what the mission's stops see.
+
+    Raises
+    ------
+    AnswerIsNo
+        When nothing on the floor can be seen.
+    """
+    lines = SightLines(planned.space)
+    stops = np.array([(stop.x, stop.y, stop.heading) for stop in planned.mission.stops]).reshape(-1, 3)
+    ledger = ledger_of(planned.seen)
+    return AsDriven(
+        ledger=ledger,
+        planned=_seen_by(_views(planned.space, lines, stops), ledger),
+        driven=_seen_by(_views(planned.space, lines, places), ledger),
+    )
+
+
+def _seen_by(views: Iterable[IntArray], ledger: Ledger) -> BoolArray:
+    """Whether enough of the places that see these units see each unit."""
+    counted = np.zeros(len(ledger.weight), dtype=np.int64)
+    for units in views:
+        counted[units] += 1
+    return ledger.enough(counted)
+
+
+def _views(space: NavigableSpace, lines: SightLines, places: Places) -> list[IntArray]:
+    """Units that each place sees, along its heading where the scanner does not look all round."""
+    fov = math.radians(space.settings.fov)
+    views = []
+    for x, y, heading in places.tolist():
+        units = np.unique(lines.seen_from(np.array([x, y])))
+        if space.settings.fov < 360:
+            way = space.targets.unit_xy[units] - (x, y)
+            units = units[in_view(way, heading, fov=fov)]
+        views.append(units)
+    return views
+
+
+def top_up(
+    planned: PlannedFloor, places: Places, *, obstacles: Sequence[Polygon] = (), evidence: str = ""
+) -> Mission | None:
+    """The smallest further mission by which all is seen that was asked for; None where nothing is missing.
+
+    It begins where the mission began, and keeps clear of obstacles that the plan did not know of, which
+    also hide what is behind them.
+
+    Parameters
+    ----------
+    evidence
+        What the mission's id is made from besides the mission's own id: a log's digest.
+
+    Raises
+    ------
+    AnswerIsNo
+        When what is asked for cannot be reached any more.
+    InputError
+        When the mission is one of several that share a floor: what it leaves is for the others to see.
+    """
+    share = planned.mission.share
+    if share is not UNSET:
+        raise InputError(
+            f"{planned.mission.name}: shares its floor with {share.of - 1} more; a further mission is "
+            "planned for a floor that one mission sees alone"
+        )
+    known = replace(planned, floor=_with(planned.floor, obstacles)) if obstacles else planned
+    seen, done = _with_places(known, places)
+    selection = select_further(seen, done)
+    if not len(selection.chosen):
+        return None
+    driven = route(selection)
+    if planned.settings.minimise == "time":
+        driven = in_least_time(driven, done=done)
+    mission = assemble(driven)
+    stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
+    once = replace(ledger_of(known.seen), asked=frozen([1], np.int64))
+    alone = once.shares(_seen_by(_views(known.space, SightLines(known.space), stops), once))
+    return _further(mission, planned.mission, evidence, alone.whole.coverage or 0.0)
+
+
+def _with(floor: FloorPlan, obstacles: Sequence[Polygon]) -> FloorPlan:
+    """The floor with what stands on it besides."""
+    found = tuple(
+        Element(f"unplanned-{number}", "unplanned", solids=(shape,), occludes=True, obstacle=True)
+        for number, shape in enumerate(obstacles, 1)
+    )
+    return replace(floor, elements=(*floor.elements, *found))
+
+
+def _with_places(planned: PlannedFloor, places: Places) -> tuple[Visibility, IntArray]:
+    """The visibility with a row for each place where the robot stood, and these rows."""
+    seen, space = planned.seen, planned.space
+    views = _views(space, SightLines(space), places)
+    joined = _joined(seen.candidates, places)
+    units = [*(seen.seen_by(row) for row in range(seen.rows)), *views]
+    whole = visibility_of(joined, units, method=seen.method)
+    return whole, np.arange(seen.rows, seen.rows + len(places))
+
+
+def _joined(found: Candidates, places: Places) -> Candidates:
+    """Candidates with places that are no candidates of the plan, and count nothing for what is visible."""
+    count = len(places)
+    more: dict[str, Any] = {
+        "xy": places[:, :2], "room": np.full(count, -1), "reason": np.full(count, KEPT),
+        "part": np.full(count, found.chosen_part),
+        "doorway": np.zeros(count, bool), "must": np.zeros(count, bool),
+    }  # fmt: skip
+    if len(found.heading):
+        more["heading"] = places[:, 2]
+    both = {name: _frozen(getattr(found, name), values) for name, values in more.items()}
+    extra = found.extra if len(found.extra) else np.zeros(len(found.xy), bool)
+    return replace(found, **both, extra=_frozen(extra, np.ones(count, bool)))
+
+
+def _frozen(one: Any, other: Any) -> Any:
+    return frozen(np.concatenate([one, other]), one.dtype)
+
+
+def _further(mission: Mission, before: Mission, evidence: str, coverage: float) -> Mission:
+    """With an id of its own, what the mission before was told besides its plan, and what it sees.
+
+    What it adds to what was seen before is for one view of each target; it claims no more of its own.
+    """
+    asked = {"coverage": math.floor(coverage * 1e6) / 1e6, "room_coverage": 0.0, "kind_coverage": 0.0}
+    parameters = {**mission.origin.parameters, **asked}
+    parameters.pop("views", None)
+    settings = read_settings(None, parameters)
+    basis = f"{before.id}:{before.revision}:{evidence}:{mission.digest}"
+    return sealed(
+        changed(
+            mission,
+            id=hashlib.sha256(basis.encode()).hexdigest()[:32],
+            name=f"{before.name}-top-up",
+            frame=before.frame,
+            georeference=before.georeference,
+            limits=limits_spec_of(settings),
+            origin=changed(mission.origin, parameters=parameters),
+        )
+    )
+
+
+def hull_of(points: FloatArray, *, margin: float) -> Polygon:
+    """The convex outline of points (n, 2), widened by a margin in metres."""
+    shape = shapely.MultiPoint(points).convex_hull.buffer(margin, quad_segs=4)
+    return Polygon.of(shapely.get_coordinates(shape.exterior))

@@ -1,0 +1,182 @@
+"""Route -> mission: stops with headings, approaches, tolerances and scans, ready to be sent."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import shapely
+from msgspec import UNSET, UnsetType
+
+from stopgo.mission import __version__
+from stopgo.mission.document import (
+    Frame,
+    Mission,
+    MissionShare,
+    Point,
+    Sees,
+    Start,
+    Stop,
+    mission_id,
+    sealed,
+    stop_names,
+)
+from stopgo.mission.document.specs import (
+    DECIMALS,
+    limits_spec_of,
+    origin_of,
+    policy_of,
+    robot_of,
+    rounded,
+    scan_of,
+    scanner_of,
+    site_origin_of,
+)
+from stopgo.mission.errors import StopgoError
+from stopgo.mission.frames.frame_transform import SAME
+from stopgo.mission.frames.transform import SiteOrigin
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Candidates, NavigableSpace, Route
+from stopgo.planner.geometry.shapes import local_origin
+from stopgo.planner.overlap.registered import registered_pairs
+from stopgo.planner.routing import GRAPHS
+from stopgo.planner.space.gaps import CLEAR_SLACK, Walls, keeps_clear
+from stopgo.planner.space.reach import walls_of
+
+
+def assemble(
+    route: Route, *, part: int = 0, revision: int = 1, share: MissionShare | UnsetType = UNSET
+) -> Mission:
+    """The mission of a route; `part` numbers the missions of a floor that has several.
+
+    `share` says which of the missions it is that together see what the floor's plan promises.
+    """
+    space = route.selection.visibility.candidates.space
+    settings, floor = space.settings, space.floor
+    check_legs(route)
+    return sealed(
+        Mission(
+            id=mission_id(floor.source, settings, __version__, part),
+            revision=revision,
+            name=_name(floor.name, part, share),
+            digest="",
+            frame=Frame(name="map", to_map=SAME) if floor.on_robots_map else Frame(name="site"),
+            georeference=_georeference(space),
+            robot=robot_of(settings),
+            scanner=scanner_of(settings),
+            limits=limits_spec_of(settings),
+            share=share,
+            start=Start(
+                x=rounded(route.start[0]),
+                y=rounded(route.start[1]),
+                heading=_turned(route.start[2]),
+                reason=route.start_reason,
+            ),
+            stops=_stops(route, settings),
+            return_=None if route.return_leg is None else _line(route.return_leg),
+            policy=policy_of(settings),
+            origin=origin_of(settings, floor=floor.name, digest=floor.digest),
+            network=registered_pairs(route) if settings.least_overlap > 0 else msgspec.UNSET,
+        )
+    )
+
+
+def _name(floor: str, part: int, share: MissionShare | UnsetType) -> str:
+    if share is not UNSET:
+        return f"{floor} {share.kind} {share.number} of {share.of}"
+    return floor if part <= 0 else f"{floor}-{part + 1}"
+
+
+def _georeference(space: NavigableSpace) -> SiteOrigin | None:
+    given, known = site_origin_of(space.settings), space.floor.georeference
+    if given is not None or known is None:
+        return given
+    return SiteOrigin(lat=known.lat, lon=known.lon, alt=known.alt, heading_deg=known.heading_deg)
+
+
+def _stops(route: Route, settings: Settings) -> tuple[Stop, ...]:
+    visibility = route.selection.visibility
+    rows = route.selection.chosen[route.order]
+    doorways = set(visibility.candidates.doorway_rows.tolist())
+    views = np.zeros(visibility.targets.total, dtype=np.int64)
+    stops = []
+    heading = _turned(route.start[2])
+    for name, row, approach in zip(stop_names(len(rows)), rows, route.approaches, strict=True):
+        units = visibility.seen_by(int(row))
+        views[units] += 1
+        new = int(np.count_nonzero(views[units] == visibility.asked[units]))
+        heading = _scan_heading(visibility.candidates, int(row), _arrival_heading(approach, heading))
+        sees = Sees(units=len(units), new_units=new)
+        doorway = int(row) in doorways
+        stops.append(_stop(name, approach, heading, sees, settings, doorway=doorway))
+    return tuple(stops)
+
+
+def _scan_heading(candidates: Candidates, row: int, arrival: float) -> float:
+    """The heading the scan was planned with; a scanner that looks all round keeps that of the arrival."""
+    if not len(candidates.heading):
+        return arrival
+    return _turned(candidates.heading[candidates.kept[row]])
+
+
+def _arrival_heading(approach: FloatArray, before: float) -> float:
+    """Direction of the approach's last piece; where the robot does not move, it keeps its heading."""
+    if len(approach) < 2:
+        return before
+    step = approach[-1] - approach[-2]
+    return rounded(math.atan2(rounded(step[1]), rounded(step[0])))
+
+
+def _stop(
+    name: str, approach: FloatArray, heading: float, sees: Sees, settings: Settings, *, doorway: bool
+) -> Stop:
+    line = _line(approach)
+    return Stop(
+        id=name,
+        x=line[-1][0],
+        y=line[-1][1],
+        heading=heading,
+        doorway=doorway,
+        tolerance_m=settings.tolerance,
+        settle_s=settings.settle,
+        scan=scan_of(settings.profile, settings.scan_time),
+        on_failure=settings.on_failure,
+        retries=settings.retries,
+        approach=line,
+        sees=sees,
+    )
+
+
+def _line(points: FloatArray) -> tuple[Point, ...]:
+    return tuple((rounded(x), rounded(y)) for x, y in points.tolist())
+
+
+def _turned(heading: float) -> float:
+    """A heading in radians between -π and π."""
+    return rounded(math.remainder(heading, math.tau))
+
+
+def check_legs(route: Route) -> None:
+    """Every leg as it will be sent keeps its distance from obstacles, closed openings and floor edges.
+
+    Raises
+    ------
+    StopgoError
+        If one does not: the route is then not written.
+    """
+    space = route.selection.visibility.candidates.space
+    origin = local_origin(space.floor)
+    graph = space.settings.graph
+    whose = space.floor.name if graph in GRAPHS else f"graph = {graph}"
+    exact = walls_of(space)
+    walls = Walls(exact.segments, exact.clearance - CLEAR_SLACK)
+    tree = shapely.STRtree(walls.shapes())
+    legs = route.approaches if route.return_leg is None else (*route.approaches, route.return_leg)
+    for leg in legs:
+        line = np.round(leg, DECIMALS) - origin
+        shape = shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0])
+        if not keeps_clear(shape, walls, tree):
+            x, y = leg[-1]
+            raise StopgoError(f"{whose}: the leg to ({x:.3f}, {y:.3f}) comes too near an obstacle or an edge")

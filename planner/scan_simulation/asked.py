@@ -1,0 +1,82 @@
+"""Scan + limits of the plan -> the units that it shows as well as was asked, by what was measured."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from stopgo.mission.document.limits import limits_of, scanner_height
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.settings import Settings
+from stopgo.planner.scan_simulation.scanning import ScanCount
+from stopgo.planner.scan_simulation.strips import CELL_M, Strips
+
+SLACK_DEG = 0.5
+"""Angles are those of a cell's middle, up to 5 cm off the unit's."""
+
+
+@dataclass(frozen=True, eq=False)
+class AskedPoints:
+    """What a unit must show: points anywhere, or in certain cells, so dense and so steep."""
+
+    strips: Strips
+    cells: BoolArray
+    """Whether a cell must be shown as well as asked (cells,); none where any point will do."""
+    steepest: float | None
+    """Radians from square on."""
+    spacing: float | None
+    """Metres between neighbouring points."""
+    needed: IntArray
+    """How many of its cells each unit must show (units,)."""
+
+    @classmethod
+    def of(cls, settings: Settings, strips: Strips) -> AskedPoints:
+        """By a plan's limits: at the scanner's height, or from the floor up to `wall_height`.
+
+        What hangs is asked for points only: a plan's angles are those in the plane.
+        """
+        limits, height = limits_of(settings), scanner_height(settings)
+        unit = strips.unit_of_cell
+        rows = np.diff(strips.first_cell)
+        row = np.arange(strips.cells) - strips.first_cell[unit]
+        if settings.wall_height is None:
+            level = np.clip(((height - strips.low) / CELL_M).astype(np.int64), 0, rows - 1)
+            wanted = row == level[unit]
+        else:
+            wanted = strips.low[unit] + (row + 1) * CELL_M <= settings.wall_height + 1e-9
+        none = limits.max_incidence is None and limits.spacing is None
+        cells = wanted & ~strips.under[unit] & (not none)
+        needed = np.bincount(unit, cells, minlength=len(strips.low)).astype(np.int64)
+        steepest = None if limits.max_incidence is None else limits.max_incidence + math.radians(SLACK_DEG)
+        return cls(strips, cells, steepest, limits.spacing, needed)
+
+    def shown(self, scan: ScanCount) -> BoolArray:
+        """Units of which a scan shows what is asked (units,)."""
+        unit = self.strips.unit_of_cell[scan.cell]
+        good = self.cells[scan.cell] & self._steep(scan) & self._dense(scan, unit)
+        many = np.bincount(unit, good, minlength=len(self.needed))
+        any_point = np.bincount(unit, minlength=len(self.needed)) > 0
+        found: BoolArray = any_point & (many >= self.needed)
+        return found
+
+    def _steep(self, scan: ScanCount) -> BoolArray | bool:
+        return True if self.steepest is None else scan.incidence <= self.steepest
+
+    def _dense(self, scan: ScanCount, unit: IntArray) -> BoolArray | bool:
+        """Whether points are as near as asked, both ways; one more may lie just beside a cell."""
+        if self.spacing is None:
+            return True
+        columns = np.maximum(scan.columns, 1)
+        height = np.minimum(CELL_M, self.strips.area[scan.cell] / self._width[unit])
+        across, up = self._width[unit] / (columns + 1), height / (scan.points / columns + 1)
+        return np.maximum(across, up) <= self.spacing
+
+    @property
+    def _width(self) -> FloatArray:
+        """Of each unit, from the area of its first cell."""
+        first = self.strips.first_cell[:-1]
+        tall = np.minimum(CELL_M, self.strips.tall)
+        found: FloatArray = self.strips.area[first] / tall
+        return found

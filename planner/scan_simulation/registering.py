@@ -1,0 +1,241 @@
+"""Two scans -> how well they register: from the error of a robot's pose, by a public library.
+
+The scanner stands level, at a known height: z, roll and pitch begin true, and the floor and the ceiling that
+both scans show hold them. Only surfaces that both show from the same side are matched, as software for
+surveyors does: else the two sides of a wall would be laid on each other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from stopgo.mission.geometry import BoolArray, FloatArray, frozen
+from stopgo.mission.proof.plan_proof import ScanPair, Simulation
+
+VOXEL_M = 0.075
+"""Clouds are thinned to a point per cube of this size."""
+NEIGHBOURS = 15
+TURNED_M = 0.5
+"""How far apart surfaces count that are one radian apart in direction."""
+SAME_M = 0.1
+"""Points of the same surface lie at most so far apart, where the poses are true."""
+STAGES = ((0.35, 0.3), (0.15, 0.1))
+"""Distances in metres: within which surfaces count as shared, and within which points are matched."""
+LEAST_POINTS = 100
+"""Fewer shared points on upright surfaces, about 0.5 m², are no pair."""
+FEW = 10
+"""Of so many points one is looked at first."""
+WEAKEST = 0.02
+"""At least this share of the shared upright surface must face in the direction that is held least."""
+UPRIGHT = 0.5
+"""Upward part of a normal up to which a surface is upright."""
+MOST_ITERATIONS = 60
+FINE = 1e-5
+"""Metres and radians of a step after which registration ends."""
+GLOBAL_VOXEL_M = 0.15
+"""Of the matching without poses."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface6:
+    """A thinned cloud with the directions in which its surfaces face, from its scanner."""
+
+    points: FloatArray
+    """(n, 3)."""
+    normals: FloatArray
+    """Towards the scanner (n, 3)."""
+
+    @cached_property
+    def tree(self) -> Any:
+        return cKDTree(self._both(np.eye(4)))
+
+    @cached_property
+    def upright(self) -> BoolArray:
+        return frozen(np.abs(self.normals[:, 2]) < UPRIGHT, np.bool_)
+
+    def near(self, other: Surface6, there: FloatArray, within: float) -> BoolArray:
+        """Which points of `other`, placed here by `there` (4, 4), lie on surfaces of this one."""
+        distance, _ = self.tree.query(other._both(there), distance_upper_bound=within)
+        found: BoolArray = np.isfinite(distance)
+        return found
+
+    def _both(self, there: FloatArray) -> FloatArray:
+        turn = there[:3, :3].T
+        return np.hstack([self.points @ turn + there[:3, 3], TURNED_M * self.normals @ turn])
+
+
+def surface_of(cloud: FloatArray) -> Surface6:
+    """A scan's cloud (n, 3), thinned, with its normals."""
+    import small_gicp
+
+    if len(cloud) <= NEIGHBOURS:
+        return Surface6(frozen(np.empty((0, 3))), frozen(np.empty((0, 3))))
+    thin, _ = small_gicp.preprocess_points(
+        cloud, downsampling_resolution=VOXEL_M, num_neighbors=NEIGHBOURS, num_threads=1
+    )
+    points, normals = thin.points()[:, :3], thin.normals()[:, :3]
+    towards = -np.sign(np.einsum("ij,ij->i", points, normals))
+    return Surface6(frozen(points), frozen(normals * towards[:, None]))
+
+
+@dataclass(frozen=True, eq=False)
+class Registered:
+    """A pair, and the pose of its second scan in the first as registration has it."""
+
+    pair: ScanPair
+    there: FloatArray
+    """(4, 4)."""
+
+
+def registered(
+    names: Sequence[str], places: FloatArray, surfaces: Sequence[Surface6], simulation: Simulation
+) -> Iterator[Registered]:
+    """Every pair of scans that show some of the same surfaces; `places` (n, 3) are where they were taken."""
+    for i in range(len(names)):
+        for j in range(i + 1, len(names)):
+            if math.dist(places[i], places[j]) < 2 * simulation.joining_m:
+                two = _Two(surfaces[i], surfaces[j], _shift(places[j] - places[i]))
+                if two.meets and two.shared_points >= LEAST_POINTS:
+                    starts = _starts(two, simulation, (i, j))
+                    yield _registered((names[i], names[j]), two, starts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Two:
+    """Two surfaces, and the true pose of the second in the first."""
+
+    one: Surface6
+    other: Surface6
+    truth: FloatArray
+
+    @cached_property
+    def shared(self) -> tuple[BoolArray, BoolArray]:
+        """Which upright points of each lie on surfaces of the other."""
+        one, other = _shared(self.one, self.other, self.truth, SAME_M)
+        return one & self.one.upright, other & self.other.upright
+
+    @property
+    def meets(self) -> bool:
+        """Whether it is worth while to look: a few points tell most pairs that share nothing."""
+        few = Surface6(self.other.points[::FEW], self.other.normals[::FEW])
+        return bool((self.one.near(few, self.truth, SAME_M) & few.upright).any())
+
+    @property
+    def shared_points(self) -> int:
+        return min(int(mask.sum()) for mask in self.shared)
+
+    @property
+    def share(self) -> float:
+        pairs = zip(self.shared, (self.one, self.other), strict=True)
+        return min(float(mask.sum() / item.upright.sum()) for mask, item in pairs)
+
+    @property
+    def free_deg(self) -> float | None:
+        """The direction in which next to no shared surface faces, degrees from +x."""
+        facing = self.one.normals[self.shared[0]][:, :2]
+        weight, axes = np.linalg.eigh(facing.T @ facing / len(facing))
+        if weight[0] >= WEAKEST:
+            return None
+        return math.degrees(math.atan2(axes[1, 0], axes[0, 0])) % 180.0
+
+    def aligned(self, there: FloatArray) -> FloatArray:
+        """The pose of the second in the first that registration finds from `there`."""
+        import small_gicp
+
+        for within, matched in STAGES:
+            one, other = _shared(self.one, self.other, there, within)
+            if min(one.sum(), other.sum()) <= NEIGHBOURS:
+                return there
+            target, tree = _prepared(self.one.points[one])
+            source, _ = _prepared(self.other.points[other])
+            there = small_gicp.align(
+                target, source, tree, there,
+                max_correspondence_distance=matched, num_threads=1, max_iterations=MOST_ITERATIONS,
+                rotation_epsilon=FINE, translation_epsilon=FINE,
+            ).T_target_source  # fmt: skip
+        return there
+
+    def error(self, there: FloatArray) -> tuple[float, float]:
+        """How far a pose is off the truth, metres and degrees."""
+        return off(np.linalg.inv(self.truth) @ there)
+
+
+def _registered(names: tuple[str, str], two: _Two, starts: Sequence[FloatArray]) -> Registered:
+    """From every start; the worst end counts."""
+    ends = [two.aligned(start) for start in starts]
+    errors = [two.error(end) for end in ends]
+    worst = int(np.argmax([error[0] for error in errors]))
+    pair = ScanPair(
+        *names,
+        shared=two.share,
+        free_deg=two.free_deg,
+        error_m=errors[worst][0],
+        error_deg=max(error[1] for error in errors),
+    )
+    return Registered(pair, ends[worst])
+
+
+def _starts(two: _Two, simulation: Simulation, pair: tuple[int, int]) -> list[FloatArray]:
+    """Poses that are off to one side and to the other; or what is found without any."""
+    random = np.random.default_rng([simulation.seed, *pair])
+    way, turn = random.uniform(0, 2 * math.pi), random.choice((-1.0, 1.0))
+    if not simulation.poses:
+        return [_without_pose(two.one.points, two.other.points, turn=way)]
+    far, angle = simulation.pose_error_m, turn * math.radians(simulation.pose_error_deg)
+    aside = far * np.array([math.cos(way), math.sin(way), 0.0])
+    return [_shift(side * aside) @ two.truth @ _turned(side * angle) for side in (1.0, -1.0)]
+
+
+def _without_pose(one: FloatArray, other: FloatArray, *, turn: float) -> FloatArray:
+    """Where KISS-Matcher puts the second, that was turned about the vertical by nobody knows how much."""
+    import kiss_matcher
+
+    away = _turned(turn)
+    matcher = kiss_matcher.KISSMatcher(
+        kiss_matcher.KISSMatcherConfig(voxel_size=GLOBAL_VOXEL_M, use_quatro=True)
+    )
+    seen = (other @ away[:3, :3].T).astype(np.float32)
+    found = matcher.estimate(seen, one.astype(np.float32))
+    there = np.eye(4)
+    there[:3, :3], there[:3, 3] = found.rotation, np.ravel(found.translation)
+    return there @ away
+
+
+def _shared(one: Surface6, other: Surface6, there: FloatArray, within: float) -> tuple[BoolArray, BoolArray]:
+    """Which points of each lie on surfaces of the other, that is at `there` in the first."""
+    return other.near(one, frozen(np.linalg.inv(there)), within), one.near(other, there, within)
+
+
+def _prepared(points: FloatArray) -> tuple[Any, Any]:
+    import small_gicp
+
+    cloud = small_gicp.PointCloud(points)
+    tree = small_gicp.KdTree(cloud)
+    small_gicp.estimate_normals_covariances(cloud, tree, num_neighbors=NEIGHBOURS, num_threads=1)
+    return cloud, tree
+
+
+def off(pose: FloatArray) -> tuple[float, float]:
+    """How far a pose (4, 4) is from none, metres and degrees."""
+    sine = np.linalg.norm(pose[[2, 0, 1], [1, 2, 0]] - pose[[1, 2, 0], [2, 0, 1]]) / 2
+    angle = math.atan2(float(sine), (float(np.trace(pose[:3, :3])) - 1) / 2)
+    return float(np.linalg.norm(pose[:3, 3])), math.degrees(angle)
+
+
+def _shift(by: FloatArray) -> FloatArray:
+    pose = np.eye(4)
+    pose[:3, 3] = by
+    return pose
+
+
+def _turned(angle: float) -> FloatArray:
+    pose = np.eye(4)
+    pose[:2, :2] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    return pose

@@ -1,0 +1,110 @@
+"""Prices of units that prove how many stops are needed: from places known, held against all of them.
+
+Whatever is asked for, prices of demands p_k >= 0 and of units u_j >= 0 give, where no stop sees units that
+cost more than M together, the bound (Σ needed_k p_k - Σ_j max(0, Σ_k w_kj p_k - u_j)) / M: weak duality of
+the covering problem with a row for every place there is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.sparse import coo_array, csr_array, diags_array, hstack, vstack
+
+from stopgo.mission.geometry import FloatArray, IntArray
+from stopgo.planner.visibility.unit_ranges import ranges
+
+
+@dataclass(frozen=True, eq=False)
+class WantedUnits:
+    """What stops must see: every demand a least weight of the units that belong to it."""
+
+    weight: IntArray
+    """Of each unit (units,); 0 where it does not count."""
+    member: IntArray
+    """(memberships, units): demands that each unit belongs to, -1 for none."""
+    needed: FloatArray
+    """(demands,)."""
+
+    def paid(self, demand: FloatArray) -> FloatArray:
+        """What is paid for each unit, at prices of demands (units,)."""
+        rate = np.where(self.member >= 0, demand[self.member], 0.0).sum(axis=0)
+        paid: FloatArray = rate * self.weight
+        return paid
+
+
+@dataclass(frozen=True, eq=False)
+class Prices:
+    """Prices and the bound that they prove where no stop sees units of more than 1."""
+
+    unit: FloatArray
+    demand: FloatArray
+    value: float
+    stops: FloatArray
+    """How much of each place the relaxation takes (rows,)."""
+
+    @classmethod
+    def of(cls, asked: WantedUnits, unit: FloatArray, demand: FloatArray, stops: FloatArray) -> Prices:
+        beyond = np.maximum(0.0, asked.paid(demand) - unit).sum()
+        return cls(unit, demand, float(asked.needed @ demand - beyond), stops)
+
+
+def prices_of(asked: WantedUnits, row: IntArray, first: IntArray, last: IntArray, rows: int) -> Prices | None:
+    """The prices that prove most for these rows' runs of units; None where the solver gives up."""
+    group, sees = _groups(asked, row, first, last, rows)
+    inside = np.flatnonzero(group >= 0)
+    groups, scale = sees.shape[1], max(1.0, float(asked.weight.sum()) / max(1, sees.shape[1]))
+    which = asked.member[:, inside]
+    belongs = which >= 0
+    entries = np.tile(asked.weight[inside] / scale, len(which))[belongs.ravel()]
+    places = (which[belongs], np.tile(group[inside], (len(which), 1))[belongs])
+    worth = coo_array((entries, places), shape=(len(asked.needed), groups)).tocsr()
+    solution = linprog(
+        np.concatenate([np.ones(rows), np.zeros(groups)]),
+        A_ub=vstack(
+            [
+                hstack([-sees.T, diags_array(np.ones(groups))]),
+                hstack([csr_array((len(asked.needed), rows)), -worth]),
+            ],
+            format="csr",
+        ),
+        b_ub=np.concatenate([np.zeros(groups), -asked.needed / scale]),
+        bounds=[(0, None)] * rows + [(0, 1)] * groups,
+        method="highs",
+    )
+    if solution.status != 0:
+        return None
+    duals = np.maximum(-np.asarray(solution.ineqlin.marginals), 0.0)
+    weight = np.bincount(group[inside], asked.weight[inside], groups)
+    unit = np.zeros(len(asked.weight))
+    unit[inside] = (duals[:groups] / weight)[group[inside]] * asked.weight[inside]
+    return Prices.of(asked, unit, duals[groups:] / scale, solution.x[:rows])
+
+
+def _groups(
+    asked: WantedUnits, row: IntArray, first: IntArray, last: IntArray, rows: int
+) -> tuple[IntArray, csr_array]:
+    """The group of each unit by who sees it and what asks for it (-1: does not count); who sees each."""
+    total = len(asked.weight)
+    changes = (np.diff(asked.member, axis=1) != 0).any(axis=0) | (np.diff(asked.weight > 0) != 0)
+    begin = np.unique(np.concatenate([[0], first, last + 1, np.flatnonzero(changes) + 1]))
+    begin = begin[begin < total]
+    low, high = np.searchsorted(begin, first), np.searchsorted(begin, last, side="right")
+    piece = ranges(low, high - low)
+    seen = csr_array((np.ones(len(piece)), (piece, np.repeat(row, high - low))), shape=(len(begin), rows))
+    seen.sum_duplicates()
+    seen.sort_indices()
+    known: dict[tuple[bytes, bytes], int] = {}
+    number, kept = np.full(len(begin), -1, dtype=np.int64), list[int]()
+    for k in np.flatnonzero((asked.weight[begin] > 0) & (np.diff(seen.indptr) > 0)):
+        key = (
+            seen.indices[seen.indptr[k] : seen.indptr[k + 1]].tobytes(),
+            asked.member[:, begin[k]].tobytes(),
+        )
+        if key not in known:
+            known[key] = len(kept)
+            kept.append(int(k))
+        number[k] = known[key]
+    return np.repeat(number, np.diff(np.append(begin, total))), seen[kept].T.tocsr()

@@ -1,0 +1,120 @@
+"""Selection -> selection: places beside the chosen stops are offered too, and may save a stop.
+
+Candidates stand on a coarse pattern; a stop is seldom best right there. Offering every place of a fine
+pattern would be dear, so only those round the chosen stops are added and the choice is made again. What is
+visible is still asked of the pattern's candidates, so that the coverage asked for stays the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stopgo.mission.geometry import FloatArray, IntArray, frozen
+from stopgo.mission.stages import Candidates, Selection, Visibility
+from stopgo.planner.candidates import judged
+from stopgo.planner.geometry.room_grid import main_axes
+from stopgo.planner.geometry.shapes import local_origin, to_shape
+from stopgo.planner.selection import select
+from stopgo.planner.visibility import visibility
+from stopgo.planner.visibility.unit_ranges import ranges
+
+STEPS = (-0.5, -0.25, 0.0, 0.25, 0.5)
+"""Where places are offered beside a stop, along both axes of its room, in spacings of the grid."""
+MOST = 25
+"""Stops up to which this is done unless it is asked for: beyond, it takes more than a second."""
+
+
+def refined(selection: Selection) -> Selection:
+    """A selection with fewer stops, some of them beside the pattern; the same where none is saved."""
+    settings = selection.visibility.candidates.space.settings
+    if settings.coverage_rule == "paper" or settings.fov < 360:
+        return selection
+    if not (len(selection.chosen) <= MOST if settings.refine is None else settings.refine):
+        return selection
+    beside = _beside(selection)
+    if beside is None:
+        return selection
+    again = select(joined(selection.visibility, visibility(beside)))
+    return again if len(again.chosen) < len(selection.chosen) else selection
+
+
+def _beside(selection: Selection) -> Candidates | None:
+    """Places round the chosen stops where a stop may be and is not offered yet, if there are any."""
+    candidates = selection.visibility.candidates
+    free = np.setdiff1d(selection.chosen, np.union1d(candidates.must_rows, candidates.doorway_rows))
+    chosen = candidates.kept[free]
+    places = np.concatenate([np.empty((0, 2)), *(_around(candidates, int(index)) for index in chosen)])
+    room = np.repeat(candidates.room[chosen], len(STEPS) ** 2)
+    found = judged(candidates.space, places, room, part=candidates.chosen_part)
+    known = {_place(point) for point in candidates.xy}
+    new = {_place(found.xy[k]): k for k in found.kept[::-1] if _place(found.xy[k]) not in known}
+    return taken(found, np.array([new[place] for place in sorted(new)])) if new else None
+
+
+def _place(point: FloatArray) -> tuple[float, float]:
+    """A position to the micrometre, for telling places apart."""
+    x, y = np.round(point, 6).tolist()
+    return x, y
+
+
+def _around(candidates: Candidates, index: int) -> FloatArray:
+    """Places (n, 2) round a candidate, along the axes of its room."""
+    space = candidates.space
+    axes = main_axes(to_shape(space.rooms[candidates.room[index]].area, local_origin(space.floor)))
+    along = np.array(STEPS) * space.settings.grid
+    offsets = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
+    return candidates.xy[index] + offsets @ axes
+
+
+PER_CANDIDATE = ("xy", "room", "reason", "part", "doorway", "must")
+"""Arrays of `Candidates` that are joined; headings there are none."""
+
+
+def taken(found: Candidates, index: IntArray) -> Candidates:
+    """Some of the candidates, marked as extra ones."""
+    taken: dict[str, Any] = {name: _frozen(getattr(found, name)[index]) for name in PER_CANDIDATE}
+    return replace(found, **taken, extra=_frozen(np.ones(len(index), dtype=np.bool_)))
+
+
+def joined(seen: Visibility, more: Visibility) -> Visibility:
+    """The candidates of both with what they see."""
+    one, other = seen.candidates, more.candidates
+    both: dict[str, Any] = {name: _frozen(getattr(one, name), getattr(other, name)) for name in PER_CANDIDATE}
+    before = one.extra if len(one.extra) else np.zeros(len(one.xy), dtype=np.bool_)
+    extra = _frozen(before, other.extra)
+    return replace(
+        seen,
+        candidates=replace(one, **both, extra=extra),
+        pointer=_frozen(seen.pointer, seen.pointer[-1] + more.pointer[1:]),
+        segment=_frozen(seen.segment, more.segment),
+        first=_frozen(seen.first, more.first),
+        last=_frozen(seen.last, more.last),
+    )
+
+
+def with_rows(seen: Visibility, rows: IntArray) -> Visibility:
+    """The visibility where of the reachable candidates only some are left (k,), ascending."""
+    candidates = seen.candidates
+    left_out = np.delete(candidates.kept, rows)
+    index = np.setdiff1d(np.arange(len(candidates.xy)), left_out)
+    some: dict[str, Any] = {name: _frozen(getattr(candidates, name)[index]) for name in PER_CANDIDATE}
+    extra = candidates.extra if len(candidates.extra) else np.zeros(len(candidates.xy), dtype=np.bool_)
+    counts = np.diff(seen.pointer)[rows]
+    run = ranges(seen.pointer[rows], counts)
+    return replace(
+        seen,
+        candidates=replace(candidates, **some, extra=_frozen(extra[index])),
+        pointer=_frozen(np.concatenate([[0], np.cumsum(counts)])),
+        segment=_frozen(seen.segment[run]),
+        first=_frozen(seen.first[run]),
+        last=_frozen(seen.last[run]),
+    )
+
+
+def _frozen(*arrays: NDArray[Any]) -> NDArray[Any]:
+    """The arrays in one, read-only."""
+    return frozen(np.concatenate(arrays), arrays[0].dtype)

@@ -1,0 +1,77 @@
+"""Whether a stop may be at a point: decided by exact distances, with the reason where it may not."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
+from stopgo.mission.stages import AT_EDGE, AVOIDED, IN_HOLE, KEPT, OUTSIDE, TOO_CLOSE, NavigableSpace
+from stopgo.planner.geometry.shapes import SLACK, boundary_lines, local_origin, to_shape
+
+
+class Place:
+    """A navigable space, prepared for asking about many points."""
+
+    def __init__(self, space: NavigableSpace) -> None:
+        self.space = space
+        self.origin = local_origin(space.floor)
+        self.outline = to_shape(space.floor.outline, self.origin)
+        self.rooms = [to_shape(room.area, self.origin) for room in space.rooms]
+        self.obstacles = to_shape(space.obstacles, self.origin)
+        self._walls = boundary_lines(self.obstacles)
+        self._edges = boundary_lines(self.outline)
+        self._wall_tree, self._edge_tree = shapely.STRtree(self._walls), shapely.STRtree(self._edges)
+        for shape in (self.outline, self.obstacles, *self.rooms):
+            shapely.prepare(shape)
+
+    @property
+    def element_clearance(self) -> float:
+        """Least distance from a stop to an element: d_sec, or the robot's radius if that is more."""
+        return max(self.space.settings.d_sec, self.space.settings.radius)
+
+    def reasons(self, xy: FloatArray, room: IntArray) -> IntArray:
+        """Index into DROP_REASONS for each point (n, 2) in the drawing's coordinates."""
+        local = np.asarray(xy, dtype=np.float64).reshape(-1, 2) - self.origin
+        points = shapely.points(local)
+        in_room = np.array(
+            [shapely.dwithin(self.rooms[k], p, SLACK) for k, p in zip(room, points, strict=True)], dtype=bool
+        )
+        on_floor = shapely.dwithin(self.outline, points, SLACK)
+        clear = (self.to_element(local) >= self.element_clearance - SLACK) & ~shapely.contains(
+            self.obstacles, points
+        )
+        off_edge = self.to_edge(local) >= self.space.settings.edge - SLACK
+        return np.select(
+            [~in_room, ~on_floor, ~clear, ~off_edge, self.avoided(local + self.origin)],
+            [OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, AVOIDED],
+            KEPT,
+        ).astype(np.int64)
+
+    def avoided(self, xy: FloatArray) -> BoolArray:
+        """Whether each point (n, 2) lies in a circle that the user wants no stop in."""
+        inside = np.zeros(len(xy), dtype=bool)
+        for x, y, radius in self.space.settings.avoid:
+            inside |= np.hypot(xy[:, 0] - x, xy[:, 1] - y) <= radius
+        return inside
+
+    def room_at(self, xy: FloatArray) -> int:
+        """The room nearest a point, by the order of rooms where several are."""
+        point = shapely.Point(xy - self.origin)
+        return int(np.argmin([room.distance(point) for room in self.rooms]))
+
+    def to_element(self, local: FloatArray) -> FloatArray:
+        """Distance of each local point (n, 2) to the nearest element's outline."""
+        return _nearest(self._wall_tree, self._walls, local)
+
+    def to_edge(self, local: FloatArray) -> FloatArray:
+        """Distance of each local point (n, 2) to the nearest floor edge."""
+        return _nearest(self._edge_tree, self._edges, local)
+
+
+def _nearest(tree: shapely.STRtree, lines: NDArray[np.object_], local: FloatArray) -> FloatArray:
+    if not len(lines) or not len(local):
+        return np.full(len(local), np.inf)
+    points = shapely.points(local)
+    return shapely.distance(points, lines[tree.nearest(points)])

@@ -1,0 +1,230 @@
+"""Route -> division: its stops shared out, with a route for each robot or tour, and a proven bound."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from stopgo.mission.document.schedule import schedule
+from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.geometry import IntArray, frozen, polyline_length
+from stopgo.mission.settings import Settings
+from stopgo.mission.stages import Route, Selection
+from stopgo.mission.stages.division import DividedRoute
+from stopgo.planner.routing import Ends, check_place, tour_bound
+from stopgo.planner.routing.assemble import assemble
+from stopgo.planner.selection import coverage_steps
+from stopgo.planner.selection.cover import cover_of
+from stopgo.planner.selection.demands import demands_of
+from stopgo.planner.task_allocation.exchange import Tours, filled, shorter, shorter_longest
+from stopgo.planner.task_allocation.least_times import least_makespan, least_tours
+from stopgo.planner.task_allocation.tour_times import Tour, TourTimes, tour_times
+from stopgo.planner.task_allocation.vehicles import vehicle_tours
+
+TURNING = (0.2, 0.4, 0.7, 1.0)
+"""Shares of half a turn allowed for each way while tours are looked for, until they keep their time."""
+SPARE_S = 1e-3
+"""Seconds that a tour stays below its limit, since missions are rounded to micrometres."""
+WIDER = (1.0, 1.02, 1.05, 1.1, 1.2, 1.4, 2.0, 4.0, 16.0)
+"""Times of the bound in which tours of a fleet are looked for."""
+HALVINGS = 4
+"""Of the time between what was found and what was not."""
+METHOD = "PyVRP, then moves and exchanges by the schedule's times"
+
+
+def divided(route: Route) -> DividedRoute:
+    """The stops of a route in tours, as the settings ask for it.
+
+    Raises
+    ------
+    AnswerIsNo
+        When a stop is too far for a tour of its own within the time.
+    InputError
+        When there are more robots than stops, or a start is where none can be.
+    """
+    settings = route.selection.visibility.candidates.space.settings
+    return _fleet(route, settings) if settings.robots is not None else _shifts(route, settings)
+
+
+def taken_by(divided: DividedRoute) -> tuple[float, float]:
+    """What a division is judged by: the longest tour, or how many there are; then the time of all (s)."""
+    times = [schedule(assemble(route)).total_s for route in divided.routes]
+    return (max(times) if divided.kind == "robot" else float(len(times))), sum(times)
+
+
+def _fleet(route: Route, settings: Settings) -> DividedRoute:
+    selection, robots = route.selection, settings.robots or 1
+    if robots > len(selection.chosen):
+        raise InputError(
+            f"robots = {robots}: the floor takes {len(selection.chosen)} stops, fewer than there are robots; "
+            f"give at most --robots {len(selection.chosen)}"
+        )
+    places = settings.starts
+    for place in places[1:]:
+        check_place(selection.visibility.candidates, "start", place)
+    closed = settings.tour != "open"
+    clock = tour_times(
+        selection,
+        np.array([place[:2] for place in places]),
+        tuple(math.radians(place[2]) for place in places),
+        closed=closed,
+    )
+    numbers = list(range(robots)) if len(places) > 1 else [0] * robots
+    bound = least_makespan(clock, np.array(numbers))
+    tours = _shared_evenly(clock, numbers, bound, route, seed=settings.seed)
+    if len(places) == 1:
+        rank = {stop: k for k, stop in enumerate(route.order.tolist())}
+        tours = tuple(sorted(tours, key=lambda tour: min(rank[stop] for stop in tour)))
+    routes = [_route(route, clock, tour, k) for tour, k in zip(tours, numbers, strict=True)]
+    return DividedRoute("robot", tuple(routes), None, bound, METHOD)
+
+
+def _shared_evenly(clock: TourTimes, numbers: list[int], bound: float, route: Route, *, seed: int) -> Tours:
+    """Tours, one from each of the starts `numbers`, of which the longest is as short as was found."""
+    best = shorter_longest(clock, _cut(clock, route, numbers), numbers)
+    low, high = bound, _longest(clock, best, numbers)
+    for factor in WIDER:
+        if bound * factor >= high:
+            break
+        found = _fleet_tours(clock, numbers, bound * factor, seed=seed)
+        if found is not None:
+            best = min(best, found, key=lambda tours: _longest(clock, tours, numbers))
+            high = min(high, bound * factor, _longest(clock, best, numbers))
+            break
+        low = bound * factor
+    for _ in range(HALVINGS):
+        if low >= high:
+            break
+        middle = (low + high) / 2
+        found = _fleet_tours(clock, numbers, middle, seed=seed)
+        if found is None:
+            low = middle
+            continue
+        best = min(best, found, key=lambda tours: _longest(clock, tours, numbers))
+        high = min(middle, _longest(clock, best, numbers))
+    return best
+
+
+def _longest(clock: TourTimes, tours: Tours, numbers: list[int]) -> float:
+    return max(clock.seconds(tour, k) for tour, k in zip(tours, numbers, strict=True))
+
+
+def _cut(clock: TourTimes, route: Route, numbers: list[int]) -> Tours:
+    """The route's stops in stretches of even number, each for the start that reaches it soonest."""
+    pieces = [tuple(piece.tolist()) for piece in np.array_split(route.order, len(numbers))]
+    least, tours = clock.least, []
+    for number in numbers:
+        nearest = min(pieces, key=lambda piece: min(least[clock.stops + number, list(piece)]))
+        pieces.remove(nearest)
+        tours.append(nearest)
+    return tuple(tours)
+
+
+def _fleet_tours(clock: TourTimes, numbers: list[int], limit_s: float, *, seed: int) -> Tours | None:
+    found = vehicle_tours(
+        clock.estimate(TURNING[0]),
+        stops=clock.stops, depots=[clock.stops + k for k in numbers], pause_s=clock.pause_s,
+        limit_s=limit_s, closed=clock.closed, seed=seed,
+    )  # fmt: skip
+    if found is None:
+        return None
+    left, tours = list(found), []
+    for number in numbers:
+        own = next((item for item in left if item[0] == clock.stops + number), None)
+        if own is not None:
+            left.remove(own)
+        tours.append(() if own is None else own[1])
+    return shorter_longest(clock, filled(clock, tuple(tours), numbers), numbers)
+
+
+def _shifts(route: Route, settings: Settings) -> DividedRoute:
+    assert settings.tour_limit is not None
+    key, limit_s = settings.tour_limit
+    clock = tour_times(route.selection, np.array([route.start[:2]]), (route.start[2],), closed=True)
+    _check_reach(clock, route, key, limit_s)
+    bound = least_tours(clock, limit_s)
+    tours = _fewest(clock, route, bound, limit_s - SPARE_S, seed=settings.seed)
+    rank = {stop: k for k, stop in enumerate(route.order.tolist())}
+    tours = tuple(sorted(tours, key=lambda tour: min(rank[stop] for stop in tour)))
+    routes = tuple(_route(route, clock, tour, 0) for tour in tours)
+    return DividedRoute("tour", routes, limit_s, float(bound), METHOD)
+
+
+def _check_reach(clock: TourTimes, route: Route, key: str, limit_s: float) -> None:
+    for number, stop in enumerate(route.order.tolist(), 1):
+        needed = clock.seconds((stop,))
+        if needed > limit_s - SPARE_S:
+            x, y = route.selection.xy[stop]
+            raise AnswerIsNo(
+                f"{key} = {limit_s:g} s: stop {number} of the route, at ({x:.2f}, {y:.2f}), takes "
+                f"{math.ceil(needed)} s there and back alone; give more time, or a start nearer to it"
+            )
+
+
+def _fewest(clock: TourTimes, route: Route, bound: int, limit_s: float, *, seed: int) -> Tours:
+    """As few tours within the time as were found."""
+    greedy = _cut_in_time(clock, route, limit_s)
+    for count in range(bound, len(greedy)):
+        for turning in TURNING:
+            found = vehicle_tours(
+                clock.estimate(turning),
+                stops=clock.stops, depots=[clock.stops] * count, pause_s=clock.pause_s,
+                limit_s=limit_s, closed=True, seed=seed,
+            )  # fmt: skip
+            if found is None:
+                break  # nor with more time for turning
+            tours = shorter_longest(clock, tuple(tour for _, tour in found), [0] * len(found))
+            if _longest(clock, tours, [0] * len(tours)) <= limit_s:
+                return tours
+    return greedy
+
+
+def _cut_in_time(clock: TourTimes, route: Route, limit_s: float) -> Tours:
+    """The route's stops in stretches, each as long as its time allows."""
+    tours: list[Tour] = []
+    for stop in route.order.tolist():
+        longer = shorter(clock, (*tours[-1], stop), 0) if tours else (stop,)
+        if tours and clock.seconds(longer) <= limit_s:
+            tours[-1] = longer
+        else:
+            tours.append((stop,))
+    return tuple(tours)
+
+
+def _route(whole: Route, clock: TourTimes, tour: Tour, start: int) -> Route:
+    """The route of one tour, over a selection of its own stops."""
+    selection, order = _selected(whole.selection, tour)
+    line = [clock.stops + start, *tour]
+    approaches = [clock.line(a, b) for a, b in pairwise(line)]
+    back = clock.line(line[-1], line[0]) if clock.closed and len(clock.line(line[-1], line[0])) > 1 else None
+    legs = approaches if back is None else [*approaches, back]
+    x, y = clock.points[clock.stops + start].tolist()
+    lengths = clock.legs.lengths[np.ix_(line, line)]
+    least = tour_bound(lengths, list(range(len(line))), Ends(0, None, clock.closed, ""))
+    return Route(
+        selection=selection,
+        order=order,
+        start=(x, y, clock.start_heading[start]),
+        start_reason=whole.start_reason,
+        approaches=tuple(approaches),
+        return_leg=back,
+        tour="closed" if clock.closed else "open",
+        bound=min(least, sum(map(polyline_length, legs))),
+        method=METHOD,
+    )
+
+
+def _selected(whole: Selection, tour: Tour) -> tuple[Selection, IntArray]:
+    """The selection of a tour's stops in the order they were chosen, and where in it each stop is."""
+    places = sorted(tour)
+    chosen = whole.chosen[places]
+    visibility = whole.visibility
+    steps = coverage_steps(cover_of(visibility, demands_of(visibility)), chosen)
+    part = replace(
+        whole, chosen=frozen(chosen, np.int64), coverage_steps=frozen(steps), required=0.0, bound=0,
+        method=f"{whole.method}, shared out",
+    )  # fmt: skip
+    return part, frozen([places.index(stop) for stop in tour], np.int64)

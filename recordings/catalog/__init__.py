@@ -1,0 +1,1 @@
+"""Many recordings: the index of runs, their site, and merging."""

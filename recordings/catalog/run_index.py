@@ -1,0 +1,258 @@
+"""What lies in a folder of recordings: plans and runs, from an index that is made anew where it is stale."""
+
+from __future__ import annotations
+
+import datetime
+import os
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from stopgo.mission.console.table import duration, table
+from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.errors import InputError
+from stopgo.mission.files.atomic import write_atomic
+from stopgo.mission.stages.figures import percent
+
+if TYPE_CHECKING:
+    from stopgo.mission.comparing.comparison import Comparison
+    from stopgo.mission.document import Mission
+    from stopgo.recordings.embedded.reading import Recording
+    from stopgo.recordings.page.reviewed import RecordingReview
+
+INDEX = ".stopgo-runs.json"
+VERSION = 1
+"""Of the index; one of another version is made anew."""
+SUFFIX = ".rrd"
+
+
+class IndexedPlan(msgspec.Struct, frozen=True, kw_only=True):
+    """A plan in a recording."""
+
+    mission_id: str
+    revision: int
+    name: str
+    stops: int
+    coverage: float | None
+
+
+class IndexedRun(msgspec.Struct, frozen=True, kw_only=True):
+    """A run in a recording."""
+
+    mission_id: str
+    name: str
+    revisions: tuple[int, ...]
+    run_id: str
+    robot: str
+    began_ns: int
+    driven_s: float | None
+    ended: str | None
+    scanned: int
+    asked: int
+    deviation_m: float | None
+    coverage: float | None
+    answer: str
+
+
+class IndexedFile(msgspec.Struct, frozen=True, kw_only=True):
+    """A file as it was when it was read."""
+
+    size: int
+    changed_ns: int
+    fault: str | None = None
+    plans: tuple[IndexedPlan, ...] = ()
+    runs: tuple[IndexedRun, ...] = ()
+
+
+class RunIndex(msgspec.Struct, frozen=True):
+    """The recordings of a folder, by their path from there."""
+
+    version: int
+    files: dict[str, IndexedFile]
+
+    def runs(self) -> list[tuple[str, IndexedRun]]:
+        """Every run and its file, the newest first."""
+        found = [(name, run) for name, file in self.files.items() for run in file.runs]
+        return sorted(found, key=lambda pair: (-pair[1].began_ns, pair[0]))
+
+    def plans(self) -> list[tuple[str, IndexedPlan]]:
+        """Every plan and its file, by name and revision."""
+        found = [(name, plan) for name, file in self.files.items() for plan in file.plans]
+        return sorted(found, key=lambda pair: (pair[1].name, pair[1].revision, pair[0]))
+
+    def faults(self) -> list[str]:
+        return [file.fault for _, file in sorted(self.files.items()) if file.fault]
+
+
+def index_of(folder: Path, *, say: Callable[[str], None] = lambda line: None) -> RunIndex:
+    """The index of a folder and those below it, read anew where files have come, gone or changed.
+
+    Raises
+    ------
+    InputError
+        When there is no such folder.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is no folder; give one that holds recordings")
+    known = _known(folder / INDEX)
+    found = dict(sorted(_stamps(folder)))
+    kept = {name: known[name] for name, stamp in found.items() if _is(known.get(name), stamp)}
+    stale = [name for name in found if name not in kept]
+    if not stale and len(kept) == len(known):
+        return RunIndex(VERSION, kept)
+    say(f"{folder}: reading {len(stale)} of {len(found)} recordings")
+    read = _read(folder, {name: found[name] for name in stale}, kept) if stale else {}
+    index = RunIndex(VERSION, dict(sorted((kept | read).items())))
+    try:
+        write_atomic(folder / INDEX, msgspec.json.encode(index))
+    except InputError as error:  # it is read anew next time
+        say(str(error))
+    return index
+
+
+def _known(path: Path) -> dict[str, IndexedFile]:
+    """What the index says; nothing if it is missing, damaged or of another version."""
+    try:
+        with one_decode_error():
+            index = msgspec.json.decode(path.read_bytes(), type=RunIndex)
+    except (OSError, msgspec.DecodeError):
+        return {}
+    return index.files if index.version == VERSION else {}
+
+
+Stamp = tuple[int, int]
+"""Size, and time of the last change in nanoseconds."""
+
+
+def _stamps(folder: Path) -> Iterator[tuple[str, Stamp]]:
+    """Every recording below a folder; files of other kinds are not looked at."""
+    for place, _, names in os.walk(folder):
+        for name in names:
+            path = Path(place, name)
+            if name.endswith(SUFFIX) and path.is_file():
+                yield str(path.relative_to(folder)), stamp_of(path)
+
+
+def stamp_of(path: Path) -> Stamp:
+    state = path.stat()
+    return state.st_size, state.st_mtime_ns
+
+
+def _is(file: IndexedFile | None, stamp: Stamp) -> bool:
+    return file is not None and (file.size, file.changed_ns) == stamp
+
+
+def _read(folder: Path, stale: dict[str, Stamp], kept: dict[str, IndexedFile]) -> dict[str, IndexedFile]:
+    """Read files, together with the plans of the same folder that are known already."""
+    from stopgo.recordings.page.reviewed import reviewed
+
+    known = [name for name, file in kept.items() if file.plans]
+    read, faults = _opened(folder, sorted({*stale, *known}))
+    found = reviewed(list(read.values()))
+    by_name = dict(zip(read, found.recordings, strict=True))
+    return {
+        name: _file(by_name[name], stamp) if name in by_name else _faulty(stamp, faults[name])
+        for name, stamp in stale.items()
+    }
+
+
+def _opened(folder: Path, names: Iterable[str]) -> tuple[dict[str, Recording], dict[str, str]]:
+    """Recordings by name without their pictures, and why others cannot be read."""
+    from stopgo.recordings.embedded.reading import read_each
+    from stopgo.recordings.embedded.values import Values
+
+    read: dict[str, Recording] = {}
+    faults: dict[str, str] = {}
+    wanted = list(names)
+    for name, (_, found) in zip(wanted, read_each([folder / name for name in wanted]), strict=True):
+        if isinstance(found, InputError):
+            faults[name] = str(found)
+        else:
+            read[name] = replace(found, values=Values())
+    return read, faults
+
+
+def _faulty(stamp: Stamp, fault: str) -> IndexedFile:
+    return IndexedFile(size=stamp[0], changed_ns=stamp[1], fault=fault)
+
+
+def _file(item: RecordingReview, stamp: Stamp) -> IndexedFile:
+    missions = item.recording.missions
+    plans = () if item.plan is None or not missions else (_plan(item, missions[-1]),)
+    runs = tuple(_run(comparison) for comparison in item.comparisons)
+    return IndexedFile(size=stamp[0], changed_ns=stamp[1], plans=plans, runs=runs)
+
+
+def _plan(item: RecordingReview, mission: Mission) -> IndexedPlan:
+    told = (item.plan or {}).get("coverage")
+    return IndexedPlan(
+        mission_id=mission.id,
+        revision=mission.revision,
+        name=mission.name,
+        stops=len(mission.stops),
+        coverage=None if told is None else float(told),
+    )
+
+
+def _run(comparison: Comparison) -> IndexedRun:
+    from stopgo.mission.comparing.run_verdict import judge
+
+    log, acquired = comparison.log, comparison.acquired
+    return IndexedRun(
+        mission_id=comparison.mission.id,
+        name=comparison.mission.name,
+        revisions=tuple(mission.revision for mission in comparison.missions),
+        run_id=log.run_id or "",
+        robot=log.robot,
+        began_ns=log.began_ns or 0,
+        driven_s=comparison.driven_s,
+        ended=type(log.events[-1]).__name__ if log.ended else None,
+        scanned=comparison.scanned,
+        asked=len(comparison.asked),
+        deviation_m=comparison.greatest_deviation_m,
+        coverage=None if acquired is None else acquired.shares.whole.coverage,
+        answer=judge(comparison).answer,
+    )
+
+
+def index_text(index: RunIndex) -> str:
+    """Runs, the newest first, and plans, as tables."""
+    runs = [{**run_cells(run), "file": name} for name, run in index.runs()]
+    plans = [
+        (plan.name, plan.mission_id[:12], str(plan.revision), str(plan.stops), percent(plan.coverage), name)
+        for name, plan in index.plans()
+    ]
+    told = [table(tuple(runs[0]), [tuple(run.values()) for run in runs])] if runs else ["no runs"]
+    if plans:
+        told += ["", table(("plan", "mission id", "revision", "stops", "coverage", "file"), plans)]
+    return "\n".join(told)
+
+
+def run_cells(run: IndexedRun) -> dict[str, str]:
+    """What a table of runs tells of one, by column."""
+    moment = datetime.datetime.fromtimestamp(run.began_ns / 1e9, tz=datetime.UTC)
+    return {
+        "began (UTC)": f"{moment:%Y-%m-%d %H:%M}",
+        "mission": run.name,
+        "revision": " ".join(map(str, run.revisions)),
+        "run": run.run_id,
+        "robot": run.robot,
+        "ended": run.ended or "not ended",
+        "took": "-" if run.driven_s is None else duration(run.driven_s),
+        "stops": f"{run.scanned}/{run.asked}",
+        "worst mm": "-" if run.deviation_m is None else f"{1000 * run.deviation_m:.1f}",
+        "coverage": percent(run.coverage),
+        "acquired": run.answer,
+    }
+
+
+def index_json(index: RunIndex) -> dict[str, Any]:
+    """The same for programs."""
+    return {
+        "runs": [{"file": name, **msgspec.to_builtins(run)} for name, run in index.runs()],
+        "plans": [{"file": name, **msgspec.to_builtins(plan)} for name, plan in index.plans()],
+        "faults": index.faults(),
+    }

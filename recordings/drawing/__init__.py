@@ -1,0 +1,1 @@
+"""Drawing in Rerun: canvas, pens, palette, strokes and the blueprint."""

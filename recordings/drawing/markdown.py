@@ -1,0 +1,231 @@
+"""A plan and a run in words: the markdown reports and the properties that travel inside recordings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from stopgo.mission.console.table import printable
+from stopgo.mission.document import Mission
+from stopgo.mission.document.schedule import Schedule
+from stopgo.mission.floor import FloorPlan
+from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection, Visibility
+from stopgo.mission.stages.figures import Figures, percent
+from stopgo.recordings.drawing.canvas import LocalOrigin
+
+Nouns = dict[type, Any]
+
+
+def plan_results(nouns: Nouns) -> dict[str, Any]:
+    """What the stages of a plan came to, by name; stages that were not reached are left out."""
+    results: dict[str, Any] = {}
+    for kind, summarise in _RESULTS.items():
+        if kind in nouns:
+            results.update(summarise(nouns[kind]))
+    return results
+
+
+def parameters(nouns: Nouns) -> dict[str, Any] | None:
+    """The settings the plan was made with, by name, if any noun tells them."""
+    if NavigableSpace in nouns:
+        settings: dict[str, Any] = msgspec.to_builtins(nouns[NavigableSpace].settings)
+        return settings
+    return nouns[Mission].origin.parameters if Mission in nouns else None
+
+
+def parameter_values(values: dict[str, Any]) -> dict[str, str]:
+    """The settings as texts, so that a parameter has one type whatever its value."""
+    return {
+        name: value if isinstance(value, str) else msgspec.json.encode(value).decode()
+        for name, value in values.items()
+    }
+
+
+def plan_report(nouns: Nouns, origin: LocalOrigin) -> str:
+    """The plan in markdown."""
+    results = plan_results(nouns)
+    title = nouns[Mission].name if Mission in nouns else results.get("floor", "plan")
+    lines = [f"# {title}", "", "| | |", "|---|---|"]
+    lines += [f"| {name.replace('_', ' ')} | {_shown(value)} |" for name, value in _ordered(results)]
+    lines += ["", *_coverage_table(nouns.get(Figures)), *_stop_table(nouns.get(Mission)), *_findings(nouns)]
+    lines += ["## Colours", "", *_COLOURS, "", "## Looking around", "", *_GUIDE, *_origin_note(origin)]
+    return "\n".join(lines)
+
+
+FIRST = (
+    *("stops", "stops_bound", "coverage", "coverage_required", "route_m", "route_bound_m"),
+    *("planned_s", "least_time_bound_s", "two_step_s"),
+)
+"""What a reader looks for first."""
+
+
+def _ordered(results: dict[str, Any]) -> list[tuple[str, Any]]:
+    names = [name for name in FIRST if name in results]
+    names += [name for name in results if name not in FIRST]
+    return [(name, results[name]) for name in names]
+
+
+def _floor(floor: FloorPlan) -> dict[str, Any]:
+    return {
+        "floor": floor.name,
+        "floor_digest": floor.digest,
+        "area_m2": round(float(floor.area), 2),
+        "rooms": len(floor.rooms),
+        "openings": len(floor.openings),
+        "findings": len(floor.findings),
+    }
+
+
+def _space(space: NavigableSpace) -> dict[str, Any]:
+    passable = sum(state.passable for state in space.openings)
+    return {"passable_openings": passable, "target_units": space.targets.total}
+
+
+def _candidates(candidates: Candidates) -> dict[str, Any]:
+    return {
+        "candidates": candidates.generated,
+        "reachable_candidates": candidates.reachable,
+        "strategy": candidates.strategy,
+    }
+
+
+def _visibility(visibility: Visibility) -> dict[str, Any]:
+    return {"visible_units": int(visibility.visible.sum()), "visibility": visibility.method}
+
+
+def _selection(selection: Selection) -> dict[str, Any]:
+    return {
+        "stops": len(selection.chosen),
+        "stops_bound": int(selection.bound),
+        **({"stops_bound_over": selection.among} if selection.everywhere else {}),
+        "coverage": round(selection.coverage, 4),
+        "coverage_required": float(selection.required),
+        "selector": selection.method,
+    }
+
+
+def _route(route: Route) -> dict[str, Any]:
+    return {
+        "route_m": round(float(route.length), 3),
+        "route_bound_m": round(float(route.bound), 3),
+        "tour": route.tour,
+        "router": route.method,
+        "begins_at": route.start_reason,
+        **_least_time(route),
+    }
+
+
+def _least_time(route: Route) -> dict[str, Any]:
+    time = route.time
+    if time is None:
+        return {}
+    return {
+        "least_time_bound_s": round(float(time.bound), 1),
+        "two_step_s": round(float(time.two_step_s), 1),
+        "two_step_stops": time.two_step_stops,
+    }
+
+
+def _schedule(schedule: Schedule) -> dict[str, Any]:
+    return {"planned_s": round(float(schedule.total_s), 1)}
+
+
+def _mission(mission: Mission) -> dict[str, Any]:
+    return {
+        "mission_id": mission.id,
+        "revision": mission.revision,
+        "digest": mission.digest,
+        "stopgo": mission.origin.stopgo,
+    }
+
+
+_RESULTS: dict[type, Any] = {
+    FloorPlan: _floor,
+    NavigableSpace: _space,
+    Candidates: _candidates,
+    Visibility: _visibility,
+    Selection: _selection,
+    Route: _route,
+    Schedule: _schedule,
+    Mission: _mission,
+}
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    text = str(value)
+    return f"`{text[:12]}…`" if len(text) >= 32 else text
+
+
+def _stop_table(mission: Mission | None) -> list[str]:
+    if mission is None or not mission.stops:
+        return []
+    lines = ["## Stops", "", "| stop | x m | y m | units seen | new |", "|---|---|---|---|---|"]
+    for stop in mission.stops:
+        lines.append(
+            f"| {stop.id} | {stop.x:.3f} | {stop.y:.3f} | {stop.sees.units} | {stop.sees.new_units} |"
+        )
+    return [*lines, ""]
+
+
+def _coverage_table(figures: Figures | None) -> list[str]:
+    """What the stops see of everything, least seen first, and what is left out."""
+    if figures is None:
+        return []
+    unit = figures.unit
+    lines = ["## Coverage", "", f"| | all, {unit} | visible | seen | share |", "|---|---|---|---|---|"]
+    for share in (figures.whole, *figures.kinds, *figures.rooms):
+        numbers = f"{share.total:.1f} | {share.visible:.1f} | {share.seen:.1f} | {percent(share.coverage)}"
+        lines.append(f"| {plain(share.name)} | {numbers} |")
+    if figures.quality is not None:
+        lines += ["", f"{figures.quality.told(unit)}:", ""]
+        lines += [f"- {item.words}: {item.told}" for item in figures.quality.costs]
+    if figures.unreached:
+        lines += ["", "Not reached:", ""]
+        lines += [
+            f"- {plain(item.room)} ({item.area_m2:.1f} m²): {plain(item.why)}" for item in figures.unreached
+        ]
+    return [*lines, ""]
+
+
+def plain(content: str) -> str:
+    """Text from outside as markdown shows it letter by letter: nothing in it marks up anything."""
+    return "".join(f"\\{letter}" if letter in _MARKS else letter for letter in printable(content))
+
+
+_MARKS = frozenset("\\`*_{}[]<>()#+-!|~")
+
+
+def _findings(nouns: Nouns) -> list[str]:
+    holder = nouns.get(Figures) or nouns.get(NavigableSpace) or nouns.get(FloorPlan)
+    if holder is None or not holder.findings:
+        return []
+    return ["## Findings", "", *(f"- **{item.code}** {plain(item.message)}" for item in holder.findings), ""]
+
+
+_COLOURS = (
+    "- targets: blue seen by a stop, light grey not seen, dark grey seen from no candidate, yellow new",
+    "- of a run: bold blue was scanned, thick orange-red was planned and lost; a cross is a stop left out",
+    "- stops light green with their number, doorway stops light blue",
+    "- route yellow, way back dark yellow; run purple",
+    "- grey: stops and ways that a revision has withdrawn during a run",
+    "- openings: white passable, orange-red not",
+    "- candidates: yellow kept, reddish dropped; point at one to see why",
+    "- walls grey, columns orange, beams purple, stairs teal, windows and railings blue, holes rose",
+)
+
+_GUIDE = (
+    "- timeline `mission_time`: the planned drive, and the field run when its recording is open too",
+    "- timeline `candidate`: what each candidate sees (tab *Candidates*)",
+    "- timeline `stage_step`: how the plan was made, step by step (tab *Planning*); the log tells each",
+    "- timeline `stop`: why each stop is there (tab *Stops*); on `mission_time`, the stop that is driven to",
+    "- walls in 3D are cut at a nominal 1.2 m: the drawing tells no heights",
+)
+
+
+def _origin_note(origin: LocalOrigin) -> list[str]:
+    if origin == (0.0, 0.0):
+        return []
+    return [f"- positions shown are relative to x = {origin[0]:.0f} m, y = {origin[1]:.0f} m of the drawing"]

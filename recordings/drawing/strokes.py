@@ -1,0 +1,176 @@
+"""Polygons as what Rerun can draw: outlines, hatches and fills for 2D, triangles for 3D. Numpy only.
+
+Rerun's 2D views fill no polygons, so a solid is filled with parallel chords as wide as their spacing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stopgo.mission.geometry import FloatArray, IntArray, Polygon
+from stopgo.mission.stages import Targets
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """Straight strokes (k, 2, 2) and half the width of each (k,), in metres."""
+
+    lines: FloatArray
+    radii: FloatArray
+
+
+def outlines(polygons: Iterable[Polygon]) -> list[FloatArray]:
+    """Every ring of the polygons as a closed line strip."""
+    return [closed(ring) for polygon in polygons for ring in polygon.rings]
+
+
+def closed(ring: FloatArray) -> FloatArray:
+    """The ring with its first point repeated at the end."""
+    return np.vstack([ring, ring[:1]])
+
+
+def hatch(polygons: Iterable[Polygon], *, spacing: float, angle: float) -> FloatArray:
+    """Chords (k, 2, 2) of the polygons at `angle`, on one raster, so that neighbours line up."""
+    turn = _turn(angle)
+    lines = [np.empty((0, 2, 2))]
+    for polygon in polygons:
+        edges = _edges(polygon) @ turn
+        first, last = (np.floor(edges[..., 1].min() / spacing), np.ceil(edges[..., 1].max() / spacing))
+        lines.extend(_chords(edges, (row + 0.5) * spacing) for row in np.arange(first, last))
+    return np.concatenate(lines) @ turn.T
+
+
+def fill(polygons: Iterable[Polygon], *, spacing: float) -> Strokes:
+    """Strokes that cover the polygons, each polygon along its longest edge; their ends are round."""
+    lines, radii = [np.empty((0, 2, 2))], [np.empty(0)]
+    for polygon in polygons:
+        turn = _turn(_longest_direction(polygon))
+        edges = _edges(polygon) @ turn
+        low, high = edges[..., 1].min(), edges[..., 1].max()
+        count = max(1, int(np.ceil((high - low) / spacing)))
+        step = (high - low) / count
+        chords = np.concatenate([_chords(edges, low + (row + 0.5) * step) for row in range(count)])
+        lines.append(_shortened(chords, step / 2) @ turn.T)
+        radii.append(np.full(len(chords), step / 2))
+    return Strokes(np.concatenate(lines), np.concatenate(radii))
+
+
+def name_point(polygon: Polygon) -> FloatArray:
+    """Where a room's name is out of the way: inside, near the top, where the room is wide."""
+    height = max(float(np.ptp(polygon.exterior[:, 1])), 1e-3)
+    chords = hatch([polygon], spacing=height / 9, angle=0.0)
+    length = np.ptp(chords[:, :, 0], axis=1)
+    if not len(chords) or length.max() == 0:
+        return polygon.exterior.mean(axis=0)
+    wide = chords[length > 0.6 * length.max()].mean(axis=1)
+    return wide[np.argmax(wide[:, 1])]
+
+
+def triangles(polygons: Iterable[Polygon]) -> FloatArray:
+    """Triangles (k, 3, 2) that cover the polygons: trapezoids between all heights of their vertices."""
+    parts = [np.empty((0, 3, 2))]
+    for polygon in polygons:
+        edges = _edges(polygon)
+        heights = np.unique(edges[..., 1])
+        for low, high in pairwise(heights):
+            parts.append(_band(edges, float(low), float(high)))
+    return np.concatenate(parts)
+
+
+def walls(strips: Iterable[FloatArray], *, low: float, high: float) -> FloatArray:
+    """Upright faces (k, 3, 3) under line strips, two triangles for each of their segments."""
+    a, b = _ends(strips)
+    floor, top = np.full((len(a), 1), low), np.full((len(a), 1), high)
+    a0, a1, b0, b1 = (np.hstack([xy, z]) for xy in (a, b) for z in (floor, top))
+    return np.stack([np.stack([a0, b0, b1], axis=1), np.stack([a0, b1, a1], axis=1)], axis=1).reshape(
+        -1, 3, 3
+    )
+
+
+def level(flat: NDArray[Any], z: float) -> NDArray[Any]:
+    """Flat triangles or points (…, 2) at the height `z` (…, 3)."""
+    return np.concatenate([flat, np.full((*flat.shape[:-1], 1), z)], axis=-1)
+
+
+def pieces(targets: Targets, value: IntArray) -> tuple[FloatArray, IntArray]:
+    """Neighbouring units of one segment with one value, as lines (p, 2, 2) and their values (p,)."""
+    segment = targets.unit_segment
+    if not len(segment):
+        return np.empty((0, 2, 2)), np.empty(0, dtype=np.int64)
+    new = np.flatnonzero(np.diff(segment) | np.diff(value)) + 1
+    first = np.concatenate([[0], new])
+    last = np.concatenate([new - 1, [len(segment) - 1]])
+    return runs(targets, segment[first], first, last), value[first]
+
+
+def runs(targets: Targets, segment: IntArray, first: IntArray, last: IntArray) -> FloatArray:
+    """Runs of units, `first` to `last` inclusive on `segment`, as lines (k, 2, 2)."""
+    offset, count = targets.first_unit[:-1][segment], targets.units[segment]
+    t = np.stack([(first - offset) / count, (last + 1 - offset) / count], axis=1)
+    a, b = targets.a[segment], targets.b[segment]
+    return a[:, None] + t[:, :, None] * (b - a)[:, None]
+
+
+def circle(radius: float, points: int = 32) -> FloatArray:
+    """A closed circle (points + 1, 2) around the origin."""
+    angle = np.linspace(0.0, 2 * np.pi, points + 1)
+    return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def _turn(angle: float) -> FloatArray:
+    """Matrix M such that `xy @ M` lies along x when xy lies along `angle`."""
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def _edges(polygon: Polygon) -> FloatArray:
+    return np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in polygon.rings])
+
+
+def _chords(edges: FloatArray, y: float) -> FloatArray:
+    """Pieces (k, 2, 2) of the horizontal line at `y` inside the edges, by the even-odd rule."""
+    a, b = edges[:, 0], edges[:, 1]
+    hit = (a[:, 1] <= y) != (b[:, 1] <= y)
+    a, b = a[hit], b[hit]
+    x = np.sort(a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]))
+    return np.stack([x, np.full(len(x), y)], axis=1).reshape(-1, 2, 2)
+
+
+def _shortened(chords: FloatArray, by: float) -> FloatArray:
+    """Horizontal chords without `by` at each end, or without what they have."""
+    cut = np.minimum(by, np.ptp(chords[:, :, 0], axis=1) / 2)
+    return chords + np.stack([np.stack([cut, -cut], axis=1), np.zeros((len(chords), 2))], axis=2)
+
+
+def _longest_direction(polygon: Polygon) -> float:
+    vectors = np.roll(polygon.exterior, -1, axis=0) - polygon.exterior
+    longest = vectors[np.argmax((vectors**2).sum(axis=1))]
+    return float(np.arctan2(longest[1], longest[0]))
+
+
+def _band(edges: FloatArray, low: float, high: float) -> FloatArray:
+    a, b = edges[:, 0], edges[:, 1]
+    across = np.minimum(a[:, 1], b[:, 1]) <= low
+    across &= np.maximum(a[:, 1], b[:, 1]) >= high
+    across &= a[:, 1] != b[:, 1]
+    a, b = a[across], b[across]
+    slope = (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
+    x0, x1 = a[:, 0] + (low - a[:, 1]) * slope, a[:, 0] + (high - a[:, 1]) * slope
+    order = np.argsort(x0 + x1)
+    ends = np.stack([np.stack([x, np.full(len(x), y)], 1) for x, y in ((x0, low), (x1, high))], axis=1)[order]
+    left, right = ends[::2], ends[1::2]
+    lower = np.stack([left[:, 0], right[:, 0], right[:, 1]], axis=1)
+    upper = np.stack([left[:, 0], right[:, 1], left[:, 1]], axis=1)
+    return np.concatenate([lower, upper])
+
+
+def _ends(strips: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    parts = [strip for strip in strips if len(strip) > 1]
+    if not parts:
+        return np.empty((0, 2)), np.empty((0, 2))
+    return np.concatenate([part[:-1] for part in parts]), np.concatenate([part[1:] for part in parts])

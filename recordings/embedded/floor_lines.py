@@ -1,0 +1,56 @@
+"""The floor's lines as a recording has them, in the drawing's metres: for pictures, not for planning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stopgo.mission.geometry import FloatArray
+from stopgo.mission.settings.element_kinds import KINDS
+from stopgo.recordings.drawing import entities
+from stopgo.recordings.embedded.values import Values
+
+Polylines = tuple[FloatArray, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FloorLines:
+    """Polylines (n, 2) each; what was filled ends where it began."""
+
+    outline: Polylines
+    rooms: Polylines
+    kinds: dict[str, Polylines]
+    """By kind of element."""
+    openings: Polylines
+    names: tuple[tuple[str, float, float], ...]
+    """Room names and where they stand."""
+
+
+def floor_lines(values: Values, origin: tuple[float, float]) -> FloorLines | None:
+    """What a recording tells of the floor; None if it has none."""
+
+    def lines(entity: str) -> Polylines:
+        strips = [row["strips"] for row in values.rows(entity) if "strips" in row]
+        return tuple(_polyline(strip) + origin for strip in strips[-1]) if strips else ()
+
+    outline = lines(entities.OUTLINE)
+    if not outline:
+        return None
+    kinds = {kind: lines(entities.part(entities.FLOOR, kind)) for kind in KINDS}
+    return FloorLines(
+        outline, lines(entities.ROOMS), kinds, lines(entities.OPENINGS), tuple(_names(values, origin))
+    )
+
+
+def _names(values: Values, origin: tuple[float, float]) -> list[tuple[str, float, float]]:
+    found = []
+    for row in values.rows(entities.ROOM_NAMES):
+        for name, place in zip(row.get("labels", ()), row.get("positions", ()), strict=False):
+            x, y = _polyline([place])[0] + origin
+            found.append((str(name), float(x), float(y)))
+    return found
+
+
+def _polyline(strip: object) -> FloatArray:
+    return np.array([np.asarray(point, dtype=np.float64) for point in strip], dtype=np.float64).reshape(-1, 2)  # type: ignore[attr-defined]

@@ -1,0 +1,76 @@
+"""A recording -> all that it carries: contents, missions, what stops see, runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from stopgo.mission.document import Mission
+from stopgo.mission.errors import InputError
+from stopgo.mission.run.run_log import RunLog
+from stopgo.mission.stages.sight import Sight
+from stopgo.recordings.drawing import entities
+from stopgo.recordings.embedded.missions import missions_in
+from stopgo.recordings.embedded.run_logs import logs_in
+from stopgo.recordings.embedded.sight import sights_in
+from stopgo.recordings.embedded.values import Values
+from stopgo.recordings.rrd.read import Contents, check
+from stopgo.recordings.rrd.subprocess_read import fatal_faults
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recording that was read to its end."""
+
+    path: Path
+    contents: Contents
+    values: Values
+    missions: tuple[Mission, ...]
+    """Revisions of its mission, in ascending order; none in files of older versions."""
+    sights: tuple[Sight, ...]
+    logs: tuple[RunLog, ...]
+
+    @property
+    def mission_id(self) -> str:
+        """Plan and field recordings carry the mission's id as their own."""
+        return self.contents.recording_id
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a plan's or a run's recording.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, was not written by stopgo, or holds what contradicts itself.
+    """
+    ((_, found),) = read_each([path])
+    if isinstance(found, InputError):
+        raise found
+    return found
+
+
+def read_each(paths: Sequence[Path]) -> Iterator[tuple[Path, Recording | InputError]]:
+    """Each of several, or why it cannot be read; no file hides another, whatever its damage."""
+    fatal = fatal_faults(paths)
+    for path in paths:
+        try:
+            yield path, InputError(fatal[path]) if path in fatal else _read(path)
+        except InputError as error:
+            yield path, error
+
+
+def _read(path: Path) -> Recording:
+    values = Values()
+    contents = check(path, take=values.take)
+    if contents.application != entities.APPLICATION:
+        raise InputError(f"{path}: is a recording of {contents.application}, not of {entities.APPLICATION}")
+    return Recording(
+        path=path,
+        contents=contents,
+        values=values,
+        missions=missions_in(values, str(path)),
+        sights=sights_in(values, str(path)),
+        logs=logs_in(values, contents, path),
+    )

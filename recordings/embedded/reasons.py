@@ -1,0 +1,39 @@
+"""Why the stops of a plan stand where they do, inside its recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import msgspec
+import rerun as rr
+
+from stopgo.mission.document.decoding import one_decode_error
+from stopgo.mission.errors import InputError
+from stopgo.mission.stages.stop_reasons import StopReason
+from stopgo.recordings.drawing import entities
+from stopgo.recordings.drawing.canvas import Canvas
+from stopgo.recordings.embedded.values import Values
+
+
+def carry_reasons(canvas: Canvas, reasons: Sequence[StopReason]) -> None:
+    """Put them into the recording, as one document."""
+    document = {"document": msgspec.json.encode(reasons).decode()}
+    canvas.show(entities.REASONS, rr.DynamicArchetype("Reasons", components=document))
+
+
+def reasons_in(values: Values, name: str) -> tuple[StopReason, ...]:
+    """Those that a recording carries, in the order of driving; `name` stands in error messages.
+
+    Raises
+    ------
+    InputError
+        When they are damaged.
+    """
+    rows = list(values.rows(entities.REASONS))
+    if not rows:
+        return ()
+    try:
+        with one_decode_error():
+            return msgspec.json.decode(rows[-1]["document"][0], type=tuple[StopReason, ...])
+    except (KeyError, msgspec.DecodeError) as error:
+        raise InputError(f"{name}: what its stops are for is damaged ({error}); plan again") from None

@@ -1,0 +1,61 @@
+"""Runs inside a recording, read back as logs: their events whole, their poses as they were told."""
+
+from __future__ import annotations
+
+from hashlib import file_digest
+from pathlib import Path
+
+import msgspec
+
+from stopgo.mission.errors import InputError
+from stopgo.mission.run.events import AnyEvent, event_of
+from stopgo.mission.run.run_log import LogSource, RunLog, Track
+from stopgo.recordings.drawing import entities
+from stopgo.recordings.embedded.values import Values
+from stopgo.recordings.rrd.read import Contents
+
+
+def logs_in(values: Values, contents: Contents, path: Path) -> tuple[RunLog, ...]:
+    """Every run that a recording tells of, the one begun first before others.
+
+    Raises
+    ------
+    InputError
+        When an event in it cannot be read.
+    """
+    runs = [run for run in map(entities.run_of_events, values.chunks) if run is not None]
+    if not runs:
+        return ()
+    with path.open("rb") as file:
+        digest = file_digest(file, "sha256").hexdigest()
+    logs = [_log(run, values, _source(path, digest, contents)) for run in runs]
+    return tuple(sorted((log for log in logs if log.events), key=lambda log: (log.began_ns, log.run_id)))
+
+
+def _source(path: Path, digest: str, contents: Contents) -> LogSource:
+    notes = () if contents.complete else ("the recording was not closed: what came last may be missing",)
+    return LogSource(path.name, "rrd", digest, messages=contents.total_rows, notes=notes)
+
+
+def _log(run_id: str, values: Values, source: LogSource) -> RunLog:
+    names = entities.RunEntities(run_id)
+    events = {event.number: event for event in _events(values, names.events, source.name)}
+    ns, poses = values.columns(names.flat(entities.ROBOT), "x", "y", "heading")
+    told = tuple(events[number] for number in sorted(events))
+    last = told[-1] if told else None
+    return RunLog(
+        robot="" if last is None else last.robot,
+        run_id=run_id,
+        mission_id=None if last is None else last.mission_id,
+        revision=None if last is None else last.revision,
+        source=source,
+        poses=Track.of(ns, poses[:, :2], poses[:, 2]),
+        events=told,
+    )
+
+
+def _events(values: Values, entity: str, name: str) -> list[AnyEvent]:
+    try:
+        return [event_of(row["body"][0]) for row in values.rows(entity) if "body" in row]
+    except msgspec.DecodeError as error:
+        raise InputError(f"{name}: an event in it cannot be read ({error})") from None

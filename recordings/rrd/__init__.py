@@ -1,0 +1,1 @@
+"""Rerun files: reading, compacting and writing in chunks."""

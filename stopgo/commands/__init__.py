@@ -1,0 +1,1 @@
+"""The commands, where the folders are brought together."""

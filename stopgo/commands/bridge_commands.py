@@ -1,0 +1,77 @@
+"""The bridge's commands, each added to the front door; what `watch` records and compares by is named here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from stopgo.bridge.commands.conform_commands import conform_commands
+from stopgo.bridge.commands.doctor import doctor
+from stopgo.bridge.commands.key_commands import key_commands
+from stopgo.bridge.commands.mission_commands import clear, fetch_mission, push
+from stopgo.bridge.commands.order_commands import add_orders
+from stopgo.bridge.commands.robot_commands import robot
+from stopgo.bridge.commands.simulate_commands import simulate_commands
+from stopgo.bridge.commands.tunnel_commands import tunnel_commands
+from stopgo.bridge.commands.watch_commands import watch_by
+from stopgo.bridge.console import say
+from stopgo.mission.errors import InputError
+
+if TYPE_CHECKING:
+    from stopgo.mission.comparing.run_collector import HeardRun, RunTaker
+    from stopgo.recordings.embedded.reading import Recording
+
+
+def add_commands(app: typer.Typer) -> None:
+    """Add this folder's verbs to the front door."""
+    app.command()(robot)
+    app.command()(push)
+    app.command("fetch-mission")(fetch_mission)
+    app.command()(clear)
+    app.command()(doctor)
+    add_orders(app)
+    app.command()(watch_by(recording))
+    app.add_typer(simulate_commands(), name="simulate")
+    app.add_typer(key_commands(), name="keys")
+    app.add_typer(conform_commands(), name="conform")
+    app.add_typer(tunnel_commands(), name="tunnel")
+
+
+@contextmanager
+def recording(path: Path | None, plan: Path | None, *, view: bool) -> Iterator[HeardRun]:
+    """What hears a run: records it at `path`, looked at if wanted, and compares it with the plan.
+
+    Nothing of Rerun is loaded without a recording and a plan.
+    """
+    from stopgo.mission.comparing.run_collector import HeardRun
+
+    if path is None and view:
+        raise InputError("--view shows what is recorded: say where, with --rrd FIELD.rrd")
+    known = None if plan is None else plan_recording(plan)
+    with nullcontext() if path is None else _field(path, known, view=view) as record:
+        yield HeardRun(record, () if known is None else known.sights)
+
+
+def _field(path: Path, plan: Recording | None, *, view: bool) -> AbstractContextManager[RunTaker]:
+    from stopgo.recordings.runs.field import FieldRecording
+
+    record = FieldRecording(path, plan=plan, say=say)
+    if not view:
+        return record
+    from stopgo.recordings.viewing.viewer import Viewed
+
+    return Viewed(record)
+
+
+def plan_recording(path: Path) -> Recording:
+    """A plan's recording that tells what its stops see."""
+    from stopgo.recordings.embedded.reading import read_recording
+
+    found = read_recording(path)
+    if not found.sights:
+        raise InputError(f"{path}: tells not what stops see; give a plan.rrd that this version wrote")
+    return found

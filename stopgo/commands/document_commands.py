@@ -1,0 +1,350 @@
+"""Commands on a mission as it stands in its file: show it, check it, export it, import it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from stopgo.commands.align_command import align
+from stopgo.mission.errors import AnswerIsNo, InputError
+
+if TYPE_CHECKING:
+    from stopgo.mission.document import Mission
+    from stopgo.mission.document.problems import Problem
+    from stopgo.mission.files.exports.format import FloorDrawing, Supplements
+
+MissionFile = Annotated[Path, typer.Argument(metavar="MISSION", help="A mission.json.")]
+AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout and nothing else.")]
+Floor = Annotated[
+    Path | None, typer.Option(help="The floor it was planned on: its digest, and whether the mission fits.")
+]
+
+
+def add_commands(app: typer.Typer) -> None:
+    """Add this folder's verbs to the front door."""
+    app.command()(show)
+    app.command()(check)
+    app.command()(export)
+    app.command(name="import")(import_command)
+    app.command()(align)
+
+
+def show(mission: MissionFile, as_json: AsJson = False) -> None:
+    """Show a mission as a table.
+
+    Its stops stand in the order of driving, each with the planned time of arrival.
+
+    Example: stopgo show out/mission.json
+    """
+    from stopgo.mission.document.problems import problems_of
+    from stopgo.mission.document.schedule import schedule
+    from stopgo.mission.files.mission_json import read
+    from stopgo.mission.files.mission_text import json_text, page, report
+
+    document = read(mission)
+    for problem in problems_of(document)[:1]:
+        raise AnswerIsNo(f"{mission}: {problem} (stopgo check {mission} lists all)")
+    times = schedule(document)
+    typer.echo(json_text(report(document, times)) if as_json else page(document, times))
+
+
+def check(
+    mission: MissionFile,
+    floor: Floor = None,
+    coverage: Annotated[
+        Path | None, typer.Option(help="With --floor: the coverage.json that was written with it.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Check that a mission makes sense.
+
+    Schema, digest, numbers, legs that join up. With --floor also that it was planned on that floor, that
+    stops and legs keep every clearance there, measured anew, and that the stops see what the mission claims,
+    counted anew by holding every sight line against every wall; with --coverage, what that file claims.
+
+    Exit code 0: in order; 1: readable but senseless, of another floor, unfit for it, or claiming more than
+    its stops see; 2: not readable.
+
+    Example: stopgo check out/mission.json --floor office.dxf
+    """
+    from stopgo.mission.files.mission_json import read
+    from stopgo.mission.files.mission_text import identity, json_text
+
+    document = read(mission)
+    found = _checked(document, floor, coverage)
+    for note in found.notes:
+        typer.echo(f"stopgo: {note}", err=True)
+    if as_json:
+        typer.echo(json_text(_verdict(mission, document, found)))
+    elif found.problems:
+        from stopgo.mission.console.table import printable_lines
+
+        typer.echo(printable_lines("\n".join(map(str, found.problems))))
+    else:
+        typer.echo(f"{mission}: in order; {identity(document)}, {len(document.stops)} stops")
+    if found.told is not None and not as_json:
+        typer.echo(f"coverage {found.told}")
+    if found.problems:
+        raise AnswerIsNo(f"{mission}: {len(found.problems)} problem{'s' * (len(found.problems) > 1)}")
+
+
+@dataclass(frozen=True)
+class _Checked:
+    """What is wrong with a mission, what its stops were counted to see, and what was not checked."""
+
+    problems: tuple[Problem, ...]
+    coverage: dict[str, Any] | None = None
+    told: str | None = None
+    notes: tuple[str, ...] = ()
+
+
+def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Checked:
+    from stopgo.mission.document.problems import problems_of
+    from stopgo.mission.files.coverage_json import read_coverage
+
+    problems = problems_of(mission)
+    if floor is None:
+        if coverage is not None:
+            raise InputError(f"--coverage {coverage}: is held against the floor; give it with --floor")
+        return _Checked(problems)
+    claims = None if coverage is None else read_coverage(coverage, mission)
+    other = _other_floor(mission, floor)
+    try:
+        from stopgo.planner.checking.verdict import verdict
+
+        if sys.stderr.isatty():
+            typer.echo(f"holding the mission against {floor} …", err=True)
+        found = verdict(mission, floor, claims)
+    except ModuleNotFoundError as error:
+        if not _is_of_plan(error):
+            raise
+        unchecked = "neither clearances nor coverage were checked"
+        note = f'{error.name} is not installed, so {unchecked}; pip install "stopgo[plan]"'
+        return _Checked((*problems, *other), notes=(note,))
+    except InputError:
+        if other:  # not the floor, and no floor either
+            return _Checked((*problems, *other))
+        raise
+    counted = found.counted
+    return _Checked(
+        (*problems, *other, *found.problems),
+        coverage=None if counted is None else counted.as_json(),
+        told=None if counted is None else counted.in_words(),
+    )
+
+
+def _is_of_plan(error: ModuleNotFoundError) -> bool:
+    """Whether what is missing is a library of the extra, not a part of this program."""
+    return (error.name or "").partition(".")[0] not in ("", "stopgo")
+
+
+def _other_floor(mission: Mission, floor: Path) -> tuple[Problem, ...]:
+    import hashlib
+
+    from stopgo.mission.document.problems import Problem
+
+    try:
+        digest = hashlib.sha256(floor.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{floor}: cannot be read ({error.strerror}); give the floor's file") from None
+    if digest == mission.origin.floor_digest:
+        return ()
+    planned = mission.origin
+    message = f"is {planned.floor_digest[:12]}… ({planned.floor}), but {floor} has {digest[:12]}…; plan again"
+    return (Problem("$.origin.floor_digest", message),)
+
+
+def _verdict(path: Path, mission: Mission, found: _Checked) -> dict[str, Any]:
+    return {
+        "file": str(path),
+        "ok": not found.problems,
+        "id": mission.id,
+        "revision": mission.revision,
+        "digest": mission.digest,
+        "stops": len(mission.stops),
+        "problems": [{"path": problem.path, "message": problem.message} for problem in found.problems],
+        "coverage": found.coverage,
+        "notes": found.notes,
+    }
+
+
+OriginOption = Annotated[
+    str | None, typer.Option(metavar="LAT,LON,ALT,HEADING", help="Where on earth the drawing's origin is.")
+]
+FORMAT_NAMES = "plan, waypoints, dxf, csv, geojson, nav2, mcap, vda5050 or vda5050-2.1, whatever the suffix."
+AutopilotOption = Annotated[str | None, typer.Option(help="ardupilot, px4 or generic")]
+
+
+def export(
+    mission: MissionFile,
+    out: Annotated[Path, typer.Option("-o", "--out", help="The file; its suffix names the format.")],
+    to: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FORMAT",
+            help=FORMAT_NAMES,
+        ),
+    ] = None,
+    floor: Annotated[Path | None, typer.Option(help="The floor's .dxf, to draw over.")] = None,
+    coverage: Annotated[Path | None, typer.Option(help="coverage.json, to draw what is seen.")] = None,
+    autopilot: AutopilotOption = None,
+    trigger: Annotated[
+        str | None, typer.Option(metavar="auto|script|camera|none", help="What makes the vehicle scan.")
+    ] = None,
+    scan_wait: Annotated[
+        str | None, typer.Option(metavar="delay|script_time", help="How the vehicle waits for a scan.")
+    ] = None,
+    settle: Annotated[
+        str | None, typer.Option(metavar="delay|hold", help="Settle in an item of its own, or as a hold.")
+    ] = None,
+    origin: OriginOption = None,
+    map_: Annotated[
+        str | None,
+        typer.Option("--map", metavar="X,Y,HEADING", help="Site to map: turn by HEADING, then shift."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a mission in a format that others open.
+
+    .plan (QGroundControl), .waypoints (QGC WPL 110), .dxf, .csv, .geojson, .nav2.yaml, .mcap (nav_msgs/Path),
+    .vda5050.json (3.0), .vda5050-2.1.json; docs/how-to/exports.md tells what opens where.
+
+    Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
+    """
+    from stopgo.mission.document.problems import problems_of
+    from stopgo.mission.files.atomic import must_not_replace, write_checked
+    from stopgo.mission.files.exports import check_uses, exported, form_of, format_named
+    from stopgo.mission.files.exports.placing import moved, placed
+    from stopgo.mission.files.mission_json import read
+
+    document = read(mission)
+    there = placed(document, origin=origin, to_map=map_)
+    for problem in problems_of(there)[:1]:
+        raise AnswerIsNo(f"{mission}: {problem} (stopgo check {mission} lists all)")
+    name = format_named(to, out)
+    writing = {"autopilot": autopilot, "trigger": trigger, "scan-wait": scan_wait, "settle": settle}
+    drawn = {"floor": floor, "coverage": coverage}
+    check_uses(name, {**drawn, **writing, "origin": origin, "map": map_})
+    must_not_replace(out, mission, floor, coverage)
+    supplements = _supplements(document, floor, coverage, writing)
+    data = exported(there, name, supplements)
+    write_checked(out, data)
+    notes = (*moved(document, there), *form_of(name).notes(there, supplements))
+    report = {"mission": str(mission), "file": str(out), "format": name, "stops": len(there.stops)}
+    _say_export({**report, "bytes": len(data), "notes": notes}, form_of(name).title, as_json)
+
+
+def _supplements(
+    mission: Mission, floor: Path | None, coverage: Path | None, writing: dict[str, str | None]
+) -> Supplements:
+    from dataclasses import replace
+    from datetime import UTC, datetime
+
+    from stopgo.mission.files.exports.format import written_as
+    from stopgo.mission.files.exports.stretches import read_stretches
+
+    return replace(
+        written_as(writing),
+        floor=None if floor is None else _floor_drawing(floor, mission),
+        coverage=None if coverage is None else read_stretches(coverage, mission),
+        written=datetime.now(UTC),
+    )
+
+
+def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
+    """The drawing the mission was planned on, in the unit it was planned in."""
+    from stopgo.mission.files.exports.format import FloorDrawing
+    from stopgo.mission.files.plan_toml import read_settings
+    from stopgo.planner.floors import options_of
+    from stopgo.planner.floors.drawing import open_drawing
+    from stopgo.planner.floors.dxf import metres_in
+
+    if path.suffix.lower() != ".dxf":
+        raise InputError(
+            f"--floor {path}: layers are drawn over a .dxf only; leave --floor out to have them alone"
+        )
+    for problem in _other_floor(mission, path):
+        raise InputError(f"--floor {path}: is not the floor of this mission: its digest {problem.message}")
+    data = path.read_bytes()
+    drawing, _ = open_drawing(data, source=path)
+    options = options_of(read_settings(None, mission.origin.parameters))
+    metres = metres_in(drawing, source=path, options=options)
+    return FloorDrawing(lambda: open_drawing(data, source=path)[0], metres)
+
+
+def _say_notes(notes: Iterable[str]) -> None:
+    from stopgo.mission.console.table import printable
+
+    for note in notes:
+        typer.echo(f"stopgo: {printable(note)}", err=True)
+
+
+def _say_export(report: dict[str, Any], title: str, as_json: bool) -> None:
+    _say_notes(report["notes"])
+    from stopgo.mission.files.mission_text import json_text
+
+    line = f"{report['file']}: {title}, {report['stops']} stops, read back"
+    typer.echo(json_text(report) if as_json else line)
+
+
+def import_command(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A .plan, a .waypoints or a .csv of stops.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The mission.json to write.")],
+    parameters: Annotated[
+        Path | None, typer.Option("-p", "--parameters", help="plan.toml: robot, scanner and policy.")
+    ] = None,
+    origin: OriginOption = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="X,Y,HEADING", help="Where the robot starts, m and degrees.")
+    ] = None,
+    autopilot: AutopilotOption = None,
+    kind: Annotated[
+        str | None, typer.Option("--from", metavar="FORMAT", help="plan, waypoints or csv")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make a mission of waypoints or stops that another program wrote.
+
+    Waypoints at which something is waited for or triggered become stops, others corners of the way between.
+    A file that holds anything a scanning robot would not do is refused, naming the item.
+
+    Example: stopgo import site.plan -o mission.json --origin 47.3769,8.5417,408,0
+    """
+    from msgspec.structs import replace
+
+    from stopgo.mission.document import sealed
+    from stopgo.mission.files.atomic import write_checked
+    from stopgo.mission.files.imports import read_mission
+    from stopgo.mission.files.mission_json import encode, next_revision, read
+    from stopgo.mission.files.plan_toml import read_settings
+    from stopgo.mission.settings import PARAMETERS
+
+    given = {"origin": origin, "start": start}
+    settings = read_settings(parameters, {key: PARAMETERS[key].given(text) for key, text in given.items()})
+    made, track = read_mission(file, settings, kind=kind, autopilot=autopilot)
+    mission = sealed(replace(made, revision=next_revision(out, made)))
+    write_checked(out, encode(mission))
+    _say_import(read(out), out, (*track.notes, UNASKED), as_json)
+
+
+UNASKED = (
+    "legs are straight between the file's places; stopgo check --floor FLOOR.dxf says whether they are free"
+)
+
+
+def _say_import(mission: Mission, out: Path, notes: tuple[str, ...], as_json: bool) -> None:
+    from stopgo.mission.files.mission_text import identity, json_text, route_length
+
+    _say_notes(notes)
+    report = {
+        **{"mission": str(out), "id": mission.id, "revision": mission.revision, "digest": mission.digest},
+        **{"imported": mission.origin.floor, "stops": len(mission.stops), "route_m": route_length(mission)},
+        **{"georeference": mission.georeference, "notes": notes},
+    }
+    line = f"{out}: {len(mission.stops)} stops, route {route_length(mission):.2f} m, {identity(mission)}"
+    typer.echo(json_text(report) if as_json else line)

@@ -1,0 +1,158 @@
+"""`stopgo floors`: what is in a floor's file, told before anybody plans."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from stopgo.mission.errors import InputError
+
+if TYPE_CHECKING:
+    from stopgo.mission.floor import FloorPlan
+    from stopgo.planner.floors.reader import FloorOptions
+    from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey
+
+
+def add_floor_commands(app: typer.Typer) -> None:
+    """Add the verbs about floors' files."""
+    from stopgo.mission.settings import FLOOR_PARAMETERS
+    from stopgo.planner.commands.options import with_options
+
+    floors = with_options(floors_command, (*FLOOR_PARAMETERS, "layers"))
+    convert = with_options(convert_command, (*FLOOR_PARAMETERS, "layers"))
+    app.command(name="convert", epilog="Example: stopgo convert building.ifc --storey EG -o eg.dxf")(convert)
+    app.command(name="floors", epilog="Example: stopgo floors building.ifc --svg floors.svg")(floors)
+
+
+def floors_command(
+    file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf, .ifc, .ifczip or map.yaml.")],
+    *,
+    svg: Annotated[Path | None, typer.Option(help="Draw what was read, and what was left out.")] = None,
+    write_map: Annotated[
+        Path | None, typer.Option(help="Write what each layer was taken for, to be corrected.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+    **given: Any,
+) -> int:
+    """Tell what a file holds that a plan can be made of, what it was taken for, and what is odd about it.
+
+    Exit code 1: no floor can be made of it as it is; the last line says why, and the way out.
+    """
+    from stopgo.mission.console.table import printable_lines
+    from stopgo.mission.files.atomic import must_not_replace, write_atomic
+    from stopgo.mission.files.plan_toml import read_settings
+    from stopgo.planner.commands.options import values_of
+    from stopgo.planner.floors import options_of, survey_floor
+    from stopgo.planner.floors.layer_map import layer_map
+
+    for out in (svg, write_map):
+        must_not_replace(out, file)
+    options = options_of(read_settings(None, values_of(given)))
+    found = survey_floor(file, options)
+    if svg is not None:
+        _draw(svg, file, found, options)
+    if write_map is not None:
+        write_atomic(write_map, layer_map(found).encode("utf-8"))
+    if as_json:
+        typer.echo(json.dumps(found.as_json(), ensure_ascii=False))
+    else:
+        typer.echo(printable_lines("\n".join(survey_lines(found))))
+    return 0 if found.refusal is None else 1
+
+
+def convert_command(
+    file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf, an .ifc or an .ifczip.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The .dxf that is written.")],
+    *,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+    **given: Any,
+) -> int:
+    """Write a floor as a layered DXF in metres, which plans to the same stops and may be drawn on before."""
+    from stopgo.mission.files.atomic import must_not_replace, write_atomic
+    from stopgo.mission.files.layered_dxf import layered_dxf
+    from stopgo.mission.files.plan_toml import read_settings
+    from stopgo.planner.commands.options import values_of
+    from stopgo.planner.floors import options_of, read_floor
+
+    if out.suffix.lower() != ".dxf":
+        raise InputError(f"{out}: must end in .dxf")
+    must_not_replace(out, file)
+    floor = read_floor(file, options_of(read_settings(None, values_of(given))))
+    write_atomic(out, layered_dxf(floor))
+    lost = list(_not_in_a_drawing(floor))
+    for text in lost:
+        typer.echo(f"stopgo: {text}", err=True)
+    if as_json:
+        told = {"file": str(out), "floor": floor.name, "rooms": len(floor.rooms), "lost": lost}
+        typer.echo(json.dumps(told, ensure_ascii=False))
+    else:
+        typer.echo(f"{out}: {floor.name}, {floor.area:.0f} m², {len(floor.rooms)} rooms")
+    return 0
+
+
+def _not_in_a_drawing(floor: FloorPlan) -> Iterator[str]:
+    """What a layered drawing has no place for."""
+    place = floor.georeference
+    if place is not None:
+        origin = f"{place.lat:.7f},{place.lon:.7f},{place.alt:.2f},{place.heading_deg:.3f}"
+        yield f"a drawing has no place on earth; plan it with --origin {origin}"
+    settled = sum(not item.to_scan for item in floor.elements)
+    if settled:
+        yield f"{settled} elements are not to be scanned on that day; in the drawing all are"
+
+
+def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:
+    """Draw the floor that the options choose; else every floor of the file that a plan may be made of."""
+    from dataclasses import replace
+
+    from stopgo.mission.files.atomic import write_atomic
+    from stopgo.mission.files.floor_svg import floor_svg
+    from stopgo.planner.floors import read_floor
+    from stopgo.planner.floors.survey_picture import survey_svg
+
+    if found.lines:
+        write_atomic(out, survey_svg(found.lines, found.floor, title=found.file))
+        return
+    names = [item.name for item in found.floors if not item.aside]
+    if any(item.chosen for item in found.floors) or not names:
+        floors = [read_floor(file, options)]
+    else:
+        floors = [read_floor(file, replace(options, storey=name)) for name in names]
+    write_atomic(out, floor_svg(floors))
+
+
+def survey_lines(found: Survey) -> list[str]:
+    """What a person reads: the floors, the layers, what was worked out, left out, and is odd."""
+    from stopgo.planner.commands.plan_report import finding_lines
+
+    units = f"; unit: {found.units}" if found.units else ""
+    return [
+        f"{found.file}: {found.kind}{units}",
+        *(line for floor in found.floors for line in _floor_lines(floor)),
+        *(_layer_line(layer) for layer in found.layers),
+        *(f"  inferred    {text}" for text in found.inferred),
+        *(f"  left out    {text}" for text in found.ignored),
+        *finding_lines(found.findings),
+        *([f"  no floor    {found.refusal}"] if found.refusal else []),
+    ]
+
+
+def _floor_lines(floor: FloorChoice) -> list[str]:
+    level = "" if floor.level_m is None else f" at {floor.level_m:+.2f} m"
+    area = "" if floor.area_m2 is None else f", {floor.area_m2:.0f} m²"
+    counts = ", ".join(f"{count} {kind}" for kind, count in floor.elements.items() if count)
+    mark = "*" if floor.chosen else " "
+    lines = [f"{mark} floor       {floor.name}{level}{area}{f': {counts}' if counts else ''}"]
+    lines += [f"              {note}" for note in floor.notes]
+    return [*lines, f"              {floor.option}"] if floor.option else lines
+
+
+def _layer_line(layer: LayerUse) -> str:
+    counts = ", ".join(
+        f"{count} {word}" for count, word in ((layer.taken, "used"), (layer.ignored, "left out")) if count
+    )
+    return f"  layer       {layer.name} -> {layer.role} ({layer.why}): {counts}"
