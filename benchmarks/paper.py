@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.table import median_seconds, put, table, versions
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import BoolArray
 from stopgo.mission.settings import Settings
@@ -220,7 +220,7 @@ def _its_route(greedy: Selection, timed: Callable[[str, Callable[[], Any]], Any]
         route_found: Route = timed(
             "its route", lambda: route(_reselected(greedy, tour="closed", **_its_way()))
         )
-    except AnswerIsNo:
+    except NegativeResult:
         return None
     return route_found
 

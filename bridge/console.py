@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from stopgo.mission.console.table import printable, printable_lines
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 
 if TYPE_CHECKING:
     import rich.progress
@@ -72,7 +72,7 @@ def refusals_in(as_json: bool) -> Iterator[None]:
     """A refusal in the block is also printed as JSON, if that is what is printed."""
     try:
         yield
-    except AnswerIsNo as no:
+    except NegativeResult as no:
         if as_json:
             print_json({"outcome": "refused", "reason": no.reason, "message": str(no)})
         raise

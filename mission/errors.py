@@ -30,7 +30,7 @@ class RobotUnreachable(StopgoError):
     exit_code = 2
 
 
-class AnswerIsNo(StopgoError):
+class NegativeResult(StopgoError):
     """Everything worked and the answer is no: refused, no candidate, coverage not reached."""
 
     exit_code = 1
@@ -39,6 +39,10 @@ class AnswerIsNo(StopgoError):
         super().__init__(message)
         self.reason = reason
         """The robot's word for why it refused, if it is one of the protocol's."""
+
+
+AnswerIsNo = NegativeResult
+"""The name of `NegativeResult` until 0.1; goes with 0.3."""
 
 
 class OutcomeUnknown(StopgoError):

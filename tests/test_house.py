@@ -176,7 +176,8 @@ def _public_types(name: str) -> Iterator[str]:
 
 
 def _is_type(name: str) -> bool:
-    return len(name) > 1 and name[0].isupper() and not name.isupper()
+    bare = name.lstrip("_")
+    return len(bare) > 1 and bare[0].isupper() and not bare.isupper()
 
 
 def test_a_class_name_stands_for_one_thing() -> None:

@@ -16,7 +16,7 @@ from stopgo.bridge.console import print_json, say, tell, tell_lines
 
 if TYPE_CHECKING:
     from stopgo.bridge.station.watch import Showing
-    from stopgo.mission.comparing.run_collector import HeardRun
+    from stopgo.mission.comparing.run_collector import RunCollector
     from stopgo.mission.run.events import StateReport
 
 
@@ -25,7 +25,7 @@ class Recorder(Protocol):
 
     def __call__(
         self, path: Path | None, plan: Path | None, *, view: bool
-    ) -> AbstractContextManager[HeardRun]: ...
+    ) -> AbstractContextManager[RunCollector]: ...
 
 
 def watch_by(recording: Recorder) -> Callable[..., None]:
@@ -89,7 +89,7 @@ def watch_by(recording: Recorder) -> Callable[..., None]:
     return watch
 
 
-def tell_compared(heard: HeardRun, state: StateReport, *, json_: bool) -> int:
+def tell_compared(heard: RunCollector, state: StateReport, *, json_: bool) -> int:
     """Tell the run beside its mission; the exit code that it comes to."""
     from stopgo.mission.comparing.comparison_text import comparison_json, comparison_text
     from stopgo.mission.comparing.run_verdict import judge

@@ -12,7 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from stopgo.bridge.conform.falsified_seals import FalsifiedSeals
-from stopgo.bridge.conform.requirements import ConformVerdict, Nonconforming, PeerGone, Requirement, tried
+from stopgo.bridge.conform.requirements import (
+    ConformVerdict,
+    Nonconforming,
+    PeerNotResponding,
+    Requirement,
+    tried,
+)
 from stopgo.bridge.conform.robot_bench import OVER, Forger, OtherStation, RobotBench
 from stopgo.bridge.conform.robot_orders import IDLE, ORDERS
 from stopgo.bridge.conform.robot_pushes import PUSHES
@@ -25,7 +31,7 @@ from stopgo.bridge.link.protocol import Info, KeyExpressions
 from stopgo.bridge.link.seals import Seals
 from stopgo.bridge.link.zenoh_link import Guard, connecting
 from stopgo.bridge.station.station import Station, connect
-from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown
+from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown
 from stopgo.mission.run.lease import remaining_s
 
 REQUIREMENTS: tuple[Requirement[RobotBench], ...] = (
@@ -98,7 +104,7 @@ def robot_bench(options: ConformOptions) -> Iterator[RobotBench]:
 def _leave(bench: RobotBench) -> None:
     try:
         bench.leave()
-    except PeerGone as error:
+    except PeerNotResponding as error:
         raise OutcomeUnknown(f"{bench.keys.robot}: {error}") from None
 
 
@@ -112,7 +118,7 @@ def _reach(options: ConformOptions) -> dict[str, Any]:
 def _first_info(station: Station) -> Info:
     try:
         return station.info()
-    except AnswerIsNo as no:
+    except NegativeResult as no:
         raise InputError(f"{no}; no case was tried") from None
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from stopgo.bridge.conform.fake_robot import FakeRobot, ForgedAnswers, MeddledLink, at_work
+from stopgo.bridge.conform.fake_robot import FakeRobot, FaultyLink, ForgedAnswers, at_work
 from stopgo.bridge.conform.requirements import ConformVerdict, NotTried, tried
 from stopgo.bridge.conform.station_bench import Doing, StationBench
 from stopgo.bridge.conform.station_requirements import STATION_REQUIREMENTS
@@ -76,7 +76,7 @@ def station_bench(options: StationOptions, ready: Callable[[], None]) -> Iterato
         tempfile.TemporaryDirectory(prefix="stopgo-conform-") as folder,
         listening(options.listen, guard) as link,
     ):
-        meddled = MeddledLink(link, keys)
+        meddled = FaultyLink(link, keys)
         with at_work(FakeRobot(meddled, keys, boot_id, speed_up=SPEED_UP)) as robot:
             ready()
             path = Path(folder) / "mission.json"
@@ -122,7 +122,7 @@ def by_command(options: StationOptions, path: Path) -> Doing:
     return do
 
 
-def by_hand(options: StationOptions, link: MeddledLink, path: Path) -> Doing:
+def by_hand(options: StationOptions, link: FaultyLink, path: Path) -> Doing:
     """Asks a person to let the station act, and waits until it has been quiet for a while."""
 
     def do(what: str, mission: Mission | None) -> int | None:
@@ -148,7 +148,7 @@ KEYS_OF = {"push": "mission/", "watch": "keep", "status": "info"}
 """What a station asks first of all that is no order."""
 
 
-def _has_acted(link: MeddledLink, what: str) -> bool:
+def _has_acted(link: FaultyLink, what: str) -> bool:
     """Whether the station has asked something: where it is fooled, the order itself may never come."""
     return (
         bool(link.asked)

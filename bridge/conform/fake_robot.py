@@ -43,7 +43,7 @@ class Asked:
     request: Request
 
 
-class MeddledLink:
+class FaultyLink:
     """A robot's link that notes what is asked, and answers and publishes as it is told to."""
 
     def __init__(self, link: Link, keys: KeyExpressions) -> None:
@@ -155,7 +155,7 @@ def _spoilt(seal: bytes) -> bytes:
 class FakeRobot:
     """A robot in this process, which simulates what it is sent and drives nothing."""
 
-    def __init__(self, link: MeddledLink, keys: KeyExpressions, boot_id: str, *, speed_up: float) -> None:
+    def __init__(self, link: FaultyLink, keys: KeyExpressions, boot_id: str, *, speed_up: float) -> None:
         self.link = link
         self.keys = keys
         self.journal = memory_journal()

@@ -18,7 +18,7 @@ class NotTried(Exception):
     """A requirement could not be tried; the message says why."""
 
 
-class PeerGone(Exception):
+class PeerNotResponding(Exception):
     """The peer answers nothing any more."""
 
 
@@ -86,7 +86,7 @@ def tried(
                 bench.check_in(may_drive=requirement.drives)
             except Nonconforming as wrong:
                 outcome, reason = "failed", reason or str(wrong)
-            except PeerGone as error:
+            except PeerNotResponding as error:
                 gone = str(error)
                 outcome, reason = "failed", reason or gone
             yield ConformVerdict(*told, outcome, reason, gone=bool(gone))

@@ -13,7 +13,7 @@ from typing import Any, Final, TypeVar
 import msgspec
 
 from stopgo.bridge.conform.falsified_seals import FalsifiedSeals
-from stopgo.bridge.conform.requirements import Nonconforming, NotTried, PeerGone, must, short
+from stopgo.bridge.conform.requirements import Nonconforming, NotTried, PeerNotResponding, must, short
 from stopgo.bridge.conform.trial_mission import REACH_M, trial_mission
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import (
@@ -320,10 +320,10 @@ class RobotBench:
         try:
             return self.info().state
         except Nonconforming as silent:
-            raise PeerGone(f"the robot answers no more: {silent}") from None
+            raise PeerNotResponding(f"the robot answers no more: {silent}") from None
 
     def leave(self) -> None:
-        """Abort what is under way, if the robot still answers; raises `PeerGone` if it does not obey."""
+        """Abort the run under way, if the robot still answers; `PeerNotResponding` if it does not obey."""
         raw = self.link.ask(self.keys.info, timeout_s=TRY_S)
         if raw is not None and not self._at_rest(raw):
             self.end_run()
@@ -335,12 +335,12 @@ class RobotBench:
             return False  # who knows
 
     def end_run(self) -> None:
-        """Abort what is under way; raises `PeerGone` if the robot does not obey."""
+        """Abort what is under way; raises `PeerNotResponding` if the robot does not obey."""
         try:
             self.give(self.order("abort"))
             self.wait_for_state(*OVER, within_s=AT_REST_S)
         except Nonconforming as wrong:
-            raise PeerGone(f"the robot does not obey an abort; stop it by hand: {wrong}") from None
+            raise PeerNotResponding(f"the robot does not obey an abort; stop it by hand: {wrong}") from None
 
 
 def manifest_of(mission: Mission, document: bytes, **details: Any) -> Manifest:

@@ -173,7 +173,7 @@ class StationBench:
             cmd_id=uuid.uuid4().hex, verb=verb, commander=self.commander, valid_for_s=5.0, take_over=True,
             issued_ns=self.robot.wall.now_ns(),
         )  # fmt: skip
-        answer = self.robot.controller.obey(order)
+        answer = self.robot.controller.execute(order)
         assert answer.outcome == "ok", answer
         return answer
 

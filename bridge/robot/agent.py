@@ -313,7 +313,7 @@ class Agent:
     def _obey(self, request: Request, order: Order) -> Reply:
         if not request.key.endswith(f"/cmd/{order.verb}"):
             return Malformed(message=f"command {order.verb} on {request.key}")
-        return self._runner.obey(order)
+        return self._runner.execute(order)
 
     def _log(self, request: Request) -> bytes:
         self._contact(request)
@@ -335,7 +335,7 @@ class Agent:
         while not self._closing.is_set():
             self._news.wait(STATE_EVERY_S)
             self._news.clear()
-            self._runner.hear_of_link(self._silent_s())
+            self._runner.on_link_silence(self._silent_s())
             self._look_for_twin()
             for event in self._journal.events(since=told):
                 self._tell_event(encode(event))

@@ -74,7 +74,7 @@ class Scanner(Protocol):
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
         """Scan, and give up when `interrupt` is set or `scan.timeout_s` has passed."""
 
-    def what_became(self, label: str) -> ScanResult | ScanFailed | None:
+    def scan_outcome(self, label: str) -> ScanResult | ScanFailed | None:
         """How a scan ended that was begun before the program was started anew; `None` if it cannot say."""
 
     @property

@@ -23,7 +23,7 @@ from stopgo.bridge.robot.current_task import faces, has_work, label, moved, same
 from stopgo.bridge.robot.journal import Journal
 from stopgo.bridge.robot.mission_fitness import follows, weighed_by, why_unfit
 from stopgo.bridge.robot.mission_reading import read_mission
-from stopgo.bridge.robot.pending_writes import Unstored
+from stopgo.bridge.robot.pending_writes import PendingWrites
 from stopgo.bridge.robot.runner import Position
 from stopgo.mission.document import Mission
 from stopgo.mission.run import revision, route_position
@@ -48,7 +48,7 @@ def new_boot_id() -> str:
 
 
 @dataclass(frozen=True)
-class Weighed:
+class TentativeDecision:
     """What an order leads to, if nothing has changed since of what it was decided by."""
 
     run: Run
@@ -97,7 +97,7 @@ class Controller:
         self._newest_mission: Mission | None = None
         """The one that was taken last."""
         self._run = Run()
-        self._unstored = Unstored()
+        self._unstored = PendingWrites()
         self._recover()
 
     @property
@@ -127,7 +127,7 @@ class Controller:
         stop = runs.stop_of(run, self._mission)
         if stop is None or run.stop_state != "SCANNING":
             return None
-        return self._scanner.what_became(label(run, stop))
+        return self._scanner.scan_outcome(label(run, stop))
 
     def _mend_lease(self) -> None:
         """A lease from a time when the date was far ahead would last until then."""
@@ -151,7 +151,7 @@ class Controller:
 
     # Orders and missions, from the link's threads
 
-    def obey(self, order: Order) -> Answer:
+    def execute(self, order: Order) -> Answer:
         """Carry out an order once, however often it comes, and remember what was answered.
 
         Whether a robot may drive takes long to say of a long mission, and is weighed without the lock: a stop
@@ -168,11 +168,11 @@ class Controller:
                 if (weighed.run, weighed.lease) == (self._run, self.lease):
                     return self._decided(order, weighed.decision)
 
-    def _weigh(self, order: Order) -> Weighed:
+    def _weigh(self, order: Order) -> TentativeDecision:
         """What an order would lead to as all is now."""
         with self._lock:
             run, mission, lease = self._run, self._mission, self.lease
-        return Weighed(run, lease, decide(order, self._situation_of(run, mission)))
+        return TentativeDecision(run, lease, decide(order, self._situation_of(run, mission)))
 
     def _decided(self, order: Order, decision: Decision | Refused) -> Answer:
         """Store what was decided, and its answer, and let it be so."""
@@ -279,7 +279,7 @@ class Controller:
             return Refused("replayed", "this commit was taken before, and another mission since; push again")
         return None
 
-    def hear_of_link(self, silent_s: float) -> None:
+    def on_link_silence(self, silent_s: float) -> None:
         """Told how long no station has been heard; the mission's policy may want something of it."""
         with self._lock:
             self._silent_s = silent_s

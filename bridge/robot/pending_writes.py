@@ -10,7 +10,7 @@ from stopgo.mission.run.events import AnyEvent
 from stopgo.mission.run.orders import Answer, Order
 
 
-class Unstored:
+class PendingWrites:
     """Events and answers in the order in which they came to be; gone if the power fails before."""
 
     def __init__(self) -> None:

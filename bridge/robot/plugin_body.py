@@ -158,13 +158,13 @@ class GuardedScanner:
         except InputError as error:
             return ScanFailed(reason=str(error))
 
-    def what_became(self, label: str) -> ScanResult | ScanFailed | None:
+    def scan_outcome(self, label: str) -> ScanResult | ScanFailed | None:
         """What it says of a scan that was cut off; nothing, where it has no such word."""
         if not hasattr(self._scanner, "what_became"):
             return None
         try:
             with self._made.blamed():
-                result = self._scanner.what_became(label)
+                result = self._scanner.scan_outcome(label)
         except InputError:
             return None
         return result if isinstance(result, ScanResult | ScanFailed) else None

@@ -26,7 +26,7 @@ from stopgo.bridge.robot.recorder import LIMIT_BYTES, RunRecorder
 from stopgo.bridge.robot.refusal_log import RefusalLog
 from stopgo.bridge.robot.robot_hardware import OpenBody
 from stopgo.bridge.robot.simulator import NO_FAULTS, Faults
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.revision import RevisionPolicy
 
@@ -114,7 +114,7 @@ def check_name_is_free(link: Link, keys: KeyExpressions, router: str) -> None:
     while not gone.is_set() and time.monotonic() < deadline:
         others = others_of(link, keys, "")
         if others:
-            raise AnswerIsNo(
+            raise NegativeResult(
                 f"robot {keys.robot}: is alive behind {router} already (boot {others[0]}); two of one name"
                 " cannot be told apart. End the other, or choose another --name"
             )

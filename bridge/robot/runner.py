@@ -41,10 +41,10 @@ class Runner(Protocol):
     def battery(self) -> float:
         """0 to 1."""
 
-    def obey(self, order: Order) -> Answer:
+    def execute(self, order: Order) -> Answer:
         """Carry out an order once, however often it comes."""
 
-    def hear_of_link(self, silent_s: float) -> None:
+    def on_link_silence(self, silent_s: float) -> None:
         """Told how long no station has been heard."""
 
     def close(self) -> None:

@@ -286,7 +286,7 @@ class SimulatedScanner:
         self._remember_scan(label, result)
         return result
 
-    def what_became(self, label: str) -> ScanResult | ScanFailed | None:
+    def scan_outcome(self, label: str) -> ScanResult | ScanFailed | None:
         """A scanner has a memory of its own: a scan that it does not know of has not ended."""
         return self._ended.get(label, ScanFailed(reason="cut off"))
 

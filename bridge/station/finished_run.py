@@ -9,7 +9,7 @@ from stopgo.bridge.station.follow import Followed
 from stopgo.bridge.station.record import Past, past_run, read_index
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.events import Aborted, AnyEvent, Finished, Scanned, Skipped, StateReport, Unconfirmed
 from stopgo.mission.run.tolerance import stops_outside
 
@@ -31,10 +31,12 @@ def past_reports(
     robot, recorded = station.keys.robot, RECORD in station.info().capabilities
     events = station.log(run_id=run_id)
     if not events:
-        raise AnswerIsNo(f"{robot} has no run {run_id}; it has {_runs(station) if recorded else 'others'}")
+        raise NegativeResult(
+            f"{robot} has no run {run_id}; it has {_runs(station) if recorded else 'others'}"
+        )
     end = events[-1]
     if not isinstance(end, Finished | Aborted):
-        raise AnswerIsNo(f"run {run_id} of {robot} is still under way; follow it without --run")
+        raise NegativeResult(f"run {run_id} of {robot} is still under way; follow it without --run")
     waiting, battery = list(events), 0.0
     told = past_run(station.link, station.keys, run_id, patience_s=station.patience_s) if recorded else ()
     for item in told:

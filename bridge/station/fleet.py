@@ -13,7 +13,7 @@ from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.link.tls_probe import why_no_link
 from stopgo.bridge.station.station import Station, whoami
-from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.run.events import StateReport
 
 GATHER_S = 0.3
@@ -76,5 +76,5 @@ def _member(link: Link, keys: KeyExpressions, timeout_s: float, held: HeldKeys |
         return FleetMember(keys.robot, station.status())
     except OutcomeUnknown as silent:
         return FleetMember(keys.robot, None, f"shows itself, but {silent}")
-    except (AnswerIsNo, InputError) as no:
+    except (NegativeResult, InputError) as no:
         return FleetMember(keys.robot, None, str(no))

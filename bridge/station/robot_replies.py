@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 import msgspec
 
 from stopgo.bridge.link.protocol import LogPage, Malformed, Rejected, Reply, decode
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.run.events import AnyEvent
 
 M = TypeVar("M")
@@ -36,10 +36,10 @@ def read_reply(reply: bytes, kind: type[M], *, robot: str, what: str) -> M:
         raise _unknown(robot, what, str(error)) from None
     if isinstance(message, Rejected):
         why = f"{message.reason}: {'; '.join(message.messages)}"
-        raise AnswerIsNo(f"{robot} rejected {what}: {why}", reason=message.reason)
+        raise NegativeResult(f"{robot} rejected {what}: {why}", reason=message.reason)
     if not isinstance(message, kind):
         said = message.message if isinstance(message, Malformed) else type(message).__name__
-        raise AnswerIsNo(f"{robot} could not make sense of {what}: {said}")
+        raise NegativeResult(f"{robot} could not make sense of {what}: {said}")
     return message
 
 

@@ -42,7 +42,7 @@ from stopgo.bridge.station import follow
 from stopgo.bridge.station.robot_replies import read_reply
 from stopgo.bridge.station.window import Window, windowed
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.files.mission_json import parse
 from stopgo.mission.run.events import AnyEvent, Scanned, Skipped, StateReport, Unconfirmed
 from stopgo.mission.run.orders import FREE_VERBS, LONGEST_VALID_S, Answer, Order, Verb
@@ -196,7 +196,7 @@ class Station:
                 )  # fmt: skip
                 self.link.ask_all(self.keys.command("pause"), encode(pause), timeout_s=TRY_S)
             told = "both were told to pause"
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"two robots answer to the name {self.keys.robot} (boots {boots}); {told}. End one of them,"
             " or start it under another --name"
         )
@@ -265,7 +265,7 @@ class Station:
             )  # fmt: skip
             try:
                 return self._step(manifest, "commit", encode(commit), Accepted)
-            except AnswerIsNo as no:
+            except NegativeResult as no:
                 if no.reason != "expired" or not tries_left:
                     raise
         raise AssertionError
@@ -281,7 +281,7 @@ class Station:
             data = document[number * manifest.chunk_bytes : (number + 1) * manifest.chunk_bytes]
             got = self._step(manifest, f"chunk/{number}", data, ChunkHeld, of=manifest.sha256)
             if got.sha256 != hashlib.sha256(data).hexdigest():
-                raise AnswerIsNo(f"chunk {number} arrived damaged at {self.keys.robot}; push again")
+                raise NegativeResult(f"chunk {number} arrived damaged at {self.keys.robot}; push again")
 
         missing = [number for number in range(manifest.chunks) if number not in held]
         progress(min(manifest.size, len(held) * manifest.chunk_bytes), manifest.size)
@@ -341,7 +341,7 @@ class Station:
         """Viewers are told here; the robot would not even answer them."""
         if self.held is not None and self.held.holder.role != "station":
             holder = self.held.holder
-            raise AnswerIsNo(f"{what}: {holder.name} is a {holder.role}, and only stations give orders")
+            raise NegativeResult(f"{what}: {holder.name} is a {holder.role}, and only stations give orders")
 
     def give(self, order: Order, *, within_s: float | None = None) -> Answer:
         """Give an order that was written before; given again it is still carried out once."""
@@ -355,7 +355,7 @@ class Station:
         answer = self._answered(reply, Answer, order.verb)
         if answer.outcome == "refused":
             why = f"{answer.reason}: {answer.message}"
-            raise AnswerIsNo(f"{self.keys.robot} refused {order.verb}: {why}", reason=answer.reason)
+            raise NegativeResult(f"{self.keys.robot} refused {order.verb}: {why}", reason=answer.reason)
         return answer
 
     def stop_order(self, verb: Verb, **details: Any) -> Order:

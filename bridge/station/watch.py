@@ -14,7 +14,7 @@ from stopgo.bridge.station.finished_run import past_reports
 from stopgo.bridge.station.follow import Followed, Silence
 from stopgo.bridge.station.record import Past
 from stopgo.bridge.station.station import Station
-from stopgo.mission.comparing.run_collector import RunTaker
+from stopgo.mission.comparing.run_collector import RunSink
 from stopgo.mission.comparing.spans import stood_s
 from stopgo.mission.console.table import printable
 from stopgo.mission.document import Mission, Stop
@@ -51,13 +51,13 @@ class Showing(Protocol):
     def show(self, report: Followed) -> None: ...
 
 
-def watch_run(station: Station, record: RunTaker | None, *, say: Callable[[str], None]) -> StateReport:
+def watch_run(station: Station, record: RunSink | None, *, say: Callable[[str], None]) -> StateReport:
     """Follow the run to its end, told line by line, and return the last state."""
     return watch_showing(station, record, Lines(say))
 
 
 def watch_showing(
-    station: Station, record: RunTaker | None, showing: Showing, *, run_id: str | None = None
+    station: Station, record: RunSink | None, showing: Showing, *, run_id: str | None = None
 ) -> StateReport:
     """Follow the run to its end, or tell one that is over once more, and return the last state.
 
@@ -96,7 +96,7 @@ def _plan_of(report: Followed) -> tuple[str | None, int | None] | None:
     return report.run_id, report.revision
 
 
-def _introduced(station: Station, report: Any, record: RunTaker | None, showing: Showing) -> Mission:
+def _introduced(station: Station, report: Any, record: RunSink | None, showing: Showing) -> Mission:
     """Fetch the mission that is run, so that it can be drawn and counted down."""
     mission = station.mission(report.mission_id or "", report.revision or 0)
     showing.mission(mission)
@@ -105,7 +105,7 @@ def _introduced(station: Station, report: Any, record: RunTaker | None, showing:
     return mission
 
 
-def hand_over(record: RunTaker, report: Followed) -> None:
+def hand_over(record: RunSink, report: Followed) -> None:
     """Give a report to the recording's method for it."""
     if isinstance(report, StateReport):
         record.state(report)

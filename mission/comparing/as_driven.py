@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from stopgo.mission.geometry import BoolArray
-from stopgo.mission.stages.coverage_totals import Ledger
+from stopgo.mission.stages.coverage_totals import CoverageTotals
 from stopgo.mission.stages.figures import Share, Shares
 
 
@@ -14,7 +14,7 @@ from stopgo.mission.stages.figures import Share, Shares
 class AsDriven:
     """What was in sight from the places where a robot stood long enough for a scan."""
 
-    ledger: Ledger
+    ledger: CoverageTotals
     """The units of the floor, n of them."""
     planned: BoolArray
     """Whether enough of the mission's stops see each unit (n,)."""

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon
-from stopgo.mission.stages.coverage_totals import Ledger
+from stopgo.mission.stages.coverage_totals import CoverageTotals
 from stopgo.mission.stages.figures import Shares
 
 
@@ -36,7 +36,7 @@ class Unplanned:
 class Measured:
     """Points laid on the floor's targets."""
 
-    ledger: Ledger
+    ledger: CoverageTotals
     """The units of the floor, n of them."""
     hit: BoolArray
     """Whether a point lies within the tolerance of each unit (n,)."""

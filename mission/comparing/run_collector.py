@@ -18,7 +18,7 @@ from stopgo.mission.stages.sight import Sight
 SOURCE = LogSource(name="heard", format="live", digest="", messages=0)
 
 
-class RunTaker(Protocol):
+class RunSink(Protocol):
     """What takes a run as it is told, such as a recording."""
 
     def mission(self, mission: Mission) -> None: ...
@@ -34,13 +34,13 @@ class RunTaker(Protocol):
     def missing(self, gap: PosesMissing) -> None: ...
 
 
-class HeardRun:
+class RunCollector:
     """Keeps what is told of the newest run, and hands everything on to a recording, if there is one.
 
     `sights` tell what the stops of its plan see.
     """
 
-    def __init__(self, onward: RunTaker | None = None, sights: Sequence[Sight] = ()) -> None:
+    def __init__(self, onward: RunSink | None = None, sights: Sequence[Sight] = ()) -> None:
         self._onward = onward
         self.sights = sights
         self._run_id: str | None = None

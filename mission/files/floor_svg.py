@@ -27,7 +27,7 @@ _EVEN_ODD: dict[str, object] = {"fill_rule": "evenodd"}
 
 
 @dataclass(frozen=True)
-class _Spot:
+class _LabelSpot:
     """Where a floor lies on the paper: its lower left corner in metres, its top on paper, and the scale."""
 
     x: float
@@ -49,7 +49,7 @@ def floor_svg(floors: Sequence[FloorPlan]) -> bytes:
     scale, top, drawn = WIDTH / widest, MARGIN, []
     for floor, box in zip(floors, boxes, strict=True):
         height = (box[3] - box[1]) * scale
-        place = _Spot(box[0], box[1], height, top + MARGIN, scale)
+        place = _LabelSpot(box[0], box[1], height, top + MARGIN, scale)
         drawn += [text(MARGIN, top + MARGIN / 2, _title(floor), size=5.0), *_floor(floor, place)]
         top += height + 2 * MARGIN
     drawn += _legend([kind for kind in LOOKS if any(kind in kinds_of(floor) for floor in floors)], top)
@@ -69,7 +69,7 @@ def _title(floor: FloorPlan) -> str:
     return f"{floor.name}: {floor.area:.0f} m², {len(floor.rooms)} rooms, {len(floor.openings)} openings"
 
 
-def _floor(floor: FloorPlan, place: _Spot) -> Iterator[str]:
+def _floor(floor: FloorPlan, place: _LabelSpot) -> Iterator[str]:
     yield path(["".join(_region(part, place) for part in floor.outline)], **FLOOR, **_EVEN_ODD)
     yield from (_room(room, place) for room in floor.rooms)
     for kind in kinds_of(floor):
@@ -82,21 +82,21 @@ def _floor(floor: FloorPlan, place: _Spot) -> Iterator[str]:
     yield from (_name(room, place) for room in floor.rooms)
 
 
-def _region(part: Polygon, place: _Spot) -> str:
+def _region(part: Polygon, place: _LabelSpot) -> str:
     return "".join(ring_data(place.on_paper(ring)) for ring in part.rings)
 
 
-def _room(room: Room, place: _Spot) -> str:
+def _room(room: Room, place: _LabelSpot) -> str:
     return path((_region(part, place) for part in room.polygons), **ROOM, **_EVEN_ODD)
 
 
-def _element(item: Element, place: _Spot) -> str:
+def _element(item: Element, place: _LabelSpot) -> str:
     solids = path((_region(part, place) for part in item.solids), **_EVEN_ODD)
     lines = path((line_data(place.on_paper(line)) for line in item.lines), fill="none")
     return f"<g><title>{clean(' '.join(filter(None, (item.id, item.global_id))))}</title>{solids}{lines}</g>"
 
 
-def _name(room: Room, place: _Spot) -> str:
+def _name(room: Room, place: _LabelSpot) -> str:
     low, high = np.array(bounds([part.exterior for part in room.polygons])).reshape(2, 2)
     x, y = place.on_paper(((low + high) / 2)[None])[0].tolist()
     return text(x, y, room.label, size=2.5, text_anchor="middle", fill="#333333")

@@ -21,7 +21,7 @@ OFFSETS = (0.5, 1.0)
 
 
 @dataclass(frozen=True)
-class _Spot:
+class _Corner:
     """Where a corner may be."""
 
     at: Point
@@ -56,30 +56,30 @@ def _thinned(leg: Sequence[Point], within: float) -> list[Point]:
     return kept
 
 
-def _spots(leg: Sequence[Point], within: float) -> Iterator[_Spot]:
+def _spots(leg: Sequence[Point], within: float) -> Iterator[_Corner]:
     """The leg's points, places outside its corners, and places beside the middles of its inner pieces."""
-    yield _Spot(leg[0], 0.0, 0.0)
+    yield _Corner(leg[0], 0.0, 0.0)
     for k in range(1, len(leg) - 1):
         before, here, after = leg[k - 1 : k + 2]
-        yield _Spot(here, float(k), 0.0)
+        yield _Corner(here, float(k), 0.0)
         (ux, uy), (wx, wy) = _direction(before, here), _direction(here, after)
         yield from _beside(here, (ux - wx, uy - wy), float(k), within)
         if k < len(leg) - 2:
             middle = ((here[0] + after[0]) / 2, (here[1] + after[1]) / 2)
             yield from _beside(middle, (-wy, wx), k + 0.5, within)
             yield from _beside(middle, (wy, -wx), k + 0.5, within)
-    yield _Spot(leg[-1], float(len(leg) - 1), 0.0)
+    yield _Corner(leg[-1], float(len(leg) - 1), 0.0)
 
 
-def _beside(place: Point, towards: Point, along: float, within: float) -> Iterator[_Spot]:
+def _beside(place: Point, towards: Point, along: float, within: float) -> Iterator[_Corner]:
     x, y = _direction((0.0, 0.0), towards)
     if (x, y) != (0.0, 0.0):
         for share in OFFSETS:
             off = share * within
-            yield _Spot((place[0] + off * x, place[1] + off * y), along, off)
+            yield _Corner((place[0] + off * x, place[1] + off * y), along, off)
 
 
-def _fewest(leg: Sequence[Point], spots: Sequence[_Spot], within: float) -> tuple[Point, ...]:
+def _fewest(leg: Sequence[Point], spots: Sequence[_Corner], within: float) -> tuple[Point, ...]:
     """The shortest chain of spots from end to end; of several, the one nearest to the leg."""
     best = [(0, 0.0), *[(len(spots), 0.0)] * (len(spots) - 1)]
     before = [0] * len(spots)
@@ -95,7 +95,7 @@ def _fewest(leg: Sequence[Point], spots: Sequence[_Spot], within: float) -> tupl
 
 
 def _straight_on(
-    leg: Sequence[Point], spots: Sequence[_Spot], start: int, within: float
+    leg: Sequence[Point], spots: Sequence[_Corner], start: int, within: float
 ) -> Iterator[tuple[int, float]]:
     """The spots that can be driven to straight from one, and how far that leaves the leg.
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.document.problems import problems_of
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.fields import as_sent
@@ -67,7 +67,7 @@ def check_count(mission: Mission, placed: Sequence[Placed], vehicle: Autopilot, 
     least = count - sum(one.role == "settle" for one in placed)
     enough = "which is enough" if least <= most else "which is not enough"
     by_hold = f"--settle hold makes it {least}, {enough}; or " if least < count else ""
-    raise AnswerIsNo(
+    raise NegativeResult(
         f"{mission.name}: {len(mission.stops)} stops make {count} items, {vehicle.name} holds {most}; "
         f"{by_hold}plan fewer stops at once"
     )
@@ -103,7 +103,7 @@ def _check_heading(mission: Mission, vehicle: Autopilot) -> None:
         stop, fov = mission.stops[0], mission.scanner.fov_deg
         heading = math.degrees(stop.heading)
         why = "turns no rover to it" if vehicle.keeps_arrival else "drops it"
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"{mission.name}: stop {stop.id}: heading {heading:.1f}° is needed (scanner.fov_deg is {fov:g}), "
             f"and {vehicle.name} {why}; plan with --fov 360, or push to a robot of stopgo"
         )
@@ -113,12 +113,12 @@ def _check_waits(mission: Mission, stop: Stop, options: TranslationOptions) -> N
     longest = options.vehicle.max_delay_s
     for field, seconds in {"settle_s": stop.settle_s, "scan.duration_s": stop.scan.duration_s}.items():
         if seconds > longest:
-            raise AnswerIsNo(
+            raise NegativeResult(
                 f"{mission.name}: stop {stop.id}: {field} is {seconds:g}, longer than the {longest:.0f} s "
                 f"that {options.vehicle.name} waits; shorten it"
             )
     if options.settle == "hold" and not _can_be_held(stop.settle_s, options.vehicle):
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"{mission.name}: stop {stop.id}: settle_s is {stop.settle_s:g}, a hold is whole seconds up to "
             f"{options.vehicle.longest_hold_s:.0f}; round it or settle by delay"
         )
@@ -132,12 +132,12 @@ def _check_handshake(mission: Mission, stop: Stop, number: int, options: Transla
     if options.scan_wait != "script_time":
         return
     if stop.scan.timeout_s > LONGEST_SCRIPT_S:
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"{mission.name}: stop {stop.id}: scan.timeout_s is {stop.scan.timeout_s:g}, NAV_SCRIPT_TIME "
             f"holds {LONGEST_SCRIPT_S} s; shorten it or wait by delay"
         )
     if number > LARGEST_SCRIPT_NUMBER:
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"{mission.name}: stop {stop.id}: number {number} is above the {LARGEST_SCRIPT_NUMBER} that "
             "NAV_SCRIPT_TIME holds; wait by delay"
         )

@@ -37,7 +37,7 @@ class Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class Ledger:
+class CoverageTotals:
     """The units of a plan, n of them, in the order of its targets."""
 
     rule: Literal["length", "paper"]
@@ -125,11 +125,11 @@ class Ledger:
         return frozen(of_element[self.element], np.int64)
 
 
-def ledger_of(visibility: Visibility, why: Mapping[str, str] | None = None) -> Ledger:
+def ledger_of(visibility: Visibility, why: Mapping[str, str] | None = None) -> CoverageTotals:
     """The ledger of a plan; `why` tells by room why the robot does not come there."""
     space, targets = visibility.candidates.space, visibility.targets
     settings, told, asked = space.settings, why or {}, space.settings.least_of_room
-    return Ledger(
+    return CoverageTotals(
         rule=settings.coverage_rule,
         weight=weights_of(targets, settings),
         visible=visibility.visible,

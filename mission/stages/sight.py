@@ -11,7 +11,7 @@ import numpy as np
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import BoolArray, IntArray, frozen
 from stopgo.mission.stages import Route, Targets
-from stopgo.mission.stages.coverage_totals import Ledger, ledger_of
+from stopgo.mission.stages.coverage_totals import CoverageTotals, ledger_of
 from stopgo.mission.stages.figures import Figures, Shares
 
 SAME_PLACE_M = 1e-6
@@ -40,7 +40,7 @@ class Sight:
     digest: str
     """That of the mission."""
     targets: Targets
-    ledger: Ledger
+    ledger: CoverageTotals
     stops: tuple[SeenFrom, ...]
     pointer: IntArray
     first: IntArray

@@ -9,7 +9,7 @@ import numpy as np
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import Route, Visibility, weights_of
-from stopgo.mission.stages.coverage_totals import OUTSIDE, Ledger, ledger_of
+from stopgo.mission.stages.coverage_totals import OUTSIDE, CoverageTotals, ledger_of
 from stopgo.mission.stages.figures import Share, percent
 
 NEARLY = 0.8
@@ -162,14 +162,14 @@ def driven_coverage(route: Route) -> FloatArray:
     return np.asarray(np.cumsum(gained) / max(int(counts.sum()), 1), dtype=np.float64)
 
 
-def _amount(ledger: Ledger, units: IntArray) -> float:
+def _amount(ledger: CoverageTotals, units: IntArray) -> float:
     return float(int(ledger.weight[units].sum()) * ledger.scale)
 
 
 class _Offers:
     """What every candidate would newly see, kept up as candidates are chosen."""
 
-    def __init__(self, visibility: Visibility, ledger: Ledger) -> None:
+    def __init__(self, visibility: Visibility, ledger: CoverageTotals) -> None:
         self._visibility, self._ledger = visibility, ledger
         self._row, segment, self._first, self._last = visibility.runs_apart
         summed = np.concatenate([[0], np.cumsum(np.where(ledger.visible, ledger.weight, 0))])
@@ -229,7 +229,7 @@ def _ranges(low: IntArray, high: IntArray) -> IntArray:
 class _Rooms:
     """What of each room is visible and seen, and what is left of that without some units."""
 
-    def __init__(self, ledger: Ledger, seen: BoolArray) -> None:
+    def __init__(self, ledger: CoverageTotals, seen: BoolArray) -> None:
         self._ledger = ledger
         self._room = ledger.room
         size = len(ledger.rooms) + 1  # the last one is what faces none

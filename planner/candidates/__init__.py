@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from stopgo.mission.console.plugins import variant
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.stages import (
     AT_EDGE,
@@ -91,7 +91,7 @@ def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> C
     at[reason == KEPT] = reach.part_at(xy[reason == KEPT] - origin)
     reason = np.where((reason == KEPT) & (at < 0), UNREACHABLE, reason)
     if part is None and not np.any(at >= 0):
-        raise AnswerIsNo(_no_candidate(space, reason))
+        raise NegativeResult(_no_candidate(space, reason))
     chosen = _chosen_part(space, proposals, reach, at) if part is None else part
     _check_used(space, proposals, at, chosen)
     reason = np.where((reason == KEPT) & (at != chosen), OTHER_PART, reason)
@@ -144,7 +144,7 @@ def _part_of_start(space: NavigableSpace, reach: Reach, held: set[int]) -> int:
             "choose a place clear of walls and floor edges"
         )
     if found not in held:
-        raise AnswerIsNo(f"start = {x:g},{y:g}: no scan position can be reached from there")
+        raise NegativeResult(f"start = {x:g},{y:g}: no scan position can be reached from there")
     return found
 
 

@@ -18,7 +18,7 @@ from msgspec import UNSET
 
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.document.problems import Problem
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import DIGITS, Coverage
 from stopgo.mission.geometry import BoolArray, IntArray, frozen
 from stopgo.mission.stages import Candidates, NavigableSpace, weights_of
@@ -92,7 +92,7 @@ def recount(mission: Mission, space: NavigableSpace) -> Recount:
     by_stop = tuple(_seen_from(stop, space, lines) for stop in mission.stops)
     try:
         could = _could_see(_candidates(mission, space), lines)
-    except (AnswerIsNo, InputError) as error:
+    except (NegativeResult, InputError) as error:
         return Recount(space, by_stop, None, str(error))
     return Recount(space, by_stop, could)
 

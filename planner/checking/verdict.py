@@ -7,7 +7,7 @@ from pathlib import Path
 
 from stopgo.mission.document import Mission
 from stopgo.mission.document.problems import Problem
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import Coverage
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.planner.checking.claims import Recount, overclaims, recount
@@ -41,7 +41,7 @@ def verdict(mission: Mission, path: Path, coverage: Coverage | None) -> Verdict:
     misfits = (*other_machine(mission, settings), *misfits_on(floor, mission, settings))
     try:
         counted = recount(mission, navigable(floor, settings))
-    except AnswerIsNo as error:
+    except NegativeResult as error:
         claims = any(stop.sees.units for stop in mission.stops)
         return Verdict((*misfits, Problem("$.stops", f"see nothing: {error}")) if claims else misfits)
     overclaimed = (*overclaims(mission, counted, coverage), *network_overclaims(mission, counted.space))

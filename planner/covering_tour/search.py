@@ -58,7 +58,7 @@ class _Change:
 
 def shorter_line(times: LineTimes, task: LineTask, line: PointLine) -> PointLine:
     """A line from the same begin to the same end that meets what is asked for, and takes no longer."""
-    search = _Search(times, task, line)
+    search = _TourSearch(times, task, line)
     stops = max(1, len(line) - 2)
     for _ in range(min(STEPS, max(50, LOOKS // stops))):
         if not search.step():
@@ -66,7 +66,7 @@ def shorter_line(times: LineTimes, task: LineTask, line: PointLine) -> PointLine
     return search.best
 
 
-class _Search:
+class _TourSearch:
     def __init__(self, times: LineTimes, task: LineTask, line: PointLine) -> None:
         self._times, self._task = times, task
         self._line = times.turned(line, self._first_free(line))

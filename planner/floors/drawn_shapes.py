@@ -85,14 +85,14 @@ def shapes_of(
 
     Content of a block on layer 0 lies on its insert's layer. A hidden layer counts only if its name is known.
     """
-    walk = _Walk(drawing, source=source, layers=layers or Layers())
+    walk = _OutlineWalk(drawing, source=source, layers=layers or Layers())
     shapes = list(walk.through(drawing.modelspace(), _Placement()))
     return shapes, walk.findings()
 
 
 def ignored_in(drawing: Drawing, *, source: Path, layers: Layers) -> list[tuple[str, LayerReading, int]]:
     """Each layer to ignore with what says so, and how many entities it holds."""
-    walk = _Walk(drawing, source=source, layers=layers)
+    walk = _OutlineWalk(drawing, source=source, layers=layers)
     for _ in walk.through(drawing.modelspace(), _Placement()):
         pass
     return [(layer, reading, count) for (layer, reading), count in sorted(walk.left_out.items(), key=str)]
@@ -102,7 +102,7 @@ _BUILT = frozenset({*ROLES.values(), "openings"})
 """Roles for which a layer that is hidden counts all the same."""
 
 
-class _Walk:
+class _OutlineWalk:
     """One pass over a drawing, with what it met on the way."""
 
     def __init__(self, drawing: Drawing, *, source: Path, layers: Layers) -> None:

@@ -26,7 +26,7 @@ _ROOM = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _ElementPart:
     """An element before it has an id."""
 
     region: Region | None = None
@@ -98,7 +98,7 @@ def _of_kind(kind: str, drawn: Drawn, spaces: _Spaces) -> tuple[list[Element], l
     findings: list[Finding] = []
     parts = [
         *_bodies(kind, closed, spaces),
-        *(_Part(None, (line.points,), line.global_id, line.odd) for line in lines),
+        *(_ElementPart(None, (line.points,), line.global_id, line.odd) for line in lines),
     ]
     elements: list[Element] = []
     for number, part in enumerate(sorted(parts, key=_place_key), start=1):
@@ -141,11 +141,11 @@ def _on_the_floor(drawn: Drawn, spaces: _Spaces) -> tuple[Drawn, list[IgnoredLin
     return replace(drawn, closed=tuple(kept)), frames, findings
 
 
-def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Part]:
+def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_ElementPart]:
     """Solids without their holes; a ring around rooms becomes a line, and what lies in it its own solid."""
     above = parents([shape.region for shape in closed])
     holes = hole_indices(closed, above, partial(_is_hole, kind))
-    parts: list[_Part] = []
+    parts: list[_ElementPart] = []
     for index in (item for item in range(len(closed)) if item not in holes):
         inner = [closed[item] for item in sorted(holes) if above[item] == index]
         body = closed[index].region
@@ -155,7 +155,7 @@ def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Part]
             parts += [_body_or_outline(kind, shape, spaces) for shape in (closed[index], *inner)]
         else:
             odd = tuple(item for shape in (closed[index], *inner) for item in shape.odd)
-            parts.append(_Part(body, (), closed[index].global_id, odd))
+            parts.append(_ElementPart(body, (), closed[index].global_id, odd))
     return parts
 
 
@@ -176,9 +176,9 @@ def _is_hole(kind: str, inner: Closed, outer: Closed) -> bool:
     return kind != "stairs" and against and roomy
 
 
-def _body_or_outline(kind: str, shape: Closed, spaces: _Spaces) -> _Part:
+def _body_or_outline(kind: str, shape: Closed, spaces: _Spaces) -> _ElementPart:
     if not spaces.filled_by(shape.region):
-        return _Part(shape.region, (), shape.global_id, shape.odd)
+        return _ElementPart(shape.region, (), shape.global_id, shape.odd)
     lines = tuple(
         frozen(np.vstack((ring, ring[:1])))
         for polygon in canonical_region(shape.region)
@@ -186,15 +186,15 @@ def _body_or_outline(kind: str, shape: Closed, spaces: _Spaces) -> _Part:
     )
     text = f"its ring around {shape.region.area:.3g} m² of floor is read as a line, not as solid {kind}"
     odd = Oddity("outline_not_solid", text, place(lines[0]))
-    return _Part(None, lines, shape.global_id, (*shape.odd, odd))
+    return _ElementPart(None, lines, shape.global_id, (*shape.odd, odd))
 
 
-def _place_key(part: _Part) -> tuple:
+def _place_key(part: _ElementPart) -> tuple:
     rings = [polygon.exterior.tolist() for polygon in part.solids]
     return (*rings, *(line.tolist() for line in part.lines)), part.global_id or ""
 
 
-def _element(name: str, kind: str, part: _Part) -> Element:
+def _element(name: str, kind: str, part: _ElementPart) -> Element:
     means = KINDS[kind]
     return Element(
         name,

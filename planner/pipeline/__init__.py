@@ -154,12 +154,12 @@ def parts_to_plan(space: NavigableSpace) -> list[Candidates]:
 
 
 def _see_anything(found: Candidates) -> bool:
-    from stopgo.mission.errors import AnswerIsNo
+    from stopgo.mission.errors import NegativeResult
     from stopgo.planner.visibility import visibility
 
     try:
         visibility(found)
-    except AnswerIsNo:
+    except NegativeResult:
         return False
     return True
 

@@ -19,13 +19,13 @@ from msgspec.structs import replace as changed
 from stopgo.mission.comparing.as_driven import AsDriven
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.document.specs import limits_spec_of
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, Polygon, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import KEPT, Candidates, NavigableSpace, Visibility
-from stopgo.mission.stages.coverage_totals import Ledger, ledger_of
+from stopgo.mission.stages.coverage_totals import CoverageTotals, ledger_of
 from stopgo.planner.candidates import candidates
 from stopgo.planner.covering_tour import in_least_time
 from stopgo.planner.floors import options_of, read_floor
@@ -67,7 +67,7 @@ class PlannedFloor:
         parts = reach_of(self.space).part_at(places - local_origin(self.floor))
         counts = Counter(parts[parts >= 0].tolist())
         if not counts:
-            raise AnswerIsNo(f"{self.floor.name}: no stop of the mission is where the robot gets to")
+            raise NegativeResult(f"{self.floor.name}: no stop of the mission is where the robot gets to")
         return int(counts.most_common(1)[0][0])
 
 
@@ -107,7 +107,7 @@ def as_driven(planned: PlannedFloor, places: Places) -> AsDriven:
     )
 
 
-def _seen_by(views: Iterable[IntArray], ledger: Ledger) -> BoolArray:
+def _seen_by(views: Iterable[IntArray], ledger: CoverageTotals) -> BoolArray:
     """Whether enough of the places that see these units see each unit."""
     counted = np.zeros(len(ledger.weight), dtype=np.int64)
     for units in views:

@@ -40,7 +40,7 @@ def measured(
     A point belongs to the nearest unit; how far off it is, is its distance from the face. Where points lie
     far from everything that is drawn, in `least_sweeps` of them or more, there is something unplanned.
     """
-    tally = _Tally(planned.space, tolerance)
+    tally = _SeenTally(planned.space, tolerance)
     for points in sweeps:
         tally.take(points)
     return Measured(
@@ -54,7 +54,7 @@ def measured(
     )
 
 
-class _Tally:
+class _SeenTally:
     """Counts, as sweeps come; all that is kept is as large as the floor."""
 
     def __init__(self, space: NavigableSpace, tolerance: float) -> None:
@@ -102,7 +102,7 @@ class _Tally:
         self.cells[cells[:, 0], cells[:, 1]] += 1
 
 
-def _unplanned(tally: _Tally, space: NavigableSpace, least: int) -> list[Unplanned]:
+def _unplanned(tally: _SeenTally, space: NavigableSpace, least: int) -> list[Unplanned]:
     """Groups of cells that hang together, on floor where nothing is drawn near."""
     cells = np.argwhere(tally.cells >= least)
     if not len(cells):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stopgo.mission.console.plugins import Variant, variant
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.geometry import FloatArray, IntArray, frozen, polyline_length
 from stopgo.mission.stages import Candidates, NavigableSpace, Route, Selection
 from stopgo.planner.geometry.shapes import local_origin
@@ -56,7 +56,7 @@ def route(selection: Selection) -> Route:
     points, ends = points_and_ends(selection)
     ways = legs_between(space, points)
     if not np.isfinite(ways.lengths).all():
-        raise AnswerIsNo(f"{space.floor.name}: the route's end is not connected with its stops")
+        raise NegativeResult(f"{space.floor.name}: the route's end is not connected with its stops")
     sequence, bound, method = _ordered(ways.lengths, ends, router, seed=settings.seed)
     method += "" if settings.graph == "exact" else f", over the ways of --graph {settings.graph}"
     return assembled(selection, points, ways, sequence, ends, bound, method)

@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 from shapely.geometry.base import BaseGeometry
 
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
@@ -59,7 +59,7 @@ def grid_ways(space: NavigableSpace, points: FloatArray) -> Ways:
         if not apart.any():
             return ways
     x, y = points[int(np.argmax(apart.sum(axis=1)))]
-    raise AnswerIsNo(
+    raise NegativeResult(
         f"{space.floor.name}: the grid of {RESOLUTIONS[-1]:g} m does not connect the stop at "
         f"({x:.3f}, {y:.3f}) with the others; --graph exact connects it"
     )

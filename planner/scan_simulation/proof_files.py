@@ -10,7 +10,7 @@ from typing import Any
 from stopgo.mission.document import Mission
 from stopgo.mission.document.limits import scanner_height
 from stopgo.mission.document.problems import problems_of
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import Coverage, read_coverage
 from stopgo.mission.files.mission_json import read
 from stopgo.mission.proof.plan_proof import PlanProof, Simulation
@@ -56,7 +56,7 @@ def prove_file(
     """
     mission = read(path)
     for problem in problems_of(mission)[:1]:
-        raise AnswerIsNo(f"{path}: {problem} (stopgo check {path} lists all)")
+        raise NegativeResult(f"{path}: {problem} (stopgo check {path} lists all)")
     planned = planned_floor(floor, mission)
     simulation = Simulation(range_m=mission.scanner.range, fov_deg=mission.scanner.fov_deg)
     simulation = replace(_as_modelled(simulation, planned), **assumed)

@@ -13,7 +13,7 @@ from msgspec import UNSET
 
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.document.limits import limits_of
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import Coverage
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, frozen
@@ -32,7 +32,7 @@ from stopgo.planner.scan_simulation.casting import SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor, extruded, heights_of
 from stopgo.planner.scan_simulation.joining import joined
 from stopgo.planner.scan_simulation.registering import registered, surface_of
-from stopgo.planner.scan_simulation.scanning import ScanCount, Stand, scanned, stand_of
+from stopgo.planner.scan_simulation.scanning import ScanCount, ScannerPose, scanned, stand_of
 from stopgo.planner.scan_simulation.strips import Strips, strips_of
 
 SPACINGS_MM = (2, 5, 10, 20, 50)
@@ -76,11 +76,11 @@ def prove(
     for library in ("embreex", "small_gicp", *(() if simulation.poses else ("kiss_matcher",))):
         import_module(library)  # whatever is missing is told before anything is done
     if not mission.stops:
-        raise AnswerIsNo(f"{mission.name}: has no stops; there is nothing to prove")
+        raise NegativeResult(f"{mission.name}: has no stops; there is nothing to prove")
     doors = _closed_doors(space)
     solids = extruded(space.floor, doors, simulation.ceiling_m)
     strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
-    tally = _Tally(strips, AskedPoints.of(space.settings, strips), simulation)
+    tally = _PointTally(strips, AskedPoints.of(space.settings, strips), simulation)
     stands = [
         replace(
             stand_of(stop, origin=solids.origin, height=simulation.height_m, number=index),
@@ -142,14 +142,14 @@ def _own_door(stop: Stop, doors: list[FloatArray]) -> int:
     return nearest if away[nearest] <= IN_DOORWAY_M else NONE
 
 
-def _drawn(stand: Stand, scan: ScanCount, most: int, ceiling: float, origin: FloatArray) -> FloatArray:
+def _drawn(stand: ScannerPose, scan: ScanCount, most: int, ceiling: float, origin: FloatArray) -> FloatArray:
     """A scan's points, thinned evenly to about `most`; without the ceiling, that hides the rooms."""
     every = max(1, -(-len(scan.cloud) // max(1, most)))
     points = scan.cloud[::every] + stand.place + np.append(origin, 0.0)
     return frozen(points[points[:, 2] < ceiling - BELOW_M])
 
 
-class _Tally:
+class _PointTally:
     """What all scans came to, cell by cell."""
 
     def __init__(self, strips: Strips, asked: AskedPoints, simulation: Simulation) -> None:
@@ -297,7 +297,7 @@ class _Promise:
         return PromisedShare(name, amount(promised), kept, beyond, coverage, required)
 
 
-def _sighted(space: NavigableSpace, solids: ExtrudedFloor, stand: Stand, ceiling: float) -> BoolArray:
+def _sighted(space: NavigableSpace, solids: ExtrudedFloor, stand: ScannerPose, ceiling: float) -> BoolArray:
     """Whether a stop has each unit's midpoint in sight, at its own height or the nearest to it (units,)."""
     targets, elements = space.targets, space.floor.elements
     spans = np.array([heights_of(item, ceiling) for item in elements]).reshape(-1, 2)
@@ -330,7 +330,7 @@ def _as_asked(space: NavigableSpace, points: FloatArray, along: FloatArray) -> B
     return good
 
 
-def _in_view(space: NavigableSpace, stand: Stand, points: FloatArray) -> BoolArray:
+def _in_view(space: NavigableSpace, stand: ScannerPose, points: FloatArray) -> BoolArray:
     """Whether points, told from the scanner, lie within its field of view."""
     aside = np.arctan2(points[:, 1], points[:, 0]) - stand.heading
     turned = np.abs(np.remainder(aside + np.pi, 2 * np.pi) - np.pi)

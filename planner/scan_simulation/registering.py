@@ -44,7 +44,7 @@ GLOBAL_VOXEL_M = 0.15
 
 
 @dataclass(frozen=True, eq=False)
-class Surface6:
+class OrientedCloud:
     """A thinned cloud with the directions in which its surfaces face, from its scanner."""
 
     points: FloatArray
@@ -60,7 +60,7 @@ class Surface6:
     def upright(self) -> BoolArray:
         return frozen(np.abs(self.normals[:, 2]) < UPRIGHT, np.bool_)
 
-    def near(self, other: Surface6, there: FloatArray, within: float) -> BoolArray:
+    def near(self, other: OrientedCloud, there: FloatArray, within: float) -> BoolArray:
         """Which points of `other`, placed here by `there` (4, 4), lie on surfaces of this one."""
         distance, _ = self.tree.query(other._both(there), distance_upper_bound=within)
         found: BoolArray = np.isfinite(distance)
@@ -71,18 +71,18 @@ class Surface6:
         return np.hstack([self.points @ turn + there[:3, 3], TURNED_M * self.normals @ turn])
 
 
-def surface_of(cloud: FloatArray) -> Surface6:
+def surface_of(cloud: FloatArray) -> OrientedCloud:
     """A scan's cloud (n, 3), thinned, with its normals."""
     import small_gicp
 
     if len(cloud) <= NEIGHBOURS:
-        return Surface6(frozen(np.empty((0, 3))), frozen(np.empty((0, 3))))
+        return OrientedCloud(frozen(np.empty((0, 3))), frozen(np.empty((0, 3))))
     thin, _ = small_gicp.preprocess_points(
         cloud, downsampling_resolution=VOXEL_M, num_neighbors=NEIGHBOURS, num_threads=1
     )
     points, normals = thin.points()[:, :3], thin.normals()[:, :3]
     towards = -np.sign(np.einsum("ij,ij->i", points, normals))
-    return Surface6(frozen(points), frozen(normals * towards[:, None]))
+    return OrientedCloud(frozen(points), frozen(normals * towards[:, None]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class Registered:
 
 
 def registered(
-    names: Sequence[str], places: FloatArray, surfaces: Sequence[Surface6], simulation: Simulation
+    names: Sequence[str], places: FloatArray, surfaces: Sequence[OrientedCloud], simulation: Simulation
 ) -> Iterator[Registered]:
     """Every pair of scans that show some of the same surfaces; `places` (n, 3) are where they were taken."""
     for i in range(len(names)):
@@ -111,8 +111,8 @@ def registered(
 class _Two:
     """Two surfaces, and the true pose of the second in the first."""
 
-    one: Surface6
-    other: Surface6
+    one: OrientedCloud
+    other: OrientedCloud
     truth: FloatArray
 
     @cached_property
@@ -124,7 +124,7 @@ class _Two:
     @property
     def meets(self) -> bool:
         """Whether it is worth while to look: a few points tell most pairs that share nothing."""
-        few = Surface6(self.other.points[::FEW], self.other.normals[::FEW])
+        few = OrientedCloud(self.other.points[::FEW], self.other.normals[::FEW])
         return bool((self.one.near(few, self.truth, SAME_M) & few.upright).any())
 
     @property
@@ -208,7 +208,9 @@ def _without_pose(one: FloatArray, other: FloatArray, *, turn: float) -> FloatAr
     return there @ away
 
 
-def _shared(one: Surface6, other: Surface6, there: FloatArray, within: float) -> tuple[BoolArray, BoolArray]:
+def _shared(
+    one: OrientedCloud, other: OrientedCloud, there: FloatArray, within: float
+) -> tuple[BoolArray, BoolArray]:
     """Which points of each lie on surfaces of the other, that is at `there` in the first."""
     return other.near(one, frozen(np.linalg.inv(there)), within), one.near(other, there, within)
 

@@ -21,7 +21,7 @@ SPARSE_M = 0.03
 
 
 @dataclass(frozen=True, eq=False)
-class Stand:
+class ScannerPose:
     """Where a scanner stands, in metres from the solids' origin."""
 
     place: FloatArray
@@ -50,7 +50,7 @@ class ScanCount:
     """Some of all points, from the scanner, with noise (n, 3)."""
 
 
-def scanned(solids: ExtrudedFloor, strips: Strips, stand: Stand, simulation: Simulation) -> ScanCount:
+def scanned(solids: ExtrudedFloor, strips: Strips, stand: ScannerPose, simulation: Simulation) -> ScanCount:
     """One scan, block by block; the same seed gives the same noise."""
     random = np.random.default_rng([simulation.seed, stand.number])
     scene = SolidScene(solids, stand.place, see_through=False, open_door=stand.open_door)
@@ -234,6 +234,6 @@ def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
     return found
 
 
-def stand_of(stop: Stop, *, origin: FloatArray, height: float, number: int) -> Stand:
+def stand_of(stop: Stop, *, origin: FloatArray, height: float, number: int) -> ScannerPose:
     """A stop as the stand of a scanner."""
-    return Stand(frozen([stop.x - origin[0], stop.y - origin[1], height]), stop.heading, number=number)
+    return ScannerPose(frozen([stop.x - origin[0], stop.y - origin[1], height]), stop.heading, number=number)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from stopgo.mission.console.plugins import Variant, variant
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
@@ -209,7 +209,7 @@ def _selection(
     steps = coverage_steps(whole, chosen)
     if whole.missing(whole.covered_by(chosen))[0] > 0:
         name, reached = visibility.candidates.space.floor.name, steps[-1] if len(steps) else 0.0
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"{name}: coverage {reached:.3f} is reached, not {settings.coverage:g}; "
             "lower --coverage or offer more candidates"
         )

@@ -34,7 +34,7 @@ def grounds_of(cover: Cover, pieces: list[IntArray]) -> list[IntArray]:
 
 
 @dataclass(frozen=True, eq=False)
-class Parting:
+class NodeSeparator:
     """Rows of a ground that part it in two: a way from one side to the other leads over them."""
 
     between: IntArray
@@ -104,7 +104,7 @@ def conditions_between(
 
 def _partings(
     links: csr_array, grounds: list[IntArray], rows: IntArray
-) -> Iterator[tuple[Parting, IntArray, IntArray]]:
+) -> Iterator[tuple[NodeSeparator, IntArray, IntArray]]:
     """What parts each piece of a ground from regions that hold others: with the piece, and those others."""
     for k, ground in enumerate(grounds):
         elsewhere = np.concatenate([np.empty(0, np.int64), *grounds[:k], *grounds[k + 1 :]])
@@ -115,7 +115,7 @@ def _partings(
                 if np.intersect1d(region, others).size:
                     between = neighbours(links, region)
                     here = np.setdiff1d(ground, np.union1d(region, between))
-                    yield Parting(between, here, region, elsewhere), piece, others
+                    yield NodeSeparator(between, here, region, elsewhere), piece, others
 
 
 def neighbours(links: csr_array, rows: IntArray) -> IntArray:

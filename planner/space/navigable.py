@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.frames.geodesy import out_of_reach
 from stopgo.mission.geometry import FloatArray, frozen
@@ -31,7 +31,9 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
     occluders = occluders_of(floor, closed)
     targets = targets_of(floor, occluders, d_dis=settings.d_dis)
     if targets.total == 0:
-        raise AnswerIsNo(f"{floor.name}: no target on the floor; elements: {_kinds(floor)} (see --targets)")
+        raise NegativeResult(
+            f"{floor.name}: no target on the floor; elements: {_kinds(floor)} (see --targets)"
+        )
     rooms = room_spaces(floor, ground, drive_area, settings)
     return NavigableSpace(
         floor=floor,

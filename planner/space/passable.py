@@ -38,7 +38,7 @@ def opening_states(
     parts = parts_of(drive_area, gaps)
 
     @cache
-    def led_into(room: int | None) -> LedInto:
+    def led_into(room: int | None) -> OpeningSide:
         return _led_into(room, parts, ground)
 
     states, findings = [], []
@@ -60,7 +60,7 @@ def _opening_finding(crossing: Crossing, why: str, ground: Ground) -> Finding:
 
 
 @dataclass(frozen=True)
-class LedInto:
+class OpeningSide:
     """What lies on one side of an opening."""
 
     shape: BaseGeometry
@@ -68,7 +68,7 @@ class LedInto:
     """Parts that make up a good share of where the robot may drive there."""
 
 
-def _led_into(room: int | None, parts: Parts, ground: Ground) -> LedInto:
+def _led_into(room: int | None, parts: Parts, ground: Ground) -> OpeningSide:
     """A room, or for None the floor outside every room."""
     if room is None:
         rooms = [to_shape(item.polygons, ground.origin) for item in ground.floor.rooms]
@@ -77,11 +77,11 @@ def _led_into(room: int | None, parts: Parts, ground: Ground) -> LedInto:
         shape = to_shape(ground.floor.rooms[room].polygons, ground.origin)
     free = parts.area_by_part(shape)
     enough = min(REACHED_AREA, REACHED_SHARE * sum(free.values()))
-    return LedInto(shape, frozenset(part for part, area in free.items() if area >= enough and area > 0))
+    return OpeningSide(shape, frozenset(part for part, area in free.items() if area >= enough and area > 0))
 
 
 def _not_reached(
-    crossing: Crossing, parts: Parts, sides: Sequence[LedInto], ground: Ground, settings: Settings
+    crossing: Crossing, parts: Parts, sides: Sequence[OpeningSide], ground: Ground, settings: Settings
 ) -> str:
     """Why the robot does not get from the opening to what lies on both sides; empty if it does."""
     here = parts.touching(crossing.clear)
@@ -91,7 +91,7 @@ def _not_reached(
 
 
 def _narrowest(
-    crossing: Crossing, parts: Parts, sides: Sequence[LedInto], ground: Ground, settings: Settings
+    crossing: Crossing, parts: Parts, sides: Sequence[OpeningSide], ground: Ground, settings: Settings
 ) -> str:
     """The place near an opening that is widest among those a robot must pass, in words."""
     window = shapely.Point(middle_and_normal(crossing.clear)[0]).buffer(NEAR_OPENING)
@@ -112,7 +112,7 @@ def _narrowest(
     return f"{gap.width:.3f} m between {names} near it, the robot needs {need:.3f} m"
 
 
-def _cells_of(parts: Parts, side: LedInto, window: BaseGeometry) -> NDArray[np.object_]:
+def _cells_of(parts: Parts, side: OpeningSide, window: BaseGeometry) -> NDArray[np.object_]:
     """Where the robot drives on one side near an opening, leaving out pockets it cannot get to."""
     near = parts.tree.query(side.shape.intersection(window), predicate="intersects")
     return parts.cells[near[np.isin(parts.cell_part[near], sorted(side.main))]]

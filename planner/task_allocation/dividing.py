@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from stopgo.mission.document.schedule import schedule
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.geometry import IntArray, frozen, polyline_length
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Route, Selection
@@ -158,7 +158,7 @@ def _check_reach(clock: TourTimes, route: Route, key: str, limit_s: float) -> No
         needed = clock.seconds((stop,))
         if needed > limit_s - SPARE_S:
             x, y = route.selection.xy[stop]
-            raise AnswerIsNo(
+            raise NegativeResult(
                 f"{key} = {limit_s:g} s: stop {number} of the route, at ({x:.2f}, {y:.2f}), takes "
                 f"{math.ceil(needed)} s there and back alone; give more time, or a start nearer to it"
             )

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from stopgo.mission.console.plugins import Variant, variant
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.geometry import frozen
 from stopgo.mission.stages import Candidates, Visibility
 from stopgo.planner.visibility.bresenham import bresenham
@@ -32,7 +32,7 @@ def visibility(candidates: Candidates) -> Visibility:
     method = variant("visibility", settings.visibility, METHODS)
     found = _sound(method, method.called(candidates), candidates)
     if not len(found.first):
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"{candidates.space.floor.name}: no target is within {settings.range:g} m of a candidate "
             "and in its sight; raise --range or lower --grid"
         )

@@ -10,7 +10,7 @@ import numpy as np
 
 from stopgo.mission.document.limits import ViewLimits, limits_in_words, limits_of
 from stopgo.mission.document.specs import limits_spec_of
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.geometry import frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Visibility
@@ -33,7 +33,9 @@ def within_limits(in_sight: Visibility) -> Visibility:
     seen = _clipped(in_sight, limits)
     if not len(seen.first):
         name = in_sight.candidates.space.floor.name
-        raise AnswerIsNo(f"{name}: nothing in sight is seen well enough: {_why_nothing(in_sight, settings)}")
+        raise NegativeResult(
+            f"{name}: nothing in sight is seen well enough: {_why_nothing(in_sight, settings)}"
+        )
     return seen
 
 

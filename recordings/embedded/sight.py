@@ -10,7 +10,7 @@ import rerun as rr
 from stopgo.mission.errors import InputError
 from stopgo.mission.geometry import IntArray, frozen
 from stopgo.mission.stages import Targets
-from stopgo.mission.stages.coverage_totals import Group, Ledger, Seen
+from stopgo.mission.stages.coverage_totals import CoverageTotals, Group, Seen
 from stopgo.mission.stages.sight import SeenFrom, Sight
 from stopgo.recordings.drawing import entities
 from stopgo.recordings.drawing.canvas import Canvas
@@ -124,12 +124,12 @@ def _within(first: IntArray, last: IntArray, total: int) -> bool:
     return bool(np.all(first >= 0) and np.all(first <= last) and np.all(last < total))
 
 
-def _ledger(row: Cells, targets: Targets, rule: str) -> Ledger:
+def _ledger(row: Cells, targets: Targets, rule: str) -> CoverageTotals:
     total = targets.total
     change = np.asarray(row["change"], dtype=np.int64)
     counts = np.diff(np.concatenate([change, [total]]))
     rooms = zip(row["room_names"], row["room_shares"], row["room_why"], strict=True)
-    return Ledger(
+    return CoverageTotals(
         rule="paper" if rule == "paper" else "length",
         weight=frozen(np.asarray(row["weight"])[targets.unit_segment], np.int64),
         visible=frozen(np.repeat(row["visible"], counts), np.bool_),

@@ -47,7 +47,7 @@ def read_ros(path: Path, reading: Reading) -> FieldLog:
 
 
 def _gathered(path: Path, bag: Bag, reading: Reading) -> FieldLog:
-    sorter = _Sorter(bag, reading)
+    sorter = _TopicSorter(bag, reading)
     wanted = [topic for topic in bag.topics if topic.count is None or sorter.wants(topic)]
     total = sum(topic.count or 0 for topic in wanted)
     for number, message in enumerate(bag.messages(wanted)):
@@ -90,7 +90,7 @@ def _channels(counts: dict[Topic, int]) -> tuple[Channel, ...]:
 
 
 @dataclass
-class _Sorter:
+class _TopicSorter:
     """Takes messages one after another, each to what it tells of."""
 
     bag: Bag

@@ -66,7 +66,7 @@ class _Loss:
         return "; ".join([self.why, *self.lines])
 
 
-class _Part(NamedTuple):
+class _FoundChunk(NamedTuple):
     """How one kind of file is read: its records, each a connection or a message."""
 
     ros2: bool
@@ -109,13 +109,13 @@ def _shifted(record: BagConnection | Raw, by: int) -> BagConnection | Raw:
     return (record[0] + by, *record[1:])
 
 
-def _part(path: Path) -> _Part:
+def _part(path: Path) -> _FoundChunk:
     with path.open("rb") as file:
         begin = file.read(16)
     kinds = {
-        BAG_MAGIC: _Part(ros2=False, records=_bag_records),
-        MCAP_MAGIC: _Part(ros2=True, records=_mcap_records),
-        SQLITE_MAGIC: _Part(ros2=True, records=_db3_records),
+        BAG_MAGIC: _FoundChunk(ros2=False, records=_bag_records),
+        MCAP_MAGIC: _FoundChunk(ros2=True, records=_mcap_records),
+        SQLITE_MAGIC: _FoundChunk(ros2=True, records=_db3_records),
     }
     for magic, part in kinds.items():
         if begin.startswith(magic):

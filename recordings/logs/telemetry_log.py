@@ -83,8 +83,8 @@ def read_telemetry_log(path: Path, reading: Reading) -> FieldLog:
     InputError
         When no packet in it can be read.
     """
-    walk = _Walk(path, reading)
-    sorter = _Sorter()
+    walk = _FrameScan(path, reading)
+    sorter = _VehicleSorter()
     for packet in walk.packets():
         sorter.take(packet)
     if not sorter.counts:
@@ -110,7 +110,7 @@ def read_telemetry_log(path: Path, reading: Reading) -> FieldLog:
 def messages_of(path: Path) -> Iterator[Heard]:
     """The messages of TOLD, once more, for whoever follows the vehicle's run by them."""
     decoder = _Decoder()
-    for packet in _Walk(path, Reading()).packets():
+    for packet in _FrameScan(path, Reading()).packets():
         message = decoder.message(packet)
         if message is not None:
             yield Heard(packet.ns, packet.system, message)
@@ -132,7 +132,7 @@ class _Decoder:
             return None
 
 
-class _Walk:
+class _FrameScan:
     """Goes through a file from packet to packet."""
 
     def __init__(self, path: Path, reading: Reading) -> None:
@@ -217,7 +217,7 @@ MISSION_TYPE = 0
 
 
 @dataclass
-class _Sorter:
+class _VehicleSorter:
     """Takes packets one after another, each to what it tells of."""
 
     counts: Counter[tuple[int, int]] = field(default_factory=Counter)

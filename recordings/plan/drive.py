@@ -31,7 +31,7 @@ class Drive:
 
 def planned_drive(mission: Mission) -> Drive:
     """The drive that `schedule` times: turn in place, straight on, settle, scan."""
-    walk = _Walk(mission)
+    walk = _DriveTimer(mission)
     leaving = []
     for stop in mission.stops:
         walk.along(stop.approach)
@@ -43,7 +43,7 @@ def planned_drive(mission: Mission) -> Drive:
     return Drive(table[:, 0], table[:, 1:], np.array(leaving))
 
 
-class _Walk:
+class _DriveTimer:
     """A robot going through a plan, writing down a pose whenever it has moved."""
 
     def __init__(self, mission: Mission) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.geometry import FloatArray
 from stopgo.recordings.replay.matching import matched, reaches
 from stopgo.recordings.replay.standstills import Standing
@@ -64,21 +64,21 @@ def fitted(halts: Sequence[Standing], mission: Mission) -> Fit:
     stops = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)
     places = np.array([halt.xy for halt in halts]).reshape(-1, 2)
     if min(len(stops), len(places)) < LEAST_PAIRS:
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"--align stops: {len(places)} halts and {len(stops)} stops are too few to tell how they belong "
             f"together ({LEAST_PAIRS} are needed); give --map X,Y,HEADING or --align first"
         )
     tried = [_refined(guess, halts, mission) for guess in _promising(places, stops, mission)]
     found = sorted((item for item in tried if item is not None), key=lambda item: -item[0])
     if not found or found[0][1].pairs < LEAST_PAIRS:
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"--align stops: no placing brings {LEAST_PAIRS} of the {len(places)} halts onto stops in the "
             "mission's order; is it this mission's log? else give --map X,Y,HEADING"
         )
     score, best = found[0]
     for other_score, other in found[1:]:
         if other_score > RIVAL * score and _apart(best, other, places) > APART_M:
-            raise AnswerIsNo(
+            raise NegativeResult(
                 f"--align stops: {best.pairs} halts fit the stops in one way and {other.pairs} in quite "
                 "another, and nothing tells which is right; give --map X,Y,HEADING or --align first"
             )

@@ -22,7 +22,7 @@ from stopgo.bridge.console import say
 from stopgo.mission.errors import InputError
 
 if TYPE_CHECKING:
-    from stopgo.mission.comparing.run_collector import HeardRun, RunTaker
+    from stopgo.mission.comparing.run_collector import RunCollector, RunSink
     from stopgo.recordings.embedded.reading import Recording
 
 
@@ -42,21 +42,21 @@ def add_commands(app: typer.Typer) -> None:
 
 
 @contextmanager
-def recording(path: Path | None, plan: Path | None, *, view: bool) -> Iterator[HeardRun]:
+def recording(path: Path | None, plan: Path | None, *, view: bool) -> Iterator[RunCollector]:
     """What hears a run: records it at `path`, looked at if wanted, and compares it with the plan.
 
     Nothing of Rerun is loaded without a recording and a plan.
     """
-    from stopgo.mission.comparing.run_collector import HeardRun
+    from stopgo.mission.comparing.run_collector import RunCollector
 
     if path is None and view:
         raise InputError("--view shows what is recorded: say where, with --rrd FIELD.rrd")
     known = None if plan is None else plan_recording(plan)
     with nullcontext() if path is None else _field(path, known, view=view) as record:
-        yield HeardRun(record, () if known is None else known.sights)
+        yield RunCollector(record, () if known is None else known.sights)
 
 
-def _field(path: Path, plan: Recording | None, *, view: bool) -> AbstractContextManager[RunTaker]:
+def _field(path: Path, plan: Recording | None, *, view: bool) -> AbstractContextManager[RunSink]:
     from stopgo.recordings.runs.field import FieldRecording
 
     record = FieldRecording(path, plan=plan, say=say)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from stopgo.commands.align_command import align
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 
 if TYPE_CHECKING:
     from stopgo.mission.document import Mission
@@ -48,7 +48,7 @@ def show(mission: MissionFile, as_json: AsJson = False) -> None:
 
     document = read(mission)
     for problem in problems_of(document)[:1]:
-        raise AnswerIsNo(f"{mission}: {problem} (stopgo check {mission} lists all)")
+        raise NegativeResult(f"{mission}: {problem} (stopgo check {mission} lists all)")
     times = schedule(document)
     typer.echo(json_text(report(document, times)) if as_json else page(document, times))
 
@@ -90,7 +90,7 @@ def check(
     if found.told is not None and not as_json:
         typer.echo(f"coverage {found.told}")
     if found.problems:
-        raise AnswerIsNo(f"{mission}: {len(found.problems)} problem{'s' * (len(found.problems) > 1)}")
+        raise NegativeResult(f"{mission}: {len(found.problems)} problem{'s' * (len(found.problems) > 1)}")
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ def export(
     document = read(mission)
     there = placed(document, origin=origin, to_map=map_)
     for problem in problems_of(there)[:1]:
-        raise AnswerIsNo(f"{mission}: {problem} (stopgo check {mission} lists all)")
+        raise NegativeResult(f"{mission}: {problem} (stopgo check {mission} lists all)")
     name = format_named(to, out)
     writing = {"autopilot": autopilot, "trigger": trigger, "scan-wait": scan_wait, "settle": settle}
     drawn = {"floor": floor, "coverage": coverage}

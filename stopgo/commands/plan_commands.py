@@ -21,7 +21,7 @@ from stopgo.mission.errors import InputError, OutcomeUnknown, StopgoError
 if TYPE_CHECKING:
     from stopgo.bridge.station.station import Station
     from stopgo.mission.comparing.comparison import Comparison
-    from stopgo.mission.comparing.run_collector import HeardRun
+    from stopgo.mission.comparing.run_collector import RunCollector
     from stopgo.mission.document import Mission
     from stopgo.mission.floor import FloorPlan
     from stopgo.mission.plan import PartPlan, Plan
@@ -471,10 +471,10 @@ def demo_command(
     return _say_demo(compared, ended, out)
 
 
-def _follow(station: Station, report: PlanReport, path: Path) -> tuple[HeardRun, str]:
+def _follow(station: Station, report: PlanReport, path: Path) -> tuple[RunCollector, str]:
     """Record the run to its end; what was told of it, and the state it ended in."""
     from stopgo.bridge.station.watch import watch_run
-    from stopgo.mission.comparing.run_collector import HeardRun
+    from stopgo.mission.comparing.run_collector import RunCollector
     from stopgo.mission.stages.sight import sight_of
     from stopgo.recordings.embedded.reading import read_recording
     from stopgo.recordings.runs.field import FieldRecording
@@ -483,7 +483,7 @@ def _follow(station: Station, report: PlanReport, path: Path) -> tuple[HeardRun,
     with FieldRecording(
         path, report.mission, plan=plan, say=lambda line: typer.echo(line, err=True)
     ) as record:
-        heard = HeardRun(record, [sight_of(report.part.route, report.mission, report.figures)])
+        heard = RunCollector(record, [sight_of(report.part.route, report.mission, report.figures)])
         heard.mission(report.mission)
         last = watch_run(station, heard, say=lambda line: typer.echo(f"  {line}", err=True))
     return heard, last.state

@@ -132,7 +132,7 @@ class Field:
         return Commit(manifest=manifest, commander="test", nonce="n1", not_after_ns=not_after_ns)
 
     def order(self, verb: Verb, **details: Any) -> Answer:
-        return self.controller.obey(self.command(verb, **details))
+        return self.controller.execute(self.command(verb, **details))
 
     def command(self, verb: Verb, **details: Any) -> Order:
         given = {"cmd_id": f"c{next(self.ids)}", "commander": "test", "valid_for_s": 5.0} | details

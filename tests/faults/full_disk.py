@@ -13,7 +13,7 @@ from stopgo.bridge.commands.spawn import robot_process
 from stopgo.bridge.robot.journal import open_journal
 from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from tests.bridge.world import Field, corridor
 
 LAST_NET_S = 60.0
@@ -43,7 +43,7 @@ def in_simulated_time(folder: Path) -> None:
         refused = {answer.verb for answer in answers if answer.reason == "storage"}
         print(*sorted(refused), field.base.speed())
         ballast.unlink()
-        field.controller.hear_of_link(0.0)
+        field.controller.on_link_silence(0.0)
         field.order("resume" if field.controller.run.state == "PAUSED" else "retry")
         field.work()
         print(field.controller.run.state)
@@ -89,7 +89,7 @@ def go_on(station: Station, ballast: Path) -> None:
 
     try:
         station.command("resume")
-    except AnswerIsNo as no:
+    except NegativeResult as no:
         assert no.reason == "storage"
     until(drives)
 

@@ -29,7 +29,7 @@ from stopgo.bridge.robot.robot_hardware import pose_of
 from stopgo.bridge.robot.simulator import SimulatedBase, SimulatedScanner
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.run.events import AnyEvent, Finished, PoseReport, Scanned, StateReport
 from stopgo.mission.run.lease import lasting_ns
 from stopgo.mission.run.orders import Answer, Verb
@@ -80,7 +80,7 @@ def test_a_date_that_is_set_forward_at_both_ends_during_a_run_moves_nothing(
             if isinstance(report, Scanned) and report.stop == "s1":
                 set_forward(monkeypatch, seconds)
                 alice.command("pause")
-                with pytest.raises(AnswerIsNo, match="not_the_commander"):
+                with pytest.raises(NegativeResult, match="not_the_commander"):
                     bob.command("resume")
                 assert alice.command("resume").outcome == "ok"
     assert fence is not None
@@ -140,13 +140,13 @@ def test_what_was_meant_for_an_earlier_date_comes_to_nothing() -> None:
     station = field.station()
     station.push(corridor())
     start, skip = field.command("start"), field.command("skip")
-    assert field.controller.obey(start).outcome == "ok"
+    assert field.controller.execute(start).outcome == "ok"
     old = field.commit(manifest_of(corridor(stops=2, revision=2), b""))
     field.base.stop()
     field.clock.jump(YEAR)
     field.boot()
-    assert field.controller.obey(start).outcome == "ok"
-    assert field.controller.obey(skip).reason == "expired"
+    assert field.controller.execute(start).outcome == "ok"
+    assert field.controller.execute(skip).reason == "expired"
     late = field.controller.take(old, corridor(stops=2, revision=2))
     assert isinstance(late, Rejected)
     assert late.reason == "expired"
@@ -184,7 +184,7 @@ def test_a_robot_whose_date_is_beyond_a_certificates_end_obeys_it_no_more_and_ru
     station.push(corridor())
     assert station.command("start").outcome == "ok"
     date += timedelta(days=91)
-    with pytest.raises(AnswerIsNo, match="untrusted: the certificate of alice ends"):
+    with pytest.raises(NegativeResult, match="untrusted: the certificate of alice ends"):
         station.command("pause")
     field.work()
     assert field.controller.run.state == "FINISHED"

@@ -90,7 +90,7 @@ class Trial:
 
     def order(self, verb: Verb) -> Answer:
         command: Order = self.field.command(verb)
-        return self.insist(lambda: self.field.controller.obey(command))
+        return self.insist(lambda: self.field.controller.execute(command))
 
     def finish(self) -> None:
         while self.field.controller.run.state != "FINISHED":

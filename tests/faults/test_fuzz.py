@@ -119,7 +119,7 @@ def test_no_payload_on_any_key_brings_the_robot_down() -> None:
 
     fuzz()
     assert station.push(MISSION).already
-    assert field.controller.obey(field.command("pause")).cmd_id
+    assert field.controller.execute(field.command("pause")).cmd_id
 
 
 def test_a_command_on_the_key_of_another_verb_is_malformed() -> None:

@@ -16,7 +16,7 @@ import pytest
 from stopgo.bridge.mavlink.simulated.vehicle_scanner import ScanEnd, VehicleScanner
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.events import Pose, PoseReport, Scanned, StateReport
 from stopgo.mission.run.route_position import foot
 from tests.bridge.mavlink.driving.world import (
@@ -150,7 +150,7 @@ def go_on(site: Site, state: str) -> None:
     try:
         site.operator.hold()
         site.station.command("retry" if state == "HELD" else "resume")
-    except AnswerIsNo:
+    except NegativeResult:
         return
 
 

@@ -29,7 +29,7 @@ from stopgo.bridge.link.protocol import encode
 from stopgo.bridge.robot.journal import open_journal
 from stopgo.bridge.station.station import Station, connect
 from stopgo.mission.document import Mission, Scan
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.run.events import Finished, Paused, RevisionTaken, RevisionWaits, Scanned, Started
 from stopgo.mission.run.orders import Order
 from tests.bridge.world import corridor
@@ -137,7 +137,7 @@ def give(station: Station, order: Order, outcome: Outcome) -> bool:
         try:
             stubbornly(lambda: station.give(order), outcome)
             carried_out.append(True)
-        except AnswerIsNo:
+        except NegativeResult:
             carried_out.append(False)
     assert carried_out[0] == carried_out[1], "a repeated order was answered differently"
     return carried_out[0]

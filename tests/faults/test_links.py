@@ -15,7 +15,7 @@ from stopgo.bridge.commands.spawn import end_robot, start_robot
 from stopgo.bridge.link.protocol import KeyExpressions, encode
 from stopgo.bridge.station.follow import Report
 from stopgo.bridge.station.station import Station, connect
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.run.events import Finished, PoseReport, Scanned, StateReport
 from tests.bridge.proxy import Proxy
 from tests.bridge.world import corridor
@@ -112,7 +112,7 @@ def test_an_order_into_a_blackhole_is_unknown_and_comes_to_nothing_when_it_is_la
         with_answer = None
         try:
             with_answer = station.give(start)
-        except AnswerIsNo as refused:
+        except NegativeResult as refused:
             assert "expired" in str(refused)
         # Either it had arrived in time and ran once, or it never will.
         states = {station.status().run_id for _ in range(3)}
@@ -137,7 +137,7 @@ def test_of_two_stations_at_once_one_commands(tmp_path: Path) -> None:
             with connect(proxy.endpoint, robot="r1", commander=who) as mine:
                 try:
                     outcomes[who] = mine.command("start").outcome
-                except AnswerIsNo as refused:
+                except NegativeResult as refused:
                     outcomes[who] = str(refused)
 
         threads = [threading.Thread(target=start, args=(who,)) for who in ("alice", "bob")]

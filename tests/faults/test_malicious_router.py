@@ -21,7 +21,7 @@ from stopgo.bridge.link.memory_link import SealedMessage
 from stopgo.bridge.link.protocol import encode
 from stopgo.bridge.link.seals import OLDEST_S
 from stopgo.bridge.station import station as stations
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.run.decision import STATES
 from stopgo.mission.run.events import Scanned, Started, StateReport
 from stopgo.mission.run.orders import FREE_VERBS, Answer, Order, Verb
@@ -192,7 +192,7 @@ class Trial:
             bound = order is not None and verb not in FREE_VERBS
             if bound and self.field.journal.answer(order.cmd_id) is None:
                 self.given_up.append(order.cmd_id)
-        except AnswerIsNo:
+        except NegativeResult:
             self.outcomes["refused"] += 1
         self.malice.withholds = ""
 
@@ -200,7 +200,7 @@ class Trial:
         before = self.state()
         try:
             state = self.station.status()
-        except (OutcomeUnknown, AnswerIsNo):
+        except (OutcomeUnknown, NegativeResult):
             self.outcomes["no state"] += 1
             return
         assert state.boot_id == before.boot_id
@@ -210,7 +210,7 @@ class Trial:
     def push(self) -> None:
         try:
             self.station.push(corridor())
-        except (OutcomeUnknown, AnswerIsNo):
+        except (OutcomeUnknown, NegativeResult):
             self.outcomes["push failed"] += 1
         else:
             assert self.field.controller.run.mission_id == corridor().id

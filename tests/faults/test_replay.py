@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.recordings.replay.fitting import fitted
 from stopgo.recordings.replay.matching import Match, long_enough, matched
 from stopgo.recordings.replay.standstills import standings
@@ -102,7 +102,7 @@ def test_a_fit_to_the_stops_is_right_or_refused() -> None:
         halts = standings(logged(run.drive, senses, seed), speed=1.0)
         try:
             fit = fitted(halts, run.mission)
-        except AnswerIsNo:
+        except NegativeResult:
             total["refused"] += 1
             continue
         truth = np.array([(halt.x, halt.y) for halt in run.drive.halts if halt.stop is not None])

@@ -21,7 +21,7 @@ from msgspec.structs import replace
 from stopgo.command_line import main
 from stopgo.mission.comparing.compare import arriving
 from stopgo.mission.comparing.comparison_text import HEADER, comparison_json, comparison_text
-from stopgo.mission.comparing.run_collector import HeardRun
+from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.console.table import duration
 from stopgo.mission.document import Mission, Stop, sealed
 from stopgo.mission.document.schedule import schedule
@@ -145,7 +145,7 @@ def test_review_and_watch_tell_the_truth_of_each_figure(
     _is_true_of_run(story, run)
     _is_true_in_text(story, capsys.readouterr().out)
     _is_true_on_page(story, page.read_text())
-    heard = HeardRun(sights=story.sights)
+    heard = RunCollector(sights=story.sights)
     tell(heard, story.missions, story.witness)
     compared = heard.compared()
     assert compared is not None

@@ -18,7 +18,7 @@ BEYOND = 1.0
 """Metres beyond the range up to which a pair counts as looked at: the others are told at a glance."""
 
 
-class Told(NamedTuple):
+class Observed(NamedTuple):
     """Pairs of place and unit that were looked at, and how many of all pairs were told wrongly."""
 
     pairs: int
@@ -26,7 +26,7 @@ class Told(NamedTuple):
     by_interpreted: int
 
 
-def told(seed: int, *, reach: float, places: int, monkeypatch: pytest.MonkeyPatch) -> Told:
+def told(seed: int, *, reach: float, places: int, monkeypatch: pytest.MonkeyPatch) -> Observed:
     """Let both kernels tell what is seen on one floor, and hold them against exact sight lines."""
     world = long_walls(seed, reach=reach, places=places)
     truth = world.by_force(reach)
@@ -34,7 +34,7 @@ def told(seed: int, *, reach: float, places: int, monkeypatch: pytest.MonkeyPatc
     for above in (-1, math.inf):
         monkeypatch.setattr(stopgo.planner.visibility.sight.sight, "COMPILE_ABOVE", above)
         wrong.append(int((world.by_kernel(reach) != truth).sum()))
-    return Told(_looked_at(world, reach), *wrong)
+    return Observed(_looked_at(world, reach), *wrong)
 
 
 def long_walls(seed: int, *, reach: float, places: int) -> World:

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import AnswerIsNo, InputError, StopgoError
+from stopgo.mission.errors import InputError, NegativeResult, StopgoError
 from stopgo.mission.floor import Element, FloorPlan, Opening
 from stopgo.mission.geometry import Polygon, frozen
 from stopgo.mission.settings import Settings
@@ -210,7 +210,7 @@ def test_a_floor_far_from_its_zero_is_not_placed_on_the_earth() -> None:
 
 
 def test_a_floor_of_half_a_metre_has_no_candidate() -> None:
-    assert "no candidate" in refused(hall(0.5, 0.5), kind=AnswerIsNo)
+    assert "no candidate" in refused(hall(0.5, 0.5), kind=NegativeResult)
 
 
 def test_a_floor_of_half_a_metre_is_planned_for_a_small_robot() -> None:
@@ -223,7 +223,7 @@ def test_a_floor_of_ten_kilometres_is_refused() -> None:
 
 
 def test_a_floor_without_elements_has_no_target() -> None:
-    assert "no target" in refused(floor_of(box(0, 0, 5, 5)), kind=AnswerIsNo)
+    assert "no target" in refused(floor_of(box(0, 0, 5, 5)), kind=NegativeResult)
 
 
 def test_a_floor_without_area_is_refused() -> None:

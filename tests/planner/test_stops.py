@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import Polygon
 from stopgo.mission.settings import Settings
@@ -111,7 +111,7 @@ def test_a_narrow_corridor_gets_a_candidate(width: float, degrees: float) -> Non
 
 
 def test_a_corridor_narrower_than_twice_d_sec_gets_none() -> None:
-    with pytest.raises(AnswerIsNo, match="no candidate"):
+    with pytest.raises(NegativeResult, match="no candidate"):
         kept(hall(6, 1.398))
 
 

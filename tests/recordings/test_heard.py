@@ -8,7 +8,7 @@ import pytest
 
 from stopgo.bridge.commands.watch_commands import tell_compared
 from stopgo.bridge.station.watch import hand_over
-from stopgo.mission.comparing.run_collector import HeardRun
+from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Mission
 from stopgo.mission.run.events import StateReport
 from stopgo.mission.stages.sight import Sight
@@ -20,9 +20,9 @@ from tests.mission.comparing.test_compare import planned
 from tests.recordings import run
 
 
-def heard_run(mission: Mission, *sights: Sight, skips: str | None = None) -> tuple[HeardRun, StateReport]:
+def heard_run(mission: Mission, *sights: Sight, skips: str | None = None) -> tuple[RunCollector, StateReport]:
     """A run that was heard to its end, and its last state."""
-    heard = HeardRun(None, sights)
+    heard = RunCollector(None, sights)
     heard.mission(mission)
     reports = list(run.reports(mission) if skips is None else run.reports_with_a_skip(mission, skips))
     for report in reports:

@@ -11,7 +11,7 @@ from stopgo.bridge.mavlink.auto.confirmed_commands import ConfirmedCommands, Den
 from stopgo.bridge.mavlink.auto.logbook import Logbook, Ordered, PendingCommand
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.transfer.download import download
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots.kind import AUTO
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.following import steps as progress
@@ -264,7 +264,7 @@ class AutoFollower:
         listed, state = self._book.listed, self._book.run.state
         if listed is None or state in ("FINISHED", "ABORTED"):
             return
-        with suppress(AnswerIsNo, RobotUnreachable):
+        with suppress(NegativeResult, RobotUnreachable):
             self._differs = next(iter(differences(listed.sent, download(self._peer))), "")
 
 

@@ -85,14 +85,14 @@ class AutoRunner:
     def battery(self) -> float:
         return self._observer.battery
 
-    def obey(self, order: Order) -> Answer:
+    def execute(self, order: Order) -> Answer:
         """Raises `OutcomeUnknown` if the vehicle was told and does not show what it does."""
-        answer = self._orders.obey(order)
+        answer = self._orders.execute(order)
         self._follower.run = self._book.run
         self.changed()
         return answer
 
-    def hear_of_link(self, silent_s: float) -> None:
+    def on_link_silence(self, silent_s: float) -> None:
         """The vehicle goes on without a station, as its own failsafes say."""
 
     def close(self) -> None:

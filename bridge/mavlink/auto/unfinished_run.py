@@ -5,7 +5,7 @@ from __future__ import annotations
 from stopgo.bridge.mavlink.auto.logbook import Logbook
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.line.url import Url
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.tolerance import told_outside
 
 
@@ -24,7 +24,7 @@ def check_run_over(peer: Peer, url: Url, book: Logbook, what: str) -> None:
     outside = told_outside(run.outside, len(run.outside))
     stops = f"{len(run.done)} of {len(mission.stops)} stops done{outside}"
     seen = ", unless stopgo watch sees that it has come to its end" if run.state == "RUNNING" else ""
-    raise AnswerIsNo(
+    raise NegativeResult(
         f"{peer}: run {run.run_id} of {mission.name} ({mission.id[:12]}) is {run.state}, {stops}, and {what}"
         f" would end it; end it first (stopgo abort --mavlink {url}){seen}, or add --while-running;"
         " nothing was sent",

@@ -76,7 +76,7 @@ class VehicleOrders:
         self._wall = wall
         self._consent = consent
 
-    def obey(self, order: Order) -> Answer:
+    def execute(self, order: Order) -> Answer:
         """Carry out an order once, and remember what was answered.
 
         Raises

@@ -78,7 +78,7 @@ class MavlinkScanner:
         lost = self._autopilot.out_of_reach()
         return ScanFailed(reason=f"no result within {scan.timeout_s:g} s" + (f": {lost}" if lost else ""))
 
-    def what_became(self, label: str) -> ScanResult | ScanFailed | None:
+    def scan_outcome(self, label: str) -> ScanResult | ScanFailed | None:
         """Nobody knows: a camera's last picture does not say which of two triggers it followed."""
         return None
 

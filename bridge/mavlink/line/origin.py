@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from stopgo.bridge.mavlink.line.peer import Peer
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.local_frame import VehicleOrigin, how_far_off
 
@@ -27,13 +27,13 @@ def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> Vehic
         tried = (
             "and takes none (does its navigation run?)" if set_it else "or does not tell: add --set-origin"
         )
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"{peer} has no origin, {tried}, or --any-origin if it finds its place by satellites; "
             "nothing was sent"
         )
     away = how_far_off(site, held.place)
     if away:
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"{peer}: its origin {_told(held)} is {away} from the mission's {_told(wanted)}, "
             "and so would every stop be; an origin is taken once per boot: restart it and push with "
             "--set-origin, or --any-origin if it finds its place by satellites; nothing was sent"

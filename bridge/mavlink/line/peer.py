@@ -27,7 +27,7 @@ from stopgo.bridge.mavlink.line.messages import (
 from stopgo.bridge.mavlink.line.round_trips import RoundTrips
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.mavlink.line.wire import SIGNATURE, MessageQueue, Who, Wire, sender, wire
-from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import autopilot_of
 from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.enums import CommandResult, Component, Firmware, MessageId, ModeFlag, VehicleType
@@ -218,7 +218,7 @@ class Peer:
         ack = self.command(number, *params, patience_s=patience_s)
         if not ack.accepted:
             named = what or enum_name("MAV_CMD", number)
-            raise AnswerIsNo(f"{self}: {named} was answered {ack.name}{self._last_text()}")
+            raise NegativeResult(f"{self}: {named} was answered {ack.name}{self._last_text()}")
         return ack
 
     def ask(self, number: int, *, patience_s: float | None = None) -> Message | None:

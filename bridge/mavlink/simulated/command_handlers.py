@@ -84,8 +84,8 @@ def _answer(vehicle: Vehicle, who: Who, order: ReceivedCommand) -> None:
     if order.command == Command.COMPONENT_ARM_DISARM and order.params[0] == 1 and vehicle.refuses_arming:
         _acknowledge(vehicle, who, order.command, _no(vehicle))
         return vehicle.text(vehicle.refuses_arming)  # a real one says why after it has answered
-    obey = OBEYED.get(order.command)
-    _acknowledge(vehicle, who, order.command, UNSUPPORTED if obey is None else obey(vehicle, order))
+    execute = OBEYED.get(order.command)
+    _acknowledge(vehicle, who, order.command, UNSUPPORTED if execute is None else execute(vehicle, order))
     if order.command == Command.REQUEST_MESSAGE:
         vehicle.requested(order.whole(0), order.whole(1))
 

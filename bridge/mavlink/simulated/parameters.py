@@ -8,7 +8,7 @@ from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.simulated import replies
 from stopgo.bridge.mavlink.simulated.tuning import Tuning
 from stopgo.bridge.mavlink.simulated.vehicle_scanner import DEFAULT_S, LONGEST_S
-from stopgo.mission.mavlink.autopilots.kind import Habits
+from stopgo.mission.mavlink.autopilots.kind import ProtocolBehaviour
 from stopgo.mission.mavlink.telemetry import Message
 
 SCAN_TIME = "SIM_SCAN_TIME"
@@ -19,7 +19,7 @@ class Parameters:
     """Named numbers, float32 on the wire."""
 
     def __init__(
-        self, habits: Habits, tuning: Tuning, *, speed: float, set_speed: Callable[[float], bool]
+        self, habits: ProtocolBehaviour, tuning: Tuning, *, speed: float, set_speed: Callable[[float], bool]
     ) -> None:
         self._speed, self._set_speed, self._tuning = habits.speed_parameter, set_speed, tuning
         self._values = {

@@ -18,7 +18,7 @@ from stopgo.bridge.mavlink.line.messages import (
 )
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.transfer.flow_control import Pace, TransferTimeout, window_for
-from stopgo.mission.errors import AnswerIsNo, RobotUnreachable
+from stopgo.mission.errors import NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.enums import MissionResult
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.telemetry import Message
@@ -51,7 +51,7 @@ def download(
         reading = _Reading(peer, 1, patience_s or peer.patience_s, progress)
         refused = reading.run()
     if refused is not None:
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"{peer}: reading its mission was answered {result_name(refused)}; "
             "another station may be at work on it: try again"
         )

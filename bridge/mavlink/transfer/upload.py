@@ -18,7 +18,7 @@ from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.flow_control import window_for
 from stopgo.bridge.mavlink.transfer.sending import TransferEnd, send_items
 from stopgo.bridge.mavlink.transfer.upload_recovery import cancel, emptied, left_on, own_items, unknown
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.enums import MissionResult
 from stopgo.mission.mavlink.items import Item, ItemList
@@ -98,7 +98,7 @@ def upload(
     with if_stopped(tell, lambda: "all was sent and read back as it should be"):
         peer.clock_seen(patience_s=CLOCK_S)
     if peer.boots != boots:
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"{peer} was started again during the upload, and may have lost its origin; it holds the "
             "mission: push it again to have the origin checked"
         )
@@ -148,7 +148,7 @@ def clear(peer: Peer, *, while_running: bool = False, tell: Tell = lambda line: 
 def check_standing(peer: Peer, while_running: bool, what: str = "would begin its current item again") -> None:
     """Refuses to touch the mission that a vehicle is following; `what` is what it would come to."""
     if peer.armed and peer.in_auto and not while_running:
-        raise AnswerIsNo(
+        raise NegativeResult(
             f"{peer} is armed and follows its mission, and {what}; "
             "pause it first, or add --while-running; nothing was sent"
         )
@@ -180,7 +180,7 @@ def _read_back(peer: Peer, sent: ItemList, progress: Progress) -> Failure | None
     count = len(upload_of(sent))
     try:
         read = download(peer, progress=lambda done, total: progress(count + done, count + total))
-    except (AnswerIsNo, RobotUnreachable) as error:
+    except (NegativeResult, RobotUnreachable) as error:
         return Failure(f"all was sent, and could not be read back: {error}")
     lines = differences(sent, read)
     if not lines:
@@ -234,10 +234,10 @@ def _given_up(peer: Peer, ended: TransferEnd, count: int) -> Failure:
     return Failure(f"it fell silent when {ended.at} of {count} items had arrived{peer.why_silent()}")
 
 
-def _error(peer: Peer, failure: Failure, before: Sequence[Item]) -> AnswerIsNo | OutcomeUnknown:
+def _error(peer: Peer, failure: Failure, before: Sequence[Item]) -> NegativeResult | OutcomeUnknown:
     """The failure with what is on the vehicle now."""
     if not failure.touched:
-        return AnswerIsNo(f"{peer}: {failure.why}; nothing of this mission was stored")
+        return NegativeResult(f"{peer}: {failure.why}; nothing of this mission was stored")
     left = left_on(peer, before)
-    error = AnswerIsNo if left.known else OutcomeUnknown
+    error = NegativeResult if left.known else OutcomeUnknown
     return error(f"{peer}: {failure.why}; {left.words}")

@@ -10,7 +10,7 @@ from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.flow_control import window_for
 from stopgo.bridge.mavlink.transfer.sending import send_items
-from stopgo.mission.errors import AnswerIsNo, RobotUnreachable
+from stopgo.mission.errors import NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.enums import MissionResult
 from stopgo.mission.mavlink.items import Item
 
@@ -33,7 +33,7 @@ def left_on(peer: Peer, before: Sequence[Item]) -> Left:
     if peer.autopilot.habits.atomic:
         try:
             held = download(peer)
-        except (AnswerIsNo, RobotUnreachable):
+        except (NegativeResult, RobotUnreachable):
             return unknown(peer)
         if _same(peer, held, before):
             return _as_before(peer, before, "still")
@@ -97,7 +97,7 @@ def emptied(peer: Peer) -> bool:
 def _holds(peer: Peer, items: Sequence[Item]) -> bool:
     try:
         return _same(peer, download(peer), items)
-    except (AnswerIsNo, RobotUnreachable):
+    except (NegativeResult, RobotUnreachable):
         return False
 
 

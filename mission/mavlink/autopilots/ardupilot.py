@@ -14,11 +14,11 @@ from stopgo.mission.mavlink.autopilots.kind import (
     ROVERS,
     Autopilot,
     Driving,
-    Habits,
     Heartbeat,
     Mode,
     Modes,
     ParameterRule,
+    ProtocolBehaviour,
     Steering,
 )
 from stopgo.mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag, VehicleType
@@ -108,7 +108,7 @@ DRIVING = Driving(
     reposition_mode="guided",
 )  # fmt: skip
 
-HABITS = Habits(
+HABITS = ProtocolBehaviour(
     asks_int=False, ask_again_s=1.0, give_up_s=8.0, tells_giving_up=True, atomic=False, strays="tell",
     last_again=MissionResult.ERROR, forgives_late=False, other_station=MissionResult.DENIED,
     busy_in_words=False, begins_again=True, cancels=False, clears_in_auto=False, counts_again=True,

@@ -8,7 +8,13 @@ from __future__ import annotations
 import math
 
 from stopgo.mission.mavlink.autopilots import px4
-from stopgo.mission.mavlink.autopilots.kind import EVERYWHERE, Autopilot, Driving, Habits, Heartbeat
+from stopgo.mission.mavlink.autopilots.kind import (
+    EVERYWHERE,
+    Autopilot,
+    Driving,
+    Heartbeat,
+    ProtocolBehaviour,
+)
 from stopgo.mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag
 from stopgo.mission.mavlink.fields import as_sent
 from stopgo.mission.mavlink.items import Command, MavFrame
@@ -22,7 +28,7 @@ def in_auto(heartbeat: Heartbeat) -> bool:
     return not holds and bool(heartbeat.base_mode & ModeFlag.AUTO_ENABLED)
 
 
-HABITS = Habits(
+HABITS = ProtocolBehaviour(
     asks_int=True, ask_again_s=0.25, give_up_s=1.5, tells_giving_up=True, atomic=True, strays="ask",
     last_again=MissionResult.ACCEPTED, forgives_late=True, other_station=MissionResult.DENIED,
     busy_in_words=False, begins_again=True, cancels=True, clears_in_auto=True, counts_again=False,

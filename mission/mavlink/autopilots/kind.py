@@ -100,7 +100,7 @@ class Driving:
 
 
 @dataclass(frozen=True)
-class Habits:
+class ProtocolBehaviour:
     """What it does where the protocols leave a choice, as a simulated vehicle must do it too."""
 
     asks_int: bool
@@ -238,7 +238,7 @@ class Autopilot:
     driving: Driving
     drivable: bool
     """A robot of ours may drive it: `driving` was measured, or read in its source."""
-    habits: Habits
+    habits: ProtocolBehaviour
     parameters: tuple[ParameterRule, ...] = ()
     """What its parameters must be for a mission."""
     steering: Steering = Steering((), turns_anyhow)

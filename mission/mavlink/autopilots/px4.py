@@ -14,11 +14,11 @@ from stopgo.mission.mavlink.autopilots.kind import (
     EVERYWHERE,
     Autopilot,
     Driving,
-    Habits,
     Heartbeat,
     Mode,
     Modes,
     ParameterRule,
+    ProtocolBehaviour,
     Steering,
 )
 from stopgo.mission.mavlink.enums import CommandResult, Firmware, MissionResult, ModeFlag
@@ -75,7 +75,7 @@ DRIVING = Driving(
     reposition_mode="hold",
 )  # fmt: skip
 
-HABITS = Habits(
+HABITS = ProtocolBehaviour(
     asks_int=True, ask_again_s=0.25, give_up_s=5.0, tells_giving_up=False, atomic=True, strays="ignore",
     last_again=MissionResult.ACCEPTED, forgives_late=False,
     other_station=MissionResult.ERROR,

@@ -39,7 +39,7 @@ NONE_YET: Picture = (-1, -1)
 
 
 @dataclass(frozen=True)
-class Told:
+class TimestampedMessage:
     """Something that was told, and when that came."""
 
     message: Message
@@ -71,7 +71,7 @@ class Observer:
 
     def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
-        self._newest: dict[str, Told] = {}
+        self._newest: dict[str, TimestampedMessage] = {}
         self._captures: deque[HeardCapture] = deque(maxlen=CAPTURES_KEPT)
         self._frame: tuple[ListedMission, VehicleOrigin, LocalFrame] | None = None
         self._work: tuple[int, bool] | None = None
@@ -88,7 +88,7 @@ class Observer:
         """Remember what a message tells; its name."""
         name = str(message.get_type())
         before = (self.mode, self.armed)
-        self._newest[name] = Told(message, now_ns)
+        self._newest[name] = TimestampedMessage(message, now_ns)
         if (self.mode, self.armed) != before:
             self._mode_began_ns = now_ns
         taking = TAKING.get(name)
@@ -120,7 +120,7 @@ class Observer:
         lost = fix is None or is_lost((now_ns - fix.ns) / 1e9)
         return None if fix is None or lost else fix.pose
 
-    def _clock_told(self) -> Told | None:
+    def _clock_told(self) -> TimestampedMessage | None:
         told = [self._newest[name] for name in CLOCKS if name in self._newest]
         return max(told, key=lambda seen: seen.ns, default=None)
 

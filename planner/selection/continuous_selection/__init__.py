@@ -14,14 +14,14 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.planner.candidates import judged
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.selection import posed, select
-from stopgo.planner.selection.continuous_selection.cells import Overlook, PlaceCells
+from stopgo.planner.selection.continuous_selection.cells import CellVisibility, PlaceCells
 from stopgo.planner.selection.continuous_selection.prices import Prices, WantedUnits, prices_of
 from stopgo.planner.selection.demands import demands_of
 from stopgo.planner.selection.refine import joined, taken, with_rows
@@ -50,7 +50,7 @@ def anywhere(selection: Selection) -> Selection:
     """
     seen = selection.visibility
     _check(seen.candidates.space.settings)
-    search = _Search(seen)
+    search = _CellSearch(seen)
     search.run()
     found = _best_of(selection, search.offered())
     fixed, bound = len(search.fixed), search.bound
@@ -86,13 +86,13 @@ def _best_of(selection: Selection, wide: Visibility) -> Selection:
     return replace(again, visibility=with_rows(wide, rows), chosen=frozen(at[again.chosen], np.int64))
 
 
-class _Search:
+class _CellSearch:
     """Places and cells, refined in turn until the bound is as high as the relaxation allows."""
 
     def __init__(self, seen: Visibility) -> None:
         self._seen, self._known = seen, seen
         self._asked, self.fixed = _asked(seen)
-        self._overlook = Overlook(seen.candidates)
+        self._overlook = CellVisibility(seen.candidates)
         self._place = Place(seen.candidates.space)
         self._cells = self._overlook.whole()
         self._prices: Prices | None = None
@@ -150,7 +150,7 @@ class _Search:
             return
         try:
             seen = visibility(taken(found, found.kept))
-        except AnswerIsNo:  # nothing is in sight from any of them
+        except NegativeResult:  # nothing is in sight from any of them
             return
         good = np.flatnonzero(_worth_of(seen, prices.unit) > 1 + TOLERATED)
         if len(good):

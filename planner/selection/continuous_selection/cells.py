@@ -105,7 +105,7 @@ class PlaceCells:
         )
 
 
-class Overlook:
+class CellVisibility:
     """A floor's part, prepared for telling where stops may be and what is in sight of whole cells."""
 
     def __init__(self, candidates: Candidates) -> None:

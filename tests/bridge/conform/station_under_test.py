@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from stopgo.bridge.conform.fake_robot import FakeRobot, ForgedAnswers, MeddledLink, at_work
+from stopgo.bridge.conform.fake_robot import FakeRobot, FaultyLink, ForgedAnswers, at_work
 from stopgo.bridge.conform.requirements import ConformVerdict, tried
 from stopgo.bridge.conform.station_bench import StationBench
 from stopgo.bridge.conform.station_requirements import STATION_REQUIREMENTS
@@ -64,7 +64,7 @@ class StationUnderTest:
     def bench(self) -> Iterator[StationBench]:
         held, boot_id = self.held("r1"), "b1"
         forged = None if held is None else ForgedAnswers(KeySeals(held, boot_id=boot_id))
-        link = MeddledLink(self.board.link(forged or NO_SEALS), KEYS)
+        link = FaultyLink(self.board.link(forged or NO_SEALS), KEYS)
         with at_work(FakeRobot(link, KEYS, boot_id, speed_up=10.0)) as robot:
             yield StationBench(robot, self.does, forged=forged)
 

@@ -105,49 +105,49 @@ RECORD_WHOLE = "every entry and pose once, and the same again"
 
 
 class ForgetsAnswers(Controller):
-    def obey(self, order: Order) -> Answer:
+    def execute(self, order: Order) -> Answer:
         fresh = f"{order.cmd_id}-{self._clock.now_ns()}"
-        return changed(super().obey(changed(order, cmd_id=fresh)), cmd_id=order.cmd_id)
+        return changed(super().execute(changed(order, cmd_id=fresh)), cmd_id=order.cmd_id)
 
 
 class IgnoresFences(Controller):
-    def obey(self, order: Order) -> Answer:
-        return super().obey(changed(order, fence=None))
+    def execute(self, order: Order) -> Answer:
+        return super().execute(changed(order, fence=None))
 
 
 class NeverTooLate(Controller):
-    def obey(self, order: Order) -> Answer:
+    def execute(self, order: Order) -> Answer:
         now_ns = self._clock.now_ns()
-        return super().obey(changed(order, issued_ns=now_ns, valid_for_s=5.0, boot_id=None))
+        return super().execute(changed(order, issued_ns=now_ns, valid_for_s=5.0, boot_id=None))
 
 
 class StopsForTheCommanderOnly(Controller):
-    def obey(self, order: Order) -> Answer:
+    def execute(self, order: Order) -> Answer:
         lease = self.lease
         if order.verb in FREE_VERBS and lease and lease.commander != order.commander:
             return Answer(
                 cmd_id=order.cmd_id, verb=order.verb, outcome="refused", reason="not_the_commander",
                 message="", run_id=None, state=self.run.state,
             )  # fmt: skip
-        return super().obey(order)
+        return super().execute(order)
 
 
 class HeedsNobodysLease(Controller):
-    def obey(self, order: Order) -> Answer:
-        return super().obey(changed(order, commander=self.lease.commander if self.lease else "a"))
+    def execute(self, order: Order) -> Answer:
+        return super().execute(changed(order, commander=self.lease.commander if self.lease else "a"))
 
 
 class DrivesOnEveryStart(Controller):
-    def obey(self, order: Order) -> Answer:
+    def execute(self, order: Order) -> Answer:
         plain = {"issued_ns": self._clock.now_ns(), "expect_state": None, "revision": None, "fence": None}
-        return super().obey(changed(order, **plain) if order.verb == "start" else order)
+        return super().execute(changed(order, **plain) if order.verb == "start" else order)
 
 
 class DrivesWhatItIsSent(Controller):
     def take(self, commit: Any, mission: Mission) -> Rejected | None:
         rejected = super().take(commit, mission)
         now_ns = self._clock.now_ns()
-        self.obey(Order(cmd_id=commit.nonce, verb="start", commander=commit.commander, issued_ns=now_ns,
+        self.execute(Order(cmd_id=commit.nonce, verb="start", commander=commit.commander, issued_ns=now_ns,
                         valid_for_s=5.0))  # fmt: skip
         return rejected
 

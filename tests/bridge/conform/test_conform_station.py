@@ -22,7 +22,7 @@ from stopgo.bridge.link.seals import KeySeals, Question
 from stopgo.bridge.station.follow import Followed
 from stopgo.bridge.station.station import Station
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown
+from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown
 from stopgo.mission.files.mission_json import read
 from stopgo.mission.run.orders import Answer, Order, Verb
 from tests.bridge.conform.station_under_test import StationUnderTest, verdicts
@@ -70,7 +70,7 @@ class TriesRefusedOrdersAgain(Station):
     def command(self, verb: Verb, **details: Any) -> Answer:
         try:
             return super().command(verb, **details)
-        except AnswerIsNo:
+        except NegativeResult:
             return super().command(verb, **details)
 
 

@@ -20,7 +20,7 @@ from stopgo.bridge.link.protocol import KeyExpressions
 from stopgo.bridge.link.zenoh_link import Guard, connecting, joining, listening
 from stopgo.bridge.station.station import connect
 from stopgo.command_line import main
-from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.station.test_fleet import router
 from tests.bridge.world import corridor
@@ -139,7 +139,7 @@ def test_a_revoked_station_reads_no_keys_and_is_not_obeyed(site: Path) -> None:
     station.push(corridor())
     revoke(site, "alice")
     for order in (lambda: station.command("pause"), station.status):
-        with pytest.raises((AnswerIsNo, OutcomeUnknown), match="alice is revoked"):
+        with pytest.raises((NegativeResult, OutcomeUnknown), match="alice is revoked"):
             order()
     with pytest.raises(InputError, match="is revoked; issue new keys for alice"):
         read_keys(site / "alice", now=now_utc())

@@ -22,7 +22,7 @@ from stopgo.bridge.link.protocol import KeyExpressions, Reply, encode
 from stopgo.bridge.link.zenoh_link import Guard, check_endpoint, connecting
 from stopgo.bridge.robot.agent import check_ordering
 from stopgo.bridge.station.station import Station, connect
-from stopgo.mission.errors import AnswerIsNo, InputError, RobotUnreachable
+from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
 from stopgo.mission.run.events import PoseReport, Scanned
 from tests.bridge.station.test_fleet import router
 from tests.bridge.world import corridor
@@ -180,7 +180,7 @@ def test_a_station_with_keys_runs_a_mission_and_a_viewer_watches(site: Path, tmp
             assert poses[0].mission_time_s < 20, "the poses from before the viewer came are missing"
             assert viewer.mission(corridor().id, 1) == corridor()
             for order in (lambda: viewer.command("abort"), lambda: viewer.push(corridor(revision=2))):
-                with pytest.raises(AnswerIsNo, match="vera is a viewer"):
+                with pytest.raises(NegativeResult, match="vera is a viewer"):
                     order()
         status = stopgo("status", "--connect", endpoint, "--keys", str(site / "site" / "vera"), "--json")
         assert '"state": "FINISHED"' in status.stdout, status.stderr

@@ -15,7 +15,7 @@ from jsonschema import Draft202012Validator
 from stopgo.bridge.link.protocol import Malformed, Reply, Tagged, decode, encode
 from stopgo.bridge.link.protocol_schema import protocol_schema
 from stopgo.bridge.link.seals import Seal
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.events import KINDS, AnyEvent, Pose, PoseReport, StateReport, UnknownKind, event_of
 from stopgo.mission.run.orders import Answer, Order
 from tests.bridge.guarded import GuardedField, keys_of_site
@@ -57,7 +57,7 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, Any]]:
     station.push(corridor())
     station.mission(corridor().id, 1)
     station.command("start")
-    with pytest.raises(AnswerIsNo):
+    with pytest.raises(NegativeResult):
         station.push(corridor(stops=2))
     field.work()
     for key, report in ((field.keys.state, field.report()), (field.keys.pose, POSE), *events(field)):

@@ -12,7 +12,7 @@ import pytest
 
 from stopgo.bridge.link.memory_link import SealedMessage
 from stopgo.bridge.link.seals import OLDEST_S, Seal
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import corridor
 
@@ -168,7 +168,7 @@ def test_viewers_send_no_mission(site: Path) -> None:
     field = ready(site)
     viewer = field.guarded_station("vera")
     viewer.held = None
-    with pytest.raises(AnswerIsNo, match="vera is a viewer"):
+    with pytest.raises(NegativeResult, match="vera is a viewer"):
         viewer.push(corridor(revision=2))
     assert field.journal.transfer(corridor().id) is None
 

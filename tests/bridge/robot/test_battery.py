@@ -8,7 +8,7 @@ import pytest
 
 from stopgo.bridge.robot.simulator import Fault, Faults
 from stopgo.mission.document.schedule import schedule
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.battery import time_left, what_is_missing
 from tests.bridge.world import EXACT, Field, corridor
 
@@ -53,7 +53,7 @@ def test_what_is_left_counts_from_the_last_scan_on() -> None:
 
 def test_a_mission_longer_than_the_battery_lasts_is_rejected_and_nothing_is_kept() -> None:
     field = lasting(TOTAL_S)
-    with pytest.raises(AnswerIsNo, match=r"infeasible: the mission takes 0\.1 h .* at 100%"):
+    with pytest.raises(NegativeResult, match=r"infeasible: the mission takes 0\.1 h .* at 100%"):
         field.station().push(corridor())
     assert field.controller.run.state == "IDLE"
     assert field.journal.mission(corridor().id, 1) is None
@@ -83,5 +83,5 @@ def test_a_revision_during_a_run_is_measured_by_what_is_left() -> None:
         field.controller.step()
     # One stop of 67 s is behind, and a fourth is as long; ten are not.
     assert field.station().push(corridor(revision=2, stops=4, closed=False)).waits
-    with pytest.raises(AnswerIsNo, match="infeasible"):
+    with pytest.raises(NegativeResult, match="infeasible"):
         field.station().push(corridor(revision=3, stops=10))

@@ -14,7 +14,7 @@ import pytest
 from stopgo.bridge.console import carried_out, refusals_in, tell
 from stopgo.bridge.link.link import Link
 from stopgo.bridge.link.protocol import encode
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.run.events import STOPS_LISTED, TakenOver
 from stopgo.mission.run.lease import LEASE_S, Lease, claimed
 from stopgo.mission.run.orders import Answer, Refused, Verb
@@ -94,7 +94,7 @@ def test_a_push_needs_the_lease_too() -> None:
     field.station().push(corridor())
     station = field.station()
     station.commander = "bob"
-    with pytest.raises(AnswerIsNo, match="not_the_commander: test commands it"):
+    with pytest.raises(NegativeResult, match="not_the_commander: test commands it"):
         station.push(corridor(revision=2))
     assert station.push(corridor(revision=2), take_over=True).revision == 2
 
@@ -103,11 +103,11 @@ def test_an_order_is_carried_out_once_though_it_comes_three_times_and_over_a_reb
     field = Field()
     field.station().push(corridor())
     start = field.command("start")
-    first = field.controller.obey(start)
+    first = field.controller.execute(start)
     field.boot()
-    assert field.controller.obey(start) == first
+    assert field.controller.execute(start) == first
     field.clock.wait(3600)
-    assert field.controller.obey(start) == first
+    assert field.controller.execute(start) == first
     assert field.told() == ["Started", "Paused"]
 
 
@@ -131,7 +131,7 @@ def test_a_station_sends_orders_for_the_robot_as_it_saw_it() -> None:
     station = field.station()
     station.push(corridor())
     assert station.command("start").state == "RUNNING"
-    with pytest.raises(AnswerIsNo, match="wrong_state"):
+    with pytest.raises(NegativeResult, match="wrong_state"):
         station.command("resume")
     assert station.command("pause").state == "PAUSED"
 
@@ -140,7 +140,7 @@ def test_a_refusal_is_printed_as_json_where_json_is_wanted(capsys: pytest.Captur
     station = Field().station()
     station.push(corridor())
     for as_json in (False, True):
-        with pytest.raises(AnswerIsNo) as no, refusals_in(as_json):
+        with pytest.raises(NegativeResult) as no, refusals_in(as_json):
             station.command("resume")
         printed = capsys.readouterr().out
         told = {"outcome": "refused", "reason": "wrong_state", "message": str(no.value)}
@@ -181,7 +181,7 @@ def test_a_stop_that_comes_very_late_still_stops() -> None:
     late = field.station().stop_order("pause")
     field.order("start")
     field.clock.jump(3600.0)
-    assert field.controller.obey(late).state == "PAUSED"
+    assert field.controller.execute(late).state == "PAUSED"
 
 
 def test_a_state_is_small_whatever_the_mission_and_status_tells_every_stop() -> None:

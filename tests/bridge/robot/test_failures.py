@@ -13,7 +13,7 @@ import pytest
 from stopgo.bridge.robot.base import Rest
 from stopgo.bridge.robot.simulator import Fault, Faults, read_fault
 from stopgo.mission.document import Mission, sealed
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.run.events import Pose, Scanned
 from stopgo.mission.run.orders import Verb
 from stopgo.mission.run.scans import ScanFailed
@@ -245,10 +245,10 @@ def test_a_way_home_that_was_paused_ends_for_the_reason_it_began() -> None:
 )
 def test_a_lost_link_is_met_as_the_mission_says(policy: str, state: str, done: tuple[str, ...]) -> None:
     field = started(with_policy(link_loss=policy))
-    field.clock.at(2.0, lambda: field.controller.hear_of_link(31.0))
+    field.clock.at(2.0, lambda: field.controller.on_link_silence(31.0))
     field.work()
     assert (field.controller.run.state, field.controller.run.done) == (state, done)
-    field.controller.hear_of_link(0.0)
+    field.controller.on_link_silence(0.0)
     if state != "FINISHED":
         field.order("retry" if state == "HELD" else "resume")
         field.work()
@@ -257,7 +257,7 @@ def test_a_lost_link_is_met_as_the_mission_says(policy: str, state: str, done: t
 
 def test_a_lost_link_cuts_no_scan_short() -> None:
     field = started(with_policy(link_loss="hold"))
-    field.clock.at(30.0, lambda: field.controller.hear_of_link(31.0))
+    field.clock.at(30.0, lambda: field.controller.on_link_silence(31.0))
     field.work()
     assert (field.controller.run.state, field.controller.run.done) == ("HELD", ("s1",))
 
@@ -290,15 +290,15 @@ def test_a_full_disk_keeps_no_stop_from_arriving(verb: Verb, state: str, event: 
     field = started(corridor())
     field.journal.edge = full_disk
     order = field.command(verb)
-    answer = field.controller.obey(order)
+    answer = field.controller.execute(order)
     assert (answer.outcome, field.controller.run.state, field.base.speed()) == ("ok", state, 0.0)
-    assert field.controller.obey(order) == answer
-    field.controller.hear_of_link(0.0)
+    assert field.controller.execute(order) == answer
+    field.controller.on_link_silence(0.0)
     assert field.told()[-1] == "Started"
     field.journal.edge = lambda moment: None
-    field.controller.hear_of_link(0.0)
+    field.controller.on_link_silence(0.0)
     assert field.told()[-1] == event
-    assert field.controller.obey(order) == answer
+    assert field.controller.execute(order) == answer
     field.boot()
     assert (field.controller.run.state, field.told()[-1]) == (state, event)
 
@@ -310,7 +310,7 @@ def test_a_push_of_the_mission_that_is_run_stores_once_what_a_full_disk_had_no_r
     field.order("pause")
     field.journal.edge = lambda moment: None
     station.push(corridor())
-    field.controller.hear_of_link(0.0)
+    field.controller.on_link_silence(0.0)
     assert field.told() == ["Started", "Paused"]
     field.order("resume")
     assert field.told() == ["Started", "Paused", "Resumed"]
@@ -329,7 +329,9 @@ def test_a_full_disk_rejects_a_mission() -> None:
     field = Field()
     station = field.station()
     field.journal.edge = full_disk
-    with pytest.raises(AnswerIsNo, match="storage: the journal cannot be written: database or disk is full"):
+    with pytest.raises(
+        NegativeResult, match="storage: the journal cannot be written: database or disk is full"
+    ):
         station.push(corridor())
     assert field.controller.run.state == "IDLE"
 

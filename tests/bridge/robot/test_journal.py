@@ -25,7 +25,7 @@ from stopgo.bridge.robot.journal_format import FORMAT, TABLES
 from stopgo.bridge.robot.reserve import LEAST_FREE_BYTES, RESERVE_BYTES, Reserve
 from stopgo.bridge.robot.sealed_rows import SEALED, put
 from stopgo.bridge.station.watch import event_line
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.run.events import Started, UnknownKind, event_of
 from stopgo.mission.run.orders import Verb
 from tests.bridge.world import Field, corridor
@@ -213,7 +213,7 @@ def test_missions_that_no_run_needs_are_retired_and_their_names_kept() -> None:
     newest = field.journal.newest_revision(corridor().id)
     assert newest is not None
     assert newest.revision == MISSIONS_KEPT + 3
-    with pytest.raises(AnswerIsNo, match="older_revision"):
+    with pytest.raises(NegativeResult, match="older_revision"):
         station.push(corridor(revision=1))
 
 
@@ -255,7 +255,7 @@ def test_a_push_that_would_take_the_space_kept_for_stops_is_rejected(
     with open_journal(tmp_path, "r1") as journal:
         field = Field(journal=journal)
         monkeypatch.setattr(Reserve, "_free", lambda self: 1024)
-        with pytest.raises(AnswerIsNo, match="make room"):
+        with pytest.raises(NegativeResult, match="make room"):
             field.station().push(corridor())
 
 

@@ -23,7 +23,7 @@ from stopgo.bridge.link.protocol import (
 )
 from stopgo.bridge.robot.mission_reading import read_mission
 from stopgo.mission.document import Mission, canonical, sealed
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.files.mission_json import parse
 from tests.bridge.world import Field, corridor
 
@@ -78,7 +78,7 @@ def test_pushing_the_same_again_changes_nothing() -> None:
 def test_the_same_revision_with_another_digest_is_refused_and_both_are_named() -> None:
     field = Field()
     field.station().push(corridor())
-    with pytest.raises(AnswerIsNo, match=r"revision_taken.*push the change as revision 2"):
+    with pytest.raises(NegativeResult, match=r"revision_taken.*push the change as revision 2"):
         field.station().push(corridor(stops=2))
     assert field.station().push(corridor(stops=2, revision=2)).revision == 2
 
@@ -86,7 +86,7 @@ def test_the_same_revision_with_another_digest_is_refused_and_both_are_named() -
 def test_an_older_revision_is_refused() -> None:
     field = Field()
     field.station().push(corridor(revision=2))
-    with pytest.raises(AnswerIsNo, match="older_revision"):
+    with pytest.raises(NegativeResult, match="older_revision"):
         field.station().push(corridor(revision=1))
 
 
@@ -95,7 +95,7 @@ def test_another_mission_is_refused_while_one_runs() -> None:
     field.station().push(corridor())
     field.order("start")
     other = sealed(msgspec.structs.replace(corridor(), id="f" * 32))
-    with pytest.raises(AnswerIsNo, match="running"):
+    with pytest.raises(NegativeResult, match="running"):
         field.station().push(other)
     assert field.controller.run.mission_id == corridor().id
 
@@ -153,7 +153,7 @@ def test_a_mission_that_leaves_its_route_is_infeasible() -> None:
     stop = msgspec.structs.replace(corridor().stops[1], approach=((9.0, 9.0), (4.0, 0.0)))
     mission = sealed(msgspec.structs.replace(corridor(), stops=(corridor().stops[0], stop)))
     with pytest.raises(
-        AnswerIsNo, match=r"infeasible: \$\.stops\[1\]\.approach\[0\]: \(9\.000, 9\.000\) is not stop s1"
+        NegativeResult, match=r"infeasible: \$\.stops\[1\]\.approach\[0\]: \(9\.000, 9\.000\) is not stop s1"
     ):
         Field().station().push(mission)
 

@@ -7,7 +7,7 @@ from datetime import datetime, timedelta
 from stopgo.bridge.link.keys import now_utc
 from stopgo.bridge.robot.agent import Agent
 from stopgo.bridge.robot.refusal_log import RefusalLog
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from tests.bridge.world import Field, corridor
 
 
@@ -23,7 +23,7 @@ def test_a_refused_order_is_told_with_who_and_why() -> None:
     for verb in ("resume", "start"):
         try:
             station.command(verb)
-        except AnswerIsNo:
+        except NegativeResult:
             continue
     assert "refused resume by bob: not_the_commander: test commands it" in said[0]
     assert "refused start by bob: not_the_commander" in said[1]

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from stopgo.mission.document import Mission, Scan, sealed
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import RevisionTaken, Scanned
 from tests.bridge.world import Field, corridor
@@ -116,7 +116,7 @@ def moved(index: int, **details: Any) -> Mission:
 )  # fmt: skip
 def test_a_revision_that_changes_the_way_so_far_is_refused(revision: Mission, why: str) -> None:
     field = running()
-    with pytest.raises(AnswerIsNo, match=f"way_differs: revision 2: .*{why}"):
+    with pytest.raises(NegativeResult, match=f"way_differs: revision 2: .*{why}"):
         field.station().push(revision)
     assert field.controller.run.next_revision is None
     field.work()
@@ -125,7 +125,7 @@ def test_a_revision_that_changes_the_way_so_far_is_refused(revision: Mission, wh
 
 def test_a_robot_may_refuse_every_revision_during_a_run() -> None:
     field = running(revisions="refuse")
-    with pytest.raises(AnswerIsNo, match=r"running: .* takes no revision"):
+    with pytest.raises(NegativeResult, match=r"running: .* takes no revision"):
         field.station().push(LONGER)
     field.work()
     assert not field.station().push(LONGER).waits
@@ -136,7 +136,7 @@ def test_a_robot_on_its_way_home_takes_no_revision() -> None:
     field = running()
     field.controller.step()
     field.order("home")
-    with pytest.raises(AnswerIsNo, match="on its way home"):
+    with pytest.raises(NegativeResult, match="on its way home"):
         field.station().push(LONGER)
 
 

@@ -140,7 +140,7 @@ def test_from_here_off_the_route_is_refused() -> None:
 def test_the_same_command_twice_takes_effect_once_and_gets_the_same_answer() -> None:
     field = loaded()
     command = field.command("start")
-    assert field.controller.obey(command) == field.controller.obey(command)
+    assert field.controller.execute(command) == field.controller.execute(command)
     assert field.told() == ["Started"]
 
 
@@ -148,7 +148,7 @@ def test_a_late_command_is_refused() -> None:
     field = loaded()
     command = field.command("start")
     field.clock.wait(6.0)
-    assert field.controller.obey(command).reason == "expired"
+    assert field.controller.execute(command).reason == "expired"
 
 
 def test_a_command_for_another_state_or_run_is_refused() -> None:

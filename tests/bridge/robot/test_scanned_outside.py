@@ -10,7 +10,7 @@ import pytest
 from stopgo.bridge.commands.order_commands import state_line, status_json
 from stopgo.bridge.commands.watch_commands import tell_compared
 from stopgo.bridge.station.watch import EventObjects, Lines, event_line, table_lines, watch_showing
-from stopgo.mission.comparing.run_collector import HeardRun
+from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.run.events import Scanned
 from tests.bridge.world import Field, corridor
 
@@ -45,7 +45,7 @@ def test_watch_tells_it_at_once_and_at_the_end_and_by_its_exit_code(
     field: Field, run_id: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     said: list[str] = []
-    heard = HeardRun()
+    heard = RunCollector()
     past = None if run_id is None else field.controller.run.run_id
     state = watch_showing(field.station(), heard, Lines(said.append), run_id=past)
     (line,) = [line for line in said if "Scanned         s2" in line]

@@ -14,7 +14,7 @@ from stopgo.bridge.robot import program
 from stopgo.bridge.robot.agent import Agent
 from stopgo.bridge.robot.program import check_name_is_free
 from stopgo.bridge.station.station import Station, connect
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from tests.bridge.guarded import GuardedField, keys_of_site
 from tests.bridge.world import Field, corridor
 from tests.ports import free_port
@@ -39,14 +39,14 @@ def test_an_order_is_for_the_one_that_told_its_state() -> None:
     for field in (one, other):
         field.station().push(corridor())
     start = one.station().order("start")
-    assert other.controller.obey(start).reason == "expired"
-    assert one.controller.obey(start).outcome == "ok"
+    assert other.controller.execute(start).reason == "expired"
+    assert one.controller.execute(start).outcome == "ok"
 
 
 def test_a_station_that_hears_two_stops_both_and_says_so() -> None:
     one, other = twins()
     station = Station(one.board.link(), one.keys, commander="test", timeout_s=0.3)
-    with pytest.raises(AnswerIsNo, match=r"two robots answer to the name r1 .* both were told to pause"):
+    with pytest.raises(NegativeResult, match=r"two robots answer to the name r1 .* both were told to pause"):
         station.status()
     assert (one.controller.run.state, other.controller.run.state) == ("PAUSED", "PAUSED")
 
@@ -54,7 +54,7 @@ def test_a_station_that_hears_two_stops_both_and_says_so() -> None:
 def test_a_watch_that_hears_two_stops_both() -> None:
     one, other = twins()
     station = Station(one.board.link(), one.keys, commander="test", timeout_s=0.3)
-    with pytest.raises(AnswerIsNo, match="two robots"):
+    with pytest.raises(NegativeResult, match="two robots"):
         list(station.reports())
     assert other.controller.run.state == "PAUSED"
 
@@ -92,7 +92,7 @@ def test_a_name_that_is_alive_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     link = field.board.link()
     check_name_is_free(link, KeyExpressions("r1"), "the router")
     field.link.announce(field.keys.alive)
-    with pytest.raises(AnswerIsNo, match=r"r1: is alive behind the router already .* another --name"):
+    with pytest.raises(NegativeResult, match=r"r1: is alive behind the router already .* another --name"):
         check_name_is_free(link, KeyExpressions("r1"), "the router")
 
 
@@ -112,7 +112,9 @@ def test_two_that_listen_apart_are_found_by_a_station_linked_to_both() -> None:
             link.announce(field.keys.alive)
         with (
             connect(",".join(endpoints), robot="r1") as station,
-            pytest.raises(AnswerIsNo, match=r"two robots answer to the name r1 .* both were told to pause"),
+            pytest.raises(
+                NegativeResult, match=r"two robots answer to the name r1 .* both were told to pause"
+            ),
         ):
             station.status()
     assert [field.controller.run.state for field in fields] == ["PAUSED", "PAUSED"]

@@ -10,7 +10,7 @@ import pytest
 from stopgo.bridge.link.protocol import LogPage, Malformed, RecordPage, encode
 from stopgo.bridge.station.record import past_run, read_index
 from stopgo.bridge.station.station import Station
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.run.events import Started
 from tests.bridge.world import Field, corridor
 
@@ -40,7 +40,7 @@ def test_an_answer_that_cannot_be_read_is_unknown(read: str, answer: bytes) -> N
 
 @pytest.mark.parametrize("read", READS)
 def test_a_robot_that_makes_no_sense_of_a_question_is_quoted(read: str) -> None:
-    with pytest.raises(AnswerIsNo, match=r"r1 could not make sense of reading its .*: since is a word"):
+    with pytest.raises(NegativeResult, match=r"r1 could not make sense of reading its .*: since is a word"):
         READS[read](lying(encode(Malformed(message="since is a word"))))
 
 

@@ -12,7 +12,7 @@ from stopgo.bridge.link.protocol import KeyExpressions, encode
 from stopgo.bridge.station import station as stations
 from stopgo.bridge.station.follow import PoseHistory
 from stopgo.bridge.station.station import LEAST_S, PATIENCE_S, Station
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from tests.bridge.world import Field, corridor
 
 
@@ -139,7 +139,7 @@ def test_states_and_reasons_of_a_newer_robot_are_passed_on(
     if outcome == "ok":
         assert station.give(station.stop_order("pause")).state == "DOCKED"
     else:
-        with pytest.raises(AnswerIsNo, match="refused pause: too_dark: m") as refused:
+        with pytest.raises(NegativeResult, match="refused pause: too_dark: m") as refused:
             station.give(station.stop_order("pause"))
         assert refused.value.reason == "too_dark"
 
@@ -149,7 +149,7 @@ def test_a_mission_that_a_newer_robot_rejects_is_rejected() -> None:
     told = {"is": "Rejected", "reason": "too_dark", "messages": ["m"]}
     board.link().serve(keys.command("*"), lambda request: encode(told))
     station = Station(board.link(), keys, commander="test", timeout_s=5.0)
-    with pytest.raises(AnswerIsNo, match="rejected pause: too_dark: m"):
+    with pytest.raises(NegativeResult, match="rejected pause: too_dark: m"):
         station.give(station.stop_order("pause"))
 
 

@@ -40,7 +40,7 @@ from stopgo.bridge.station.watch import (
 from stopgo.command_line import main
 from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import schedule
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown
 from stopgo.mission.run.events import (
     AnyEvent,
     Event,
@@ -216,7 +216,7 @@ def test_what_was_missed_while_the_link_was_cut_is_told_once_and_in_order_and_ag
         board.cut = False
         watching.join(20)
         past = list(past_reports(station, str(controller.run.run_id), station.mission))
-        with pytest.raises(AnswerIsNo, match=f"no run x; it has {controller.run.run_id}"):
+        with pytest.raises(NegativeResult, match=f"no run x; it has {controller.run.run_id}"):
             next(past_reports(station, "x", station.mission))
     heard += [told.get() for _ in range(told.qsize())]
     events = [report for report in heard if isinstance(report, Event)]

@@ -12,7 +12,7 @@ from mavsdk.plugins.mission_raw import MissionRaw
 from pymavlink.mavwp import MAVWPLoader
 
 from stopgo.mission.document import Mission
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.files.exports import exported
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
@@ -117,9 +117,9 @@ def test_a_stop_stands_within_8_mm_by_the_autopilots_own_rule(mission: Mission, 
 def test_a_mission_that_needs_its_headings_is_refused_for_who_drops_them(name: str) -> None:
     narrow = msgspec.structs.replace(laboratory().scanner, fov_deg=90.0)
     made = msgspec.structs.replace(laboratory(), scanner=narrow)
-    with pytest.raises(AnswerIsNo, match=r"stop s01: heading 200\.0° is needed"):
+    with pytest.raises(NegativeResult, match=r"stop s01: heading 200\.0° is needed"):
         exported(made, name, Supplements(autopilot="ardupilot"))
-    with pytest.raises(AnswerIsNo, match="px4 turns no rover to it"):
+    with pytest.raises(NegativeResult, match="px4 turns no rover to it"):
         exported(made, name, Supplements(autopilot="px4"))
     assert exported(made, name, Supplements(autopilot="generic"))
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE, Geodetic, from_geodetic
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.autopilots import AUTOPILOTS
@@ -227,7 +227,7 @@ def test_without_a_georeference_nothing_is_written(name):
 
 @pytest.mark.parametrize(("name", "why"), [("ardupilot", "drops it"), ("px4", "turns no rover to it")])
 def test_who_does_not_turn_to_a_heading_refuses_a_scanner_that_needs_it(name, why):
-    with pytest.raises(AnswerIsNo, match=rf"stop S1: heading 0\.0°.*fov_deg is 90.*{why}.*--fov 360"):
+    with pytest.raises(NegativeResult, match=rf"stop S1: heading 0\.0°.*fov_deg is 90.*{why}.*--fov 360"):
         translate(narrow_view(), name)
 
 
@@ -268,29 +268,29 @@ def test_what_is_no_number_or_no_place_is_refused_by_name(mission, told):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_wait_that_the_vehicle_cannot_count_is_refused(name):
-    with pytest.raises(AnswerIsNo, match=r"stop S1: settle_s is 5e\+06.*4294967 s"):
+    with pytest.raises(NegativeResult, match=r"stop S1: settle_s is 5e\+06.*4294967 s"):
         translate(first_stop(square_tour(), settle_s=5e6), name)
 
 
 def test_a_handshake_longer_than_its_field_is_refused():
-    with pytest.raises(AnswerIsNo, match=r"stop S1: scan\.timeout_s is 256.*255 s"):
+    with pytest.raises(NegativeResult, match=r"stop S1: scan\.timeout_s is 256.*255 s"):
         translate(first_scan(square_tour(), timeout_s=256.0), scan_wait="script_time")
 
 
 def test_a_handshake_has_no_room_for_numbers_above_an_int16():
     mission = mission_of(stop("S32768", (0.0, 0.0), (1.0, 0.0)))
-    with pytest.raises(AnswerIsNo, match=r"stop S32768: number 32768 is above the 32767"):
+    with pytest.raises(NegativeResult, match=r"stop S32768: number 32768 is above the 32767"):
         translate(first_scan(mission, timeout_s=100.0), scan_wait="script_time")
 
 
 def test_a_hold_that_would_run_as_none_is_refused():
-    with pytest.raises(AnswerIsNo, match=r"stop S1: settle_s is 32768, a hold"):
+    with pytest.raises(NegativeResult, match=r"stop S1: settle_s is 32768, a hold"):
         translate(first_stop(square_tour(), settle_s=32_768.0), settle="hold")
 
 
 def test_a_fractional_hold_is_refused_and_a_fractional_delay_is_exact():
     mission = first_stop(square_tour(), settle_s=2.5)
-    with pytest.raises(AnswerIsNo, match=r"stop S1: settle_s is 2\.5, a hold is whole seconds"):
+    with pytest.raises(NegativeResult, match=r"stop S1: settle_s is 2\.5, a hold is whole seconds"):
         translate(mission, settle="hold")
     assert translate(mission).items[2].params[0] == 2.5
 
@@ -317,24 +317,24 @@ def test_four_items_per_stop_fill_a_vehicle(name, most):
     legs = [((float(x), 0.0), (float(x + 1), 0.0)) for x in range(most + 1)]
     stops = [stop(f"S{number}", *leg) for number, leg in enumerate(legs, 1)]
     translate(mission_of(*stops[:-1]), name)
-    with pytest.raises(AnswerIsNo, match=rf"{most + 1} stops make .* items, {name} holds"):
+    with pytest.raises(NegativeResult, match=rf"{most + 1} stops make .* items, {name} holds"):
         translate(mission_of(*stops), name)
 
 
 def test_more_items_than_the_vehicle_holds_are_refused():
     assert len(translate(square_tour(), max_items=11).items) == 10  # and home
-    with pytest.raises(AnswerIsNo, match=r"2 stops make 11 items, ardupilot holds 10; --settle hold"):
+    with pytest.raises(NegativeResult, match=r"2 stops make 11 items, ardupilot holds 10; --settle hold"):
         translate(square_tour(), max_items=10)
 
 
 @pytest.mark.parametrize(("most", "said"), [(9, "9, which is enough; or"), (8, "9, which is not enough")])
 def test_too_many_items_say_whether_settling_by_hold_is_enough(most, said):
-    with pytest.raises(AnswerIsNo, match=said):
+    with pytest.raises(NegativeResult, match=said):
         translate(square_tour(), max_items=most)
     if most == 9:
         assert len(translate(square_tour(), settle="hold", max_items=most).items) == 8  # and home
     else:
-        with pytest.raises(AnswerIsNo, match="make 9 items, ardupilot holds 8; plan fewer"):
+        with pytest.raises(NegativeResult, match="make 9 items, ardupilot holds 8; plan fewer"):
             translate(square_tour(), settle="hold", max_items=most)
 
 

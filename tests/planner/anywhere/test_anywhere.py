@@ -16,7 +16,7 @@ from stopgo.mission.stages import Candidates, Visibility
 from stopgo.planner import plan
 from stopgo.planner.candidates import candidates, judged
 from stopgo.planner.geometry.shapes import local_origin, to_grid
-from stopgo.planner.selection.continuous_selection.cells import Overlook, PlaceCells
+from stopgo.planner.selection.continuous_selection.cells import CellVisibility, PlaceCells
 from stopgo.planner.selection.cover import cover_of
 from stopgo.planner.selection.demands import Demands, demands_of
 from stopgo.planner.space.navigable import navigable
@@ -69,7 +69,7 @@ def test_a_cell_sees_all_that_places_in_it_see(seed: int, limits: dict[str, floa
     settings = replace(ANYWHERE, **limits)  # type: ignore[arg-type]
     found = candidates(navigable(small_floor(seed), settings))
     seen = visibility(places_in(found, size(short=80, full=300), seed))
-    overlook = Overlook(found)
+    overlook = CellVisibility(found)
     cells = overlook.whole()
     for _ in range(size(short=2, full=4)):
         for row in range(seen.rows):

@@ -99,12 +99,12 @@ def test_another_word_is_refused(value: str, capsys: pytest.CaptureFixture[str])
 
 
 def test_a_floor_where_nothing_is_to_be_seen_is_told_as_ever(tmp_path: Path) -> None:
-    from stopgo.mission.errors import AnswerIsNo
+    from stopgo.mission.errors import NegativeResult
 
     bare = floor_of(box(0, 0, 6, 4))
-    with pytest.raises(AnswerIsNo, match="target"):
+    with pytest.raises(NegativeResult, match="target"):
         plan(bare, Settings(minimise="time"))
-    with pytest.raises(AnswerIsNo):
+    with pytest.raises(NegativeResult):
         plan(floor_of(box(0, 0, 1, 1), elements=(shell(0, 0, 1, 1),)), Settings(minimise="time"))
 
 

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace as changed
 
 from stopgo.mission.document import MissionShare
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.files.coverage_json import Coverage, coverage_json
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray, frozen
@@ -23,7 +23,7 @@ from stopgo.planner.scan_simulation.casting import RayFan, SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, extruded
 from stopgo.planner.scan_simulation.proving import prove
 from stopgo.planner.scan_simulation.registering import off, registered, surface_of
-from stopgo.planner.scan_simulation.scanning import Stand, scanned
+from stopgo.planner.scan_simulation.scanning import ScannerPose, scanned
 from stopgo.planner.scan_simulation.strips import strips_of
 from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import box, column, element, hall, two_rooms
@@ -58,7 +58,7 @@ def test_points_on_a_wall_are_as_many_as_its_angle_has_rays() -> None:
     solids = extruded(space.floor, [], simulation.ceiling_m)
     strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
     place = np.array([3.0, 2.0, 1.3]) - [*solids.origin, 0.0]
-    found = scanned(solids, strips, Stand(place, 0.0), simulation)
+    found = scanned(solids, strips, ScannerPose(place, 0.0), simulation)
     cell = strips.middle[found.cell]
     level = np.abs(cell[:, 2] - 1.25) < 0.06
     south = level & (np.abs(cell[:, 1] - place[1] + 2.0) < 1e-6)
@@ -117,7 +117,7 @@ def test_of_one_mission_of_several_no_share_is_asked_that_is_asked_of_all() -> N
 
 def test_a_mission_without_stops_is_no() -> None:
     made = plan(hall(), Settings())
-    with pytest.raises(AnswerIsNo, match="no stops"):
+    with pytest.raises(NegativeResult, match="no stops"):
         prove(changed(made.mission, stops=()), made.space, COARSE, None)
 
 
@@ -158,7 +158,7 @@ def clouds_of(
     solids = extruded(space.floor, [], simulation.ceiling_m)
     strips = strips_of(solids, space.targets, space.floor, simulation.ceiling_m)
     stands = [
-        Stand(frozen([x, y, 1.3] - np.array([*solids.origin, 0.0])), 0.0, number=k)
+        ScannerPose(frozen([x, y, 1.3] - np.array([*solids.origin, 0.0])), 0.0, number=k)
         for k, (x, y) in enumerate(places)
     ]
     return [scanned(solids, strips, stand, simulation).cloud for stand in stands]

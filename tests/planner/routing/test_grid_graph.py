@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import Polygon
 from stopgo.mission.settings import Settings
@@ -115,7 +115,7 @@ def test_where_the_finest_grid_fails_the_message_names_the_way_out(monkeypatch: 
     monkeypatch.setattr("stopgo.planner.routing.grid_graph.RESOLUTIONS", RESOLUTIONS[:1])
     space = navigable(two_rooms(0.9, thick=3.0, at=1.7, with_door=False), GRID)
     points = np.array([(1.0, 1.0), (7.0, 3.0)])
-    with pytest.raises(AnswerIsNo, match=r"does not connect the stop at .*--graph exact"):
+    with pytest.raises(NegativeResult, match=r"does not connect the stop at .*--graph exact"):
         grid_ways(space, points)
     assert np.isinf(ways_on_grids(space, points, resolutions=(1.0,)).lengths[0, 1])
     assert np.isfinite(ways_between(space, points).lengths).all()

@@ -17,7 +17,7 @@ from stopgo.command_line import main
 from stopgo.mission.document import MissionShare
 from stopgo.mission.document.problems import problems_of
 from stopgo.mission.document.schedule import schedule
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.files.coverage_json import coverage_json
 from stopgo.mission.files.plan_svg import plan_svg
 from stopgo.mission.files.plan_toml import read_settings
@@ -199,7 +199,7 @@ def test_the_scans_of_all_robots_are_one_network_told_by_mission_and_stop() -> N
 
 
 def test_a_stop_too_far_for_a_shift_is_named() -> None:
-    with pytest.raises(AnswerIsNo, match=r"shift = 66 s: stop \d+ of the route, at \(\d"):
+    with pytest.raises(NegativeResult, match=r"shift = 66 s: stop \d+ of the route, at \(\d"):
         settled("hall", shift=66.0)
 
 

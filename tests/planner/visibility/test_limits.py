@@ -14,7 +14,7 @@ import pytest
 
 from stopgo.mission.document import canonical
 from stopgo.mission.document.problems import problems_of
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.files.mission_json import encode, parse
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace, Selection, Visibility
@@ -173,5 +173,5 @@ def test_what_cannot_be_seen_as_asked_is_told_and_strict_refuses_it() -> None:
     ],
 )
 def test_limits_that_leave_nothing_are_named(limits: dict[str, Any], told: str) -> None:
-    with pytest.raises(AnswerIsNo, match=rf"^test: nothing in sight is seen well enough: .*{told}"):
+    with pytest.raises(NegativeResult, match=rf"^test: nothing in sight is seen well enough: .*{told}"):
         plan(FLOOR, replace(Settings(), **limits))

@@ -18,7 +18,7 @@ from stopgo.bridge.link.clock import SimulatedClock
 from stopgo.bridge.robot.base import Outcome
 from stopgo.bridge.robot.journal import open_journal
 from stopgo.bridge.robot.simulator import SHAKE_M, Fault, Faults, SimulatedBase, Wear
-from stopgo.mission.comparing.run_collector import RunTaker
+from stopgo.mission.comparing.run_collector import RunSink
 from stopgo.mission.document import Mission, Point, Scan, Stop
 from stopgo.mission.run.events import AnyEvent, Pose, PoseReport, RevisionTaken
 from stopgo.mission.run.scans import ScanFailed, ScanResult
@@ -241,7 +241,7 @@ def _pause(world: Field, witness: Witness) -> None:
 def _hear_nothing(world: Field, witness: Witness) -> None:
     """The robot holds at once, but for a scan: it is not cut short."""
     if world.controller.run.state == "RUNNING":
-        world.controller.hear_of_link(SILENCE_S)
+        world.controller.on_link_silence(SILENCE_S)
         if world.controller.run.state == "HELD":
             witness.orders.append((world.clock.now_ns(), "held"))
 
@@ -262,7 +262,7 @@ def _operate(world: Field, witness: Witness, troubles: Troubles, chance: random.
             if held:
                 witness.orders.append((world.clock.now_ns(), "held"))
             world.clock.wait(chance.uniform(3, 30))
-            world.controller.hear_of_link(0.0)
+            world.controller.on_link_silence(0.0)
             gives_up = held and stop and chance.random() < troubles.gives_up
             _order(world, witness, "skip" if gives_up else "retry" if held else "resume")
 
@@ -286,7 +286,7 @@ def _bring_back(world: Field) -> None:
     world.base.stand_at(Pose(x=place.x, y=place.y, heading=pose.heading))
 
 
-def tell(taker: RunTaker, missions: Sequence[Mission], witness: Witness) -> None:
+def tell(taker: RunSink, missions: Sequence[Mission], witness: Witness) -> None:
     """Tell what a station would have heard: all events, and poses 20 times a second."""
     first, *revised = missions
     taker.mission(first)

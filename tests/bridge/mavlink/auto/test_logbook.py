@@ -12,7 +12,7 @@ from stopgo.bridge.mavlink.auto.logbook import Logbook, forget, logbook, name_of
 from stopgo.bridge.mavlink.auto.unfinished_run import check_run_over
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.bridge.robot.journal import open_journal
-from stopgo.mission.errors import AnswerIsNo, InputError
+from stopgo.mission.errors import InputError, NegativeResult
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Aborted, Paused
 from stopgo.mission.run.states import Change, Run, changed, started
@@ -110,7 +110,7 @@ def test_a_mission_is_not_taken_from_under_a_run(state: str, tmp_path: Path) -> 
         check_run_over("it", URL, book, "a push")  # type: ignore[arg-type]
         book.move(lambda run: (started(run, run_id="r7", now_ns=0, by="me"),))
         book.move(lambda run: (Change(changed(run, state=state, done=("S1",))),))  # type: ignore[arg-type]
-        with pytest.raises(AnswerIsNo) as no:
+        with pytest.raises(NegativeResult) as no:
             check_run_over("it", URL, book, "a push")  # type: ignore[arg-type]
     said = str(no.value)
     assert f"run r7 of room (0123456789ab) is {state}, 1 of 3 stops done, and a push would end it" in said

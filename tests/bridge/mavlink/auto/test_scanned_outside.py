@@ -15,9 +15,9 @@ from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.line.peer import reached as found_peer
 from stopgo.bridge.mavlink.simulated.estimator import Estimator
 from stopgo.bridge.station.watch import Lines, watch_showing
-from stopgo.mission.comparing.run_collector import HeardRun
+from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Scan
-from stopgo.mission.errors import AnswerIsNo
+from stopgo.mission.errors import NegativeResult
 from stopgo.mission.run.events import Failed, Scanned, Unconfirmed
 from stopgo.mission.run.tolerance import deviation
 from stopgo.recordings.catalog.run_index import index_of, index_text
@@ -61,9 +61,9 @@ def test_a_scan_during_which_the_estimate_jumps_is_told_with_its_deviation_every
     path = tmp_path / "records" / "field.rrd"
     with site.up(), FieldRecording(path, None) as record, site.reached() as station:
         station.command("start")
-        heard = HeardRun(record)
+        heard = RunCollector(record)
         state = watch_showing(station, heard, Lines(said.append))
-        again = watch_showing(station, HeardRun(), Lines(said.append), run_id=state.run_id)
+        again = watch_showing(station, RunCollector(), Lines(said.append), run_id=state.run_id)
     first = site.mission.stops[0]
     scan = next(event for event in site.events if isinstance(event, Scanned) and event.stop == "S1")
     away = deviation(scan.pose, first)
@@ -90,7 +90,7 @@ def test_a_stop_that_is_missed_and_left_out_is_not_done(
 ) -> None:
     """It drives as a real one, so all its stops are beside their places; it scans there all the same."""
     mission = real_tour(tolerance_m=NARROW_M, on_failure="skip")
-    site, said, heard = Site(tmp_path, profile, mission=mission, seed=2), [], HeardRun()
+    site, said, heard = Site(tmp_path, profile, mission=mission, seed=2), [], RunCollector()
     with site.up(), site.reached() as station:
         station.command("start")
         state = watch_showing(station, heard, Lines(said.append))
@@ -109,7 +109,11 @@ def test_a_stop_that_is_missed_and_left_out_is_not_done(
 def test_within_a_tolerance_that_it_keeps_its_stops_are_done_with_their_deviation(
     profile: str, tmp_path: Path
 ) -> None:
-    site, said, heard = Site(tmp_path, profile, mission=real_tour(tolerance_m=WIDE_M), seed=2), [], HeardRun()
+    site, said, heard = (
+        Site(tmp_path, profile, mission=real_tour(tolerance_m=WIDE_M), seed=2),
+        [],
+        RunCollector(),
+    )
     with site.up(), site.reached() as station:
         station.command("start")
         state = watch_showing(station, heard, Lines(said.append))
@@ -146,7 +150,7 @@ def test_a_push_names_the_stops_of_the_run_in_its_way_that_were_scanned_from_els
         site.up(),
         site.book() as book,
         found_peer(site.url, vehicle=1) as peer,
-        pytest.raises(AnswerIsNo, match=r"1 of 3 stops done \(1 scanned outside tolerance: S1\)"),
+        pytest.raises(NegativeResult, match=r"1 of 3 stops done \(1 scanned outside tolerance: S1\)"),
     ):
         check_run_over(peer, site.url, book, "a push")
 

@@ -13,7 +13,7 @@ from stopgo.bridge.mavlink.line.frames import dialect
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.line.peer import reached as found_peer
 from stopgo.bridge.station.follow import Silence
-from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown
+from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Arrived, Held, Paused, Resumed, Started
 from tests.bridge.mavlink.auto.site import ALL, Site, real_tour, until, watched
@@ -41,7 +41,7 @@ def test_after_a_reboot_the_run_goes_on_at_the_stop_that_was_not_finished(
         site.order("start")
         until(site, lambda events, run: run.state == "PAUSED")
         assert site.run.done == ("S1",) and site.run.reason == "reboot"
-        with pytest.raises(AnswerIsNo, match="not_armed"):
+        with pytest.raises(NegativeResult, match="not_armed"):
             site.order("resume", arm=False)
         assert site.order("resume").state == "RUNNING"
     words = told(site.events)
@@ -122,7 +122,7 @@ def test_a_mission_that_somebody_else_changes_holds_the_run(tmp_path: Path) -> N
                 upload(peer, short)
             until(site, lambda events, run: run.state == "HELD")
         assert "somebody has changed" in site.run.reason
-        with pytest.raises(AnswerIsNo, match="mission_differs"):
+        with pytest.raises(NegativeResult, match="mission_differs"):
             site.order("retry")
         site.order("abort")
     assert any(isinstance(event, Held) for event in site.events)

@@ -15,7 +15,7 @@ from stopgo.bridge.mavlink.line.peer import reached as found_peer
 from stopgo.bridge.mavlink.simulated.vehicle_store import Store
 from stopgo.bridge.robot.answers import answer_to, remember_answer
 from stopgo.mission.document import Scan
-from stopgo.mission.errors import AnswerIsNo, InputError, RobotUnreachable
+from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
 from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import Aborted, Pose, Resumed, Started
@@ -30,7 +30,7 @@ PROFILES = ["ardupilot", "px4"]
 
 def refused(site: Site, verb: str, **details: object) -> str:
     """Why an order was refused."""
-    with pytest.raises(AnswerIsNo) as no:
+    with pytest.raises(NegativeResult) as no:
         site.order(verb, **details)
     return str(no.value)
 
@@ -117,7 +117,7 @@ def test_a_mission_that_another_station_has_cleared_is_not_told_or_started(tmp_p
     Store(tmp_path / "vehicle").keep(mission=())
     with site.up(), site.reached() as station:
         assert (station.status().state, station.status().mission_id) == ("IDLE", None)
-        with pytest.raises(AnswerIsNo, match=r"no_mission: .*cleared") as no:
+        with pytest.raises(NegativeResult, match=r"no_mission: .*cleared") as no:
             station.command("start")
     assert no.value.reason == "no_mission"
 
@@ -129,7 +129,7 @@ def test_an_abort_under_a_used_id_is_refused_and_never_told_that_it_was_done(tmp
         no_vehicle: Any = None
         orders = VehicleOrders(book, no_vehicle, no_vehicle, no_vehicle, book.clock, Consent())
         remember_answer(book.journal, start, answer_to(start, None, book.run))
-        assert (orders.obey(start).outcome, orders.obey(abort).reason) == ("ok", "id_reused")
+        assert (orders.execute(start).outcome, orders.execute(abort).reason) == ("ok", "id_reused")
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ def test_a_finished_mission_runs_once_more_when_that_is_meant(tmp_path: Path) ->
     with site.up():
         with watched(site):
             site.order("start")
-        with pytest.raises(AnswerIsNo, match="finished_before"):
+        with pytest.raises(NegativeResult, match="finished_before"):
             site.order("start")
         with site.reached() as station:
             assert station.command("start", again=True, from_here=True).state == "RUNNING"
@@ -221,7 +221,7 @@ def test_a_second_station_knows_nothing_of_the_run_and_starts_nothing(tmp_path: 
         site.order("start")
         with site.reached(state=tmp_path / "other", commander="other") as station:
             assert station.status().state == "IDLE" and station.status().run_id is None
-            with pytest.raises(AnswerIsNo, match="no_mission"):
+            with pytest.raises(NegativeResult, match="no_mission"):
                 station.command("start")
         assert site.run.state == "RUNNING"
         site.order("abort")
@@ -232,7 +232,7 @@ def test_another_commander_is_refused_until_the_lease_is_over(tmp_path: Path) ->
     with site.up():
         site.order("start")
         with site.reached(commander="other") as station:
-            with pytest.raises(AnswerIsNo, match="not_the_commander"):
+            with pytest.raises(NegativeResult, match="not_the_commander"):
                 station.command("skip")
             assert station.command("pause").outcome == "ok"
             assert station.command("resume", take_over=True).outcome == "ok"

@@ -16,9 +16,9 @@ from stopgo.bridge.mavlink.line.wire import read_signing_key
 from stopgo.bridge.mavlink.simulated.chassis import Chassis
 from stopgo.bridge.mavlink.simulated.vehicle_faults import VehicleFault, VehicleFaults
 from stopgo.bridge.station.watch import Lines, watch_showing
-from stopgo.mission.comparing.run_collector import HeardRun
+from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.document import Scan, sealed
-from stopgo.mission.errors import AnswerIsNo, InputError, RobotUnreachable
+from stopgo.mission.errors import InputError, NegativeResult, RobotUnreachable
 from stopgo.mission.mavlink.telemetry import STILL_M_S
 from stopgo.mission.run.events import Arrived, Finished, Held, PoseReport, Scanned
 from tests.bridge.mavlink.driving.world import (
@@ -81,7 +81,7 @@ def test_an_ardupilot_rover_turns_to_the_headings_that_a_narrow_scanner_needs(tm
 def test_a_mission_without_georeference_is_refused(tmp_path: Path) -> None:
     with rover(tmp_path, "ardupilot") as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
         with pytest.raises(
-            AnswerIsNo, match="infeasible: the mission has no georeference; plan it with --or"
+            NegativeResult, match="infeasible: the mission has no georeference; plan it with --or"
         ):
             station.push(site_mission(site=None))
         assert station.status().mission_id is None
@@ -90,9 +90,9 @@ def test_a_mission_without_georeference_is_refused(tmp_path: Path) -> None:
 def test_a_mission_from_another_origin_is_refused(tmp_path: Path) -> None:
     elsewhere = msgspec.structs.replace(SITE, lat=SITE.lat + 5e-6)
     with rover(tmp_path, "ardupilot") as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
-        with pytest.raises(AnswerIsNo, match=r"origin \(47\.4.*\) lies 0\.56 m from the mission's"):
+        with pytest.raises(NegativeResult, match=r"origin \(47\.4.*\) lies 0\.56 m from the mission's"):
             station.push(site_mission(site=elsewhere))
-        with pytest.raises(AnswerIsNo, match="more than a kilometre"):
+        with pytest.raises(NegativeResult, match="more than a kilometre"):
             station.push(site_mission(site=msgspec.structs.replace(SITE, lat=-SITE.lat)))
 
 
@@ -102,7 +102,7 @@ def test_a_scanner_that_needs_headings_is_not_driven_by_what_cannot_turn(tmp_pat
     with (
         rover(tmp_path, "px4") as (vehicle, _),
         gateway(tmp_path, vehicle.url) as station,
-        pytest.raises(AnswerIsNo, match="sees 90°"),
+        pytest.raises(NegativeResult, match="sees 90°"),
     ):
         station.push(sealed(narrow))
 
@@ -113,7 +113,7 @@ def test_nothing_starts_without_origin_arming_or_a_free_hand(tmp_path: Path) -> 
         gateway(tmp_path, vehicle.url, arm=False) as station,
     ):
         station.push(site_mission())
-        with pytest.raises(AnswerIsNo, match="not_ready: the autopilot has no origin"):
+        with pytest.raises(NegativeResult, match="not_ready: the autopilot has no origin"):
             station.command("start")
         vehicle.off()
         vehicle.on()
@@ -121,7 +121,7 @@ def test_nothing_starts_without_origin_arming_or_a_free_hand(tmp_path: Path) -> 
         rover(tmp_path, "ardupilot") as (vehicle, operator),
         gateway(tmp_path, vehicle.url, arm=False) as station,
     ):
-        with pytest.raises(AnswerIsNo, match=r"not_ready: the autopilot is disarmed; .*--arm"):
+        with pytest.raises(NegativeResult, match=r"not_ready: the autopilot is disarmed; .*--arm"):
             station.command("start")
         operator.manual()
         refusals = (_refusal(station) for _ in station.reports())
@@ -169,7 +169,9 @@ def test_who_drives_by_hand_keeps_the_vehicle_until_it_is_handed_over(tmp_path: 
         operator.manual()
         held = until(reports, lambda report: isinstance(report, Held))
         assert "somebody switched the autopilot to MANUAL" in held.reason
-        with pytest.raises(AnswerIsNo, match="somebody else drives it; to hand it over, switch it to HOLD"):
+        with pytest.raises(
+            NegativeResult, match="somebody else drives it; to hand it over, switch it to HOLD"
+        ):
             station.command("retry")
         assert operator.mode() == "MANUAL"
         operator.hold()
@@ -180,7 +182,7 @@ def test_who_drives_by_hand_keeps_the_vehicle_until_it_is_handed_over(tmp_path: 
 
 def _refusal(station: Any) -> str:
     """Why the robot does not start."""
-    with pytest.raises(AnswerIsNo) as refused:
+    with pytest.raises(NegativeResult) as refused:
         station.command("start")
     return str(refused.value)
 
@@ -189,7 +191,7 @@ def _retried(station: Any) -> bool:
     """Whether the robot has heard by now that it is handed over."""
     try:
         return bool(station.command("retry").outcome == "ok")
-    except AnswerIsNo:
+    except NegativeResult:
         return False
 
 
@@ -278,7 +280,7 @@ def test_a_line_that_is_cut_holds_the_leg_and_stops_the_vehicle_once_it_is_back(
         line.roughness = Roughness(loss=1.0)
         held = until(reports, lambda report: isinstance(report, Held))
         assert "the autopilot has not been heard for" in held.reason
-        with pytest.raises(AnswerIsNo, match="not_ready: the autopilot has not been heard"):
+        with pytest.raises(NegativeResult, match="not_ready: the autopilot has not been heard"):
             station.command("retry")
         assert operator.mode() == "GUIDED"
         line.roughness = Roughness()
@@ -389,7 +391,7 @@ def _strict(tmp_path: Path) -> None:
 def test_a_scan_during_which_the_estimate_jumps_is_told_as_made_beside_its_stop(tmp_path: Path) -> None:
     """The vehicle stood still, and where that was nobody knows: done, and never without saying so."""
     scan = Scan(profile="default", duration_s=40.0, timeout_s=60.0)
-    mission, said, heard = site_mission(stops=1, scan=scan), [], HeardRun()
+    mission, said, heard = site_mission(stops=1, scan=scan), [], RunCollector()
     faults = VehicleFaults((VehicleFault("jump", 35, 0.12),))
     with (
         rover(tmp_path, "ardupilot", faults=faults) as (vehicle, _),

@@ -9,7 +9,7 @@ from stopgo.bridge.mavlink.line.messages import station_beat
 from stopgo.bridge.mavlink.line.peer import found, reached
 from stopgo.bridge.mavlink.line.url import read_url
 from stopgo.bridge.mavlink.line.wire import Who, wire
-from stopgo.mission.errors import AnswerIsNo, InputError, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import InputError, NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots.generic import GENERIC
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
 from stopgo.mission.mavlink.telemetry import Message
@@ -118,7 +118,7 @@ class Refusing(Scripted):
 
 
 def test_a_refusal_is_told_with_the_vehicles_words() -> None:
-    told = pytest.raises(AnswerIsNo, match=r"COMPONENT_ARM_DISARM was answered FAILED .*Arm: no position")
+    told = pytest.raises(NegativeResult, match=r"COMPONENT_ARM_DISARM was answered FAILED .*Arm: no position")
     with Refusing() as vehicle, reached(vehicle.url, vehicle=1) as peer, told:
         peer.order(ARM, 1)
 

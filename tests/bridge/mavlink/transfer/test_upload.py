@@ -15,7 +15,7 @@ from stopgo.bridge.mavlink.line.wire import Who
 from stopgo.bridge.mavlink.transfer import upload as uploads
 from stopgo.bridge.mavlink.transfer.download import download
 from stopgo.bridge.mavlink.transfer.upload import Uploaded, clear, upload
-from stopgo.mission.errors import AnswerIsNo, OutcomeUnknown, RobotUnreachable
+from stopgo.mission.errors import NegativeResult, OutcomeUnknown, RobotUnreachable
 from stopgo.mission.mavlink.autopilots import autopilot_named
 from stopgo.mission.mavlink.items import Item
 from stopgo.mission.mavlink.telemetry import Message
@@ -107,7 +107,7 @@ def test_a_refused_item_is_named_with_its_stop_and_field(result: int, field: str
     with Refuses(held(OLD)) as vehicle:
         vehicle.result = result
         with pytest.raises(
-            AnswerIsNo, match=said + r"; it still holds the mission it had before \(6 items\)"
+            NegativeResult, match=said + r"; it still holds the mission it had before \(6 items\)"
         ):
             pushed(vehicle)
         assert items_on(vehicle) == items_on_list(held(OLD))
@@ -119,7 +119,7 @@ class Full(Scripted):
 
 
 def test_too_many_items_are_told_as_such() -> None:
-    with Full() as vehicle, pytest.raises(AnswerIsNo, match=r"refused 40 items .* plan fewer stops"):
+    with Full() as vehicle, pytest.raises(NegativeResult, match=r"refused 40 items .* plan fewer stops"):
         pushed(vehicle)
 
 
@@ -132,7 +132,7 @@ class Busy(Scripted):
 
 def test_a_second_station_is_told_that_nothing_was_stored() -> None:
     said = r"takes no mission now \(DENIED\).*nothing of this mission was stored"
-    with Busy(held(OLD)) as vehicle, pytest.raises(AnswerIsNo, match=said):
+    with Busy(held(OLD)) as vehicle, pytest.raises(NegativeResult, match=said):
         pushed(vehicle)
 
 
@@ -148,7 +148,7 @@ class Forgets(Scripted):
 def test_what_is_kept_otherwise_is_no_success() -> None:
     said = r"read back otherwise: item 1 \(scan of S1\): param1 sent 2\.5, .* is 2;.*and 17 more; it again"
     with Forgets(held(OLD)) as vehicle:
-        with pytest.raises(AnswerIsNo, match=said):
+        with pytest.raises(NegativeResult, match=said):
             pushed(vehicle, timeout_s=2.0)
         assert len(vehicle.held) == 6
 
@@ -232,7 +232,7 @@ class Reboots(Breaks):
 
 def test_a_reboot_is_noticed_and_what_it_left_is_told() -> None:
     said = r"was started again when \d of 40 items had arrived; it still holds the mission it had"
-    with Reboots(held(OLD)) as vehicle, pytest.raises(AnswerIsNo, match=said):
+    with Reboots(held(OLD)) as vehicle, pytest.raises(NegativeResult, match=said):
         pushed(vehicle, timeout_s=5.0)
 
 
@@ -305,14 +305,14 @@ def rover_refusing(before: list[Message]) -> RefusingRover:
 def test_half_an_upload_is_replaced_by_the_old_mission() -> None:
     said = r"refused item 5, NAV_WAYPOINT .* S3.*; it again holds the mission it had before \(6 items\)"
     with rover_refusing(held(ROVER_OLD)) as vehicle:
-        with pytest.raises(AnswerIsNo, match=said):
+        with pytest.raises(NegativeResult, match=said):
             pushed(vehicle, ROVER_NEW)
         assert items_on(vehicle)[1:] == items_on_list(held(ROVER_OLD))[1:]
 
 
 def test_half_an_upload_to_an_empty_vehicle_is_taken_off() -> None:
     with rover_refusing([]) as vehicle:
-        with pytest.raises(AnswerIsNo, match=r"it holds no mission"):
+        with pytest.raises(NegativeResult, match=r"it holds no mission"):
             pushed(vehicle, ROVER_NEW)
         assert vehicle.held == []
 
@@ -372,11 +372,11 @@ def running(vehicle: Scripted) -> Scripted:
 def test_the_mission_that_is_driven_is_left_alone() -> None:
     with running(Rover(held(ROVER_OLD))) as vehicle:
         with pytest.raises(
-            AnswerIsNo, match=r"armed and follows its mission.*--while-running.*nothing was sent"
+            NegativeResult, match=r"armed and follows its mission.*--while-running.*nothing was sent"
         ):
             pushed(vehicle, ROVER_NEW)
         assert vehicle.heard["MISSION_REQUEST_LIST"] == 0
-        with reached(vehicle.url, vehicle=1) as peer, pytest.raises(AnswerIsNo, match="armed"):
+        with reached(vehicle.url, vehicle=1) as peer, pytest.raises(NegativeResult, match="armed"):
             clear(peer)
         assert pushed(vehicle, ROVER_NEW, while_running=True) == HELD_NEW
 
@@ -426,7 +426,7 @@ def test_an_origin_within_five_centimetres_is_the_same(peer: tuple[Scripted, Pee
     check_origin(it, SITE)
     vehicle.origin = (470_000_007, 80_000_000, 0)
     with pytest.raises(
-        AnswerIsNo, match=r"is 0\.08 m from the mission's 47\.0000000, 8\.0000000.*once per boot"
+        NegativeResult, match=r"is 0\.08 m from the mission's 47\.0000000, 8\.0000000.*once per boot"
     ):
         check_origin(it, SITE, set_it=True)
 
@@ -434,6 +434,6 @@ def test_an_origin_within_five_centimetres_is_the_same(peer: tuple[Scripted, Pee
 def test_an_origin_is_set_where_there_is_none(peer: tuple[Scripted, Peer]) -> None:
     vehicle, it = peer
     vehicle.origin = None
-    with pytest.raises(AnswerIsNo, match=r"no origin.*--set-origin.*nothing was sent"):
+    with pytest.raises(NegativeResult, match=r"no origin.*--set-origin.*nothing was sent"):
         check_origin(it, SITE)
     assert check_origin(it, SITE, set_it=True).lat == 47.0
