@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import sys
@@ -10,8 +9,10 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from stopgo.mission.console.json_answer import answering
+from stopgo.mission.console.notice import notice
 from stopgo.mission.console.process import PIPE_CLOSED, Signals, drop_output, have_output, reader_is_gone
 from stopgo.mission.errors import InputError, MissingExtra, StopgoError
+from stopgo.renamed_options import with_new_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,7 +65,7 @@ def _heeding(arguments: list[str], *, whole_process: bool) -> int:
                 return code
             except BaseException as error:  # noqa: BLE001  the process ends here
                 message, code = _ended_by(error, signals)
-                _say(message)
+                notice(message)
                 answer.fail(message, code)
                 return code
     except KeyboardInterrupt:  # a second one, while the first was told of
@@ -126,6 +127,9 @@ def _word_of(made: CommandInfo, get_command_name: Callable[[str], str]) -> str:
 def _run(arguments: list[str]) -> int:
     """The command's own exit code, if it does not raise."""
     _must_be_text(arguments)
+    arguments, renamed = with_new_names(arguments)
+    for line in renamed:
+        notice(line)
     if COMPLETING in os.environ:  # a shell asks what the words typed so far may become
         front_door().main(list(arguments), prog_name="stopgo")
     command = front_door(arguments[0] if arguments else "")
@@ -194,13 +198,3 @@ def _missing(error: ModuleNotFoundError) -> tuple[str, int]:
     extra = EXTRAS[library]
     message = f'{library} is not installed; install it with: pip install "stopgo[{extra}]"'
     return message, MissingExtra.exit_code
-
-
-def _say(message: str) -> None:
-    """The line on stderr, if there is one."""
-    from stopgo.mission.console.table import printable, shortened
-
-    if message:
-        with contextlib.suppress(OSError):  # nobody reads it
-            line = " ".join(shortened(word) for word in message.split())
-            print(f"stopgo: {printable(line)}", file=sys.stderr)  # noqa: T201

@@ -13,7 +13,7 @@ from msgspec import UNSET, UnsetType
 
 from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.frames.transform import Point, SiteOrigin, Transform
-from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, told_of
+from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, recorded_values
 
 SCHEMA: Final = "stopgo/mission"
 VERSION: Final = 1
@@ -218,6 +218,8 @@ def mission_id(source: FloorSource, settings: Settings, version: str, part: int 
 
     What the settings tell the floor's reader is in the source.
     """
-    parameters = {key: value for key, value in told_of(settings).items() if key not in FLOOR_PARAMETERS}
+    parameters = {
+        key: value for key, value in recorded_values(settings).items() if key not in FLOOR_PARAMETERS
+    }
     basis = [source.basis, parameters, version, part]
     return hashlib.sha256(canonical({"basis": basis})).hexdigest()[:32]

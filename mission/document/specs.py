@@ -12,7 +12,7 @@ from stopgo.mission import __version__
 from stopgo.mission.document import LimitsSpec, Origin, Policy, RobotSpec, Scan, ScannerSpec
 from stopgo.mission.document.limits import blind_range
 from stopgo.mission.frames.transform import SiteOrigin
-from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, told_of
+from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, recorded_values
 
 DECIMALS = 6
 """Missions hold micrometres and microradians: finer would be float noise."""
@@ -82,7 +82,7 @@ def site_origin_of(settings: Settings) -> SiteOrigin | None:
 
 def origin_of(settings: Settings, *, floor: str, digest: str) -> Origin:
     """What the mission was made from: a file's name and digest, and every setting that was decided."""
-    told = msgspec.json.decode(msgspec.json.encode(told_of(settings)))
+    told = msgspec.json.decode(msgspec.json.encode(recorded_values(settings)))
     parameters = {
         key: value for key, value in told.items() if value not in (None, []) or key not in FLOOR_PARAMETERS
     }

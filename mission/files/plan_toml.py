@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from stopgo.mission.errors import InputError
-from stopgo.mission.settings import PARAMETERS, Settings, check_settings
+from stopgo.mission.settings import PARAMETERS, Settings
 from stopgo.mission.settings.parameter import Parameter
+from stopgo.mission.settings.parameter_checks import check_settings
 from stopgo.mission.settings.scanners import SCANNERS
 from stopgo.mission.settings.toml_file import read_toml
 
 
-def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
+def read_settings(
+    path: Path | None, overrides: dict[str, Any], *, notify: Callable[[str], None] = lambda line: None
+) -> Settings:
     """Settings from plan.toml (if given) and then `overrides`; both are checked.
+
+    A parameter may have the name that missions give it, or the word that people use for it. `notify` gets a
+    line for every key of plan.toml that has a newer name.
 
     Raises
     ------
@@ -23,15 +30,16 @@ def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
     """
     import msgspec
 
-    values = {} if path is None else _values_of(path)
-    values.update({key: value for key, value in overrides.items() if value is not None})
-    for key in values:
-        if key not in PARAMETERS:
-            raise InputError(f"{key}: no such parameter; known: {', '.join(PARAMETERS)}")
+    values = {} if path is None else _values_of(path, notify)
+    for key, value in overrides.items():
+        if key not in _NAMES:
+            raise InputError(f"{key}: no such parameter; known: {', '.join(_known())}")
+        if value is not None:
+            values[_NAMES[key]] = value
     try:
         typed = msgspec.convert(values, Settings)
     except msgspec.ValidationError as error:
-        raise InputError(_said(str(error), values, path)) from None
+        raise InputError(_refused(str(error), values, path)) from None
     given = {key: getattr(typed, key) for key in values}  # typed itself lacks the defaults
     facts = {} if given.get("scanner") is None else SCANNERS[given["scanner"]].values()
     settings = Settings(**{**facts, **given})
@@ -39,16 +47,24 @@ def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
     return settings
 
 
+_NAMES = {**{item.key: name for name, item in PARAMETERS.items()}, **{name: name for name in PARAMETERS}}
+"""Names in missions, by these names and by the words for people."""
+
+
+def _known() -> list[str]:
+    return [parameter.key for parameter in PARAMETERS.values()]
+
+
 def settings_toml(settings: Settings) -> str:
-    """The settings as a plan.toml that reads back the same; what is undecided stands as a comment."""
+    """The settings as a plan.toml that reads back the same; undecided parameters are comments."""
     lines: list[str] = []
     for table, parameters in _tables().items():
         lines.append(f"[{table}]")
         for parameter in parameters:
             value = getattr(settings, parameter.name)
-            undecided = f"# {parameter.name} = ({parameter.undecided})"
+            undecided = f"# {parameter.key} = ({parameter.undecided})"
             lines.append(f"# {parameter.meaning}")
-            lines.append(undecided if value is None else f"{parameter.name} = {_toml(value)}")
+            lines.append(undecided if value is None else f"{parameter.key} = {_toml(value)}")
         lines.append("")
     return "\n".join(lines)
 
@@ -56,16 +72,18 @@ def settings_toml(settings: Settings) -> str:
 def settings_json(settings: Settings) -> dict[str, dict[str, Any]]:
     """The settings by their table in plan.toml; what is undecided is null."""
     return {
-        table: {parameter.name: getattr(settings, parameter.name) for parameter in parameters}
+        table: {parameter.key: getattr(settings, parameter.name) for parameter in parameters}
         for table, parameters in _tables().items()
     }
 
 
-def _said(error: str, values: dict[str, Any], path: Path | None) -> str:
-    """A refused value as one line: key, value, and what would be right."""
-    what, _, where = error.partition(" - at `$.")
+def _refused(error: str, values: dict[str, Any], path: Path | None) -> str:
+    """A refused value as one line: file and key, or option; the value; and what would be right."""
+    problem, _, where = error.partition(" - at `$.")
     key = where.rstrip("`").partition("[")[0]
-    return f"{f'{path}: ' if path else ''}{key} = {_shown(values[key])}: {PARAMETERS[key].right or what}"
+    parameter, value = PARAMETERS[key], _shown(values[key])
+    given = f"{parameter.flag} {value}" if path is None else f"{path}: {parameter.key} = {value}"
+    return f"{given}: {parameter.right or problem}"
 
 
 def _shown(value: object) -> str:
@@ -74,25 +92,31 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _values_of(path: Path) -> dict[str, Any]:
+def _values_of(path: Path, notify: Callable[[str], None]) -> dict[str, Any]:
+    """The values in a plan.toml, by their names in missions."""
     document = read_toml(path)
     tables = _tables()
     known = ", ".join(f"[{table}]" for table in tables)
     values: dict[str, Any] = {}
     for table, content in document.items():
         if not isinstance(content, dict):
-            raise InputError(f"{path}: {table} = {content} stands in no table; known: {known}")
+            raise InputError(f"{path}: {table} = {content} is in no table; known: {known}")
         if table not in tables:
             raise InputError(f"{path}: unknown table [{table}]; known: {known}")
-        for key in content:
-            if key not in PARAMETERS or PARAMETERS[key].section != table:
-                raise InputError(f"{path}: unknown key {key} in [{table}]; {_home_of(key, table)}")
-        values.update(content)
+        for key, value in content.items():
+            name = _NAMES[key] if key in _NAMES else str(key)
+            if name not in PARAMETERS or PARAMETERS[name].section != table:
+                raise InputError(f"{path}: unknown key {key} in [{table}]; {_home_of(name, table)}")
+            if name in values:
+                raise InputError(f"{path}: {key} in [{table}] is given by its old and new name; remove one")
+            if key != PARAMETERS[name].key:
+                notify(f"{path}: {key} is now called {PARAMETERS[name].key}; the old name ends with 0.3")
+            values[name] = value
     return values
 
 
 def _tables() -> dict[str, list[Parameter]]:
-    """The tables of plan.toml and the parameters in each."""
+    """The tables of plan.toml with their parameters."""
     found: dict[str, list[Parameter]] = {}
     for parameter in PARAMETERS.values():
         found.setdefault(parameter.section, []).append(parameter)
@@ -102,7 +126,7 @@ def _tables() -> dict[str, list[Parameter]]:
 def _home_of(key: str, table: str) -> str:
     if key in PARAMETERS:
         return f"it belongs in [{PARAMETERS[key].section}]"
-    return f"known there: {', '.join(parameter.name for parameter in _tables()[table])}"
+    return f"known there: {', '.join(parameter.key for parameter in _tables()[table])}"
 
 
 def _toml(value: object) -> str:

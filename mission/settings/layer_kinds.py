@@ -1,4 +1,4 @@
-"""What the layers of a drawing stand for, as a person says it: in a file, or entry by entry."""
+"""Kinds of element by layer of a drawing, as a person gives them: in a file, or entry by entry."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from stopgo.mission.settings.element_kinds import KINDS
 from stopgo.mission.settings.toml_file import read_toml
 
 LAYER_ROLES = ("floor", "rooms", "names", "doors", "openings", "passages", *KINDS, "furniture", "ignore")
-"""What a layer of a drawing can stand for; names are of rooms, openings are doors and windows alike."""
+"""Roles of a layer; `names` are of rooms, `openings` are doors and windows alike."""
 
 
-def entries_in(told: str) -> tuple[str, ...]:
+def entries_in(given: str) -> tuple[str, ...]:
     """Entries `NAME=KIND` of a file that `stopgo floors --write-map` wrote, or written out, with commas.
 
     Raises
@@ -21,9 +21,9 @@ def entries_in(told: str) -> tuple[str, ...]:
     InputError
         Naming the file, the key or layer, the value and what would be right.
     """
-    path = Path(told)
-    if "=" in told and not path.exists():
-        return tuple(entry.strip() for entry in told.split(","))
+    path = Path(given)
+    if "=" in given and not path.exists():
+        return tuple(entry.strip() for entry in given.split(","))
     document = read_toml(path, way_out=f"write one with: stopgo floors FLOOR.dxf --write-map {path.name}")
     for key in document:
         if key != "layers":
@@ -39,8 +39,8 @@ def entries_in(told: str) -> tuple[str, ...]:
 
 def kinds_by_name(entries: Iterable[str]) -> dict[str, str]:
     """Kinds by layers' names in capitals."""
-    told = (entry.rpartition("=") for entry in entries)
-    return {name.strip().upper(): kind.strip().lower() for name, _, kind in told}
+    pairs = (entry.rpartition("=") for entry in entries)
+    return {name.strip().upper(): kind.strip().lower() for name, _, kind in pairs}
 
 
 def check_entries(entries: Iterable[str], *, key: str) -> None:
@@ -48,4 +48,4 @@ def check_entries(entries: Iterable[str], *, key: str) -> None:
     for entry in entries:
         name, _, kind = entry.rpartition("=")
         if not name.strip() or kind.strip().lower() not in LAYER_ROLES:
-            raise InputError(f"{key} = {entry}: write NAME=KIND; kinds: {', '.join(LAYER_ROLES)}")
+            raise InputError(f"{key} {entry}: write NAME=KIND; kinds: {', '.join(LAYER_ROLES)}")

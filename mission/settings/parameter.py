@@ -1,4 +1,4 @@
-"""One parameter of a plan as it is declared once: what it means, what it may be, and how it is written."""
+"""A parameter of a plan, declared once: its meaning, its limits, and its form for people."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _DURATION = re.compile(f"(?:{_NUMBER}h)?(?:{_NUMBER}min)?(?:{_NUMBER}s)?")
 
 @dataclass(frozen=True)
 class Parameter:
-    """What is said of a parameter where it is declared; its name, type and default stand beside it."""
+    """The declaration of a parameter; name, type and default come from the field that it annotates."""
 
     section: str
     """The table of plan.toml it stands in."""
@@ -50,47 +50,67 @@ class Parameter:
     below: float | None = None
     most: float | None = None
     farthest: float = FARTHEST
-    """What several numbers may be at most, either way."""
+    """Limit of several numbers, to either side."""
     why: str = ""
-    """Why the limits are as they are, or an example."""
+    """The reason for the limits, or an example."""
     undecided: str = "none"
-    """What is taken if nothing is given."""
+    """Value that is taken if none is given."""
     form: str = ""
-    """How a value of more than one number or word is written …"""
+    """Form of a value of more than one number or word …"""
     example: str = ""
     read: Callable[[str], Any] = numbers
-    """… and read."""
+    """… and its reader."""
     known: tuple[str, ...] = ()
-    """What such words may be."""
+    """Words that such a value may have."""
     further: str = ""
     """The parameter that holds the option's values from the second on; its own option is this one."""
+    word: str = ""
+    """The name that people use in options and plan.toml, where missions keep an older one."""
     option: str = ""
     """The option's name, where it is another. Such an option, as every list of lists, may be repeated."""
     quiet: bool = False
-    """Where it is as by default, missions do not tell of it: they stay what they were before it came."""
+    """True if missions leave it out at its default: they stay what they were before it came."""
     name: str = ""
     type: Any = None
     default: Any = None
 
     def left_out(self, value: Any) -> bool:
-        """Whether missions do not tell of this value."""
+        """True if missions leave this value out."""
         return self.quiet and bool(value == self.default)
 
     @property
+    def key(self) -> str:
+        """Its key in plan.toml."""
+        return self.word or self.name
+
+    @property
+    def flag(self) -> str:
+        """Its option on the command line."""
+        return "--" + (self.option or self.key).replace("_", "-")
+
+    def shown(self, value: object) -> str:
+        """The option with a value, as a person gives it: `--robots 2`."""
+        if value is True:
+            return self.flag
+        if isinstance(value, tuple):
+            value = ",".join(f"{item:g}" if isinstance(item, float) else str(item) for item in value)
+        return f"{self.flag} {value:g}" if isinstance(value, float) else f"{self.flag} {value}"
+
+    @property
     def meaning(self) -> str:
-        """What it is for, with its unit or the words it may be."""
+        """Its purpose, with its unit or its words."""
         unit = f", {self.unit}" if self.unit else ""
         return f"{self.help}{unit}{': ' if self.choices else ''}{', '.join(self.choices)}"
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """The words it may be, where they are fixed."""
+        """Its words, where they are fixed."""
         parts = (self.type, *get_args(self.type))
         return tuple(word for part in parts if get_origin(part) is Literal for word in get_args(part))
 
     @property
     def repeatable(self) -> bool:
-        """Whether the option may be given several times."""
+        """True if the option may be given several times."""
         return self.default == ()
 
     @property
@@ -100,7 +120,7 @@ class Parameter:
 
     @property
     def right(self) -> str:
-        """How to write it, if it is more than one number or word, or what it may be."""
+        """Its form, if it is more than one number or word, or else its words."""
         if self.form:
             each = " for each" if self.repeatable else ""
             known = f"; known: {', '.join(self.known)}" if self.known else ""
@@ -123,16 +143,16 @@ class Parameter:
         try:
             return self.read(text)
         except ValueError:
-            raise InputError(f"{self.name} = {text}: {self.right}") from None
+            raise InputError(f"{self.flag} {text}: {self.right}") from None
 
     def check(self, value: Any) -> None:
         """Refuse a value beyond the limits, naming the parameter and the value."""
         limit = self.farthest if isinstance(value, tuple) else LARGEST
         for number in _numbers_in(value):
             if not math.isfinite(number) or abs(number) > limit:
-                raise InputError(f"{self.name} = {number}: must be a finite number below {limit:g}")
+                raise InputError(f"{self.flag} {number}: must be a finite number below {limit:g}")
         if value is not None and not self._within(value):
-            raise InputError(f"{self.name} = {value}: {self.limits}")
+            raise InputError(f"{self.flag} {value}: {self.limits}")
 
     def _within(self, value: Any) -> bool:
         return (
@@ -145,16 +165,16 @@ class Parameter:
 
     @property
     def limits(self) -> str:
-        """What the value must be, in words."""
+        """Limits of the value, in words."""
         if self.choices:
             return self.right
         why = f" ({self.why})" if self.why else ""
         if self.least is not None and self.most is not None:
             return f"must be between {self.least:g} and {self.most:g}{why}"
         bounds = {"above": self.above, "at least": self.least, "below": self.below, "at most": self.most}
-        told = " and ".join(f"{word} {bound:g}" for word, bound in bounds.items() if bound is not None)
+        both = " and ".join(f"{word} {bound:g}" for word, bound in bounds.items() if bound is not None)
         usual = {"above 0": "must be greater than 0", "at least 0": "must not be negative"}
-        return usual.get(told, f"must be {told}") + why
+        return usual.get(both, f"must be {both}") + why
 
 
 def _numbers_in(value: object) -> list[float]:

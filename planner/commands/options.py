@@ -1,4 +1,4 @@
-"""The options of `stopgo plan` and `stopgo floors`: one for each parameter of mission/settings.py."""
+"""The options of `stopgo plan` and `stopgo floors`: one for each parameter of `stopgo.mission.settings`."""
 
 from __future__ import annotations
 
@@ -39,30 +39,33 @@ def values_of(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _own(parameter: Parameter) -> bool:
-    """Whether it has an option of its own, and does not take another's further values."""
+    """True if it has an option of its own, and does not hold more values of another's."""
     return parameter.name not in {item.further for item in PARAMETERS.values()}
 
 
 def _key(parameter: Parameter) -> str:
-    return parameter.option or parameter.name
+    return parameter.option or parameter.key
 
 
 def _option(parameter: Parameter) -> inspect.Parameter:
     kind = list[str] if parameter.repeatable or parameter.further else _plain(parameter)
-    name = "--" + _key(parameter).replace("_", "-")
-    told = typer.Option(
+    name = parameter.flag
+    declared = typer.Option(
         *([f"{name}/--no-{name[2:]}"] if parameter.default is None and kind is bool else [name]),
         metavar=parameter.form.upper() or "|".join(parameter.choices) or None,
         help=f"{_help(parameter)}  [default: {_default(parameter)}]",
         show_default=False,
     )
     return inspect.Parameter(
-        _key(parameter), inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, told]
+        _key(parameter),
+        inspect.Parameter.KEYWORD_ONLY,
+        default=None,
+        annotation=Annotated[kind | None, declared],
     )
 
 
 def _plain(parameter: Parameter) -> type:
-    """What the command line takes; what has a form of its own is read by the parameter."""
+    """The type that the command line reads; a parameter with a form reads its text itself."""
     return str if parameter.form else parameter.plain
 
 

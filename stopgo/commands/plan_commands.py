@@ -80,10 +80,11 @@ def plan_command(
     Exit code 1: no plan can be made, or the robot would drive over lines that were not read; with --strict
     also where floor is left out or the plan is doubtful.
     """
+    from stopgo.mission.console.notice import notice
     from stopgo.mission.files.plan_toml import read_settings, settings_json, settings_toml
     from stopgo.planner.commands.options import values_of
 
-    settings = read_settings(parameters, values_of(given))
+    settings = read_settings(parameters, values_of(given), notify=notice)
     if print_config:
         typer.echo(json.dumps(settings_json(settings)) if as_json else settings_toml(settings))
         return 0

@@ -137,13 +137,13 @@ def test_a_byte_order_mark_is_read_over(workplace: Path, capsys: pytest.CaptureF
     (workplace / "plan.toml").write_bytes(b"\xef\xbb\xbf[plan]\nd_sec = 0.8\n")
     assert main(["check", "mission.json"]) == 0
     assert main(["plan", "-p", "plan.toml", "--print-config"]) == 0
-    assert "d_sec = 0.8\n" in capsys.readouterr().out
+    assert "clearance = 0.8\n" in capsys.readouterr().out
 
 
 def test_print_config_answers_in_json_as_in_toml(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plan", "--d-sec", "0.8", "--print-config"]) == 0
+    assert main(["plan", "--clearance", "0.8", "--print-config"]) == 0
     toml = tomllib.loads(capsys.readouterr().out)
-    assert main(["plan", "--d-sec", "0.8", "--print-config", "--json"]) == 0
+    assert main(["plan", "--clearance", "0.8", "--print-config", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert {table: {k: v for k, v in of.items() if v is not None} for table, of in told.items()} == toml
 
@@ -158,7 +158,7 @@ def test_a_name_longer_than_any_is_told_by_its_beginning(capsys: pytest.CaptureF
 @pytest.mark.parametrize("radius", ["-2", "0"])
 def test_a_circle_to_avoid_has_a_radius(radius: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "--avoid", f"1,1,{radius}", "--print-config"]) == 2
-    assert capsys.readouterr().err == f"stopgo: avoid = 1,1,{radius}: the radius must be greater than 0\n"
+    assert capsys.readouterr().err == f"stopgo: --avoid 1,1,{radius}: the radius must be greater than 0\n"
 
 
 @pytest.mark.parametrize("endpoint", ["tcp/127.0.0.1:99999", "tcp/127.0.0.1:0"])

@@ -12,6 +12,7 @@ from pathlib import Path
 import ezdxf
 import pytest
 
+import stopgo
 from stopgo.command_line import main
 from stopgo.commands.plan_commands import plan_files
 from stopgo.mission.files.mission_json import read
@@ -231,7 +232,7 @@ def test_a_refusal_renames_nothing_and_what_is_no_mission_stays(
     narrow, out = drawn(tmp_path / "narrow.dxf", door=0.6), tmp_path / "out"
     run("plan", narrow, "-o", out, "--all-parts")
     (out / "mission-3.json").write_text("mine")
-    assert run("plan", narrow, "-o", out, "--d-sec", 3)[0] == 1
+    assert run("plan", narrow, "-o", out, "--clearance", 3)[0] == 1
     assert left_in(out) == FILES | SECOND | {"mission-3.json"}
     run("plan", narrow, "-o", out, "--range", 4)
     assert (out / "mission-3.json").read_text() == "mine"
@@ -372,8 +373,8 @@ def test_a_drawing_without_a_floor_is_2(run: Callable[..., Run], tmp_path: Path)
 @pytest.mark.parametrize(
     ("option", "value"),
     [
-        ("--d-sec", "nan"),
-        ("--d-sec", "-0.1"),
+        ("--clearance", "nan"),
+        ("--clearance", "-0.1"),
         ("--range", "0"),
         ("--range", "inf"),
         ("--range", "-5"),
@@ -384,8 +385,8 @@ def test_a_drawing_without_a_floor_is_2(run: Callable[..., Run], tmp_path: Path)
         ("--d-dis", "1e-9"),
         ("--grid", "0.001"),
         ("--grid", "1e300"),
-        ("--edge", "-1"),
-        ("--door-access", "0"),
+        ("--edge-clearance", "-1"),
+        ("--min-door-width", "0"),
         ("--robot-radius", "-0.35"),
         ("--robot-radius", "0"),
         ("--speed", "0"),
@@ -448,7 +449,7 @@ def test_a_plan_toml_that_is_not_there_is_2(run: Callable[..., Run], floor: Path
 
 
 def test_no_candidate_left_is_1(run: Callable[..., Run], floor: Path, tmp_path: Path) -> None:
-    line = refused(run, 1, tmp_path / "out", floor, "--d-sec", 3)
+    line = refused(run, 1, tmp_path / "out", floor, "--clearance", 3)
     assert "no candidate" in line
     assert "d_sec" in line
 
@@ -516,7 +517,7 @@ def test_a_refusal_leaves_an_older_plan_as_it_was(
 ) -> None:
     run("plan", floor, "-o", tmp_path / "out")
     before = {name: (tmp_path / "out" / name).read_bytes() for name in FILES}
-    code, _, error = run("plan", floor, "-o", tmp_path / "out", "--d-sec", 3)
+    code, _, error = run("plan", floor, "-o", tmp_path / "out", "--clearance", 3)
     assert code == 1
     one_line(error)
     assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
@@ -529,7 +530,7 @@ def test_a_full_disk_is_2_and_changes_nothing(
 ) -> None:
     out = tmp_path / "out"
     if older:
-        run("plan", floor, "-o", out, "--d-sec", 0.8)
+        run("plan", floor, "-o", out, "--clearance", 0.8)
     before = {name: (out / name).read_bytes() for name in FILES} if older else {}
     with small_disk(room):
         code, _, error = run("plan", floor, "-o", out)
@@ -591,6 +592,7 @@ SAMPLE = Path(__file__).parents[2] / "recordings" / "samples" / "office.dxf"
 def test_a_plan_is_made_where_recordings_are_not_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setattr(stopgo, "recordings", stopgo.recordings)  # and back, whatever is loaded meanwhile
     for name in [name for name in sys.modules if f"{name}.".startswith(("rerun.", "stopgo.recordings."))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "rerun", None)

@@ -16,7 +16,8 @@ from stopgo.command_line import main
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.plan_toml import read_settings, settings_toml
-from stopgo.mission.settings import PARAMETERS, Settings, check_settings, told_of
+from stopgo.mission.settings import PARAMETERS, Settings, recorded_values
+from stopgo.mission.settings.parameter_checks import check_settings
 from stopgo.mission.settings.scanners import SCANNERS, ScannerName
 
 OTHER: dict[str, Any] = {
@@ -83,7 +84,7 @@ def other(name: str) -> Any:
 
 def typed(name: str, value: Any) -> list[str]:
     """The options with which a person gives a value."""
-    option = "--" + (PARAMETERS[name].option or name).replace("_", "-")
+    option = PARAMETERS[name].flag
     if isinstance(value, bool):
         return [option if value else f"--no-{option[2:]}"]
     further = name in {item.further for item in PARAMETERS.values()}
@@ -111,7 +112,7 @@ def test_help_shows_every_option_with_its_default(capsys: pytest.CaptureFixture[
     assert main(["plan", "--help"]) == 0
     told = " ".join(capsys.readouterr().out.split())
     for name, parameter in PARAMETERS.items():
-        option = "--" + (parameter.option or name).replace("_", "-")
+        option = parameter.flag
         said = told[told.index(f" {option} ") :]
         shown = re.match(r".*?\[default: (.*?)\]", said)
         assert shown, name
@@ -133,14 +134,14 @@ def limits() -> list[tuple[str, float]]:
 
 @pytest.mark.parametrize(("name", "value"), limits())
 def test_a_value_beyond_a_limit_is_refused_by_name(name: str, value: float) -> None:
-    with pytest.raises(InputError, match=f"^{name} = .*: must "):
+    with pytest.raises(InputError, match=f"^{PARAMETERS[name].flag} .*: must "):
         check_settings(replace(Settings(), **{name: value}))
 
 
 @pytest.mark.parametrize("name", ["speed", "turn_rate", "acceleration"])
 def test_a_robot_that_hardly_moves_is_refused(name: str) -> None:
     """Its times would be beyond every number, or its turn rate 0 in the mission's microradians."""
-    with pytest.raises(InputError, match=f"^{name} = 1e-300: must be at least 0.0"):
+    with pytest.raises(InputError, match=f"^{PARAMETERS[name].flag} 1e-300: must be at least 0.0"):
         check_settings(replace(Settings(), **{name: 1e-300}))
 
 
@@ -152,20 +153,51 @@ def test_the_slowest_turn_is_not_rounded_away() -> None:
 @pytest.mark.parametrize("name", [name for name, p in PARAMETERS.items() if p.plain in (int, float)])
 def test_no_number_is_endless(name: str) -> None:
     for value in (math.nan, math.inf, -math.inf, 1e7):
-        with pytest.raises(InputError, match=f"^{name} = "):
+        with pytest.raises(InputError, match=f"^{PARAMETERS[name].flag} "):
             check_settings(replace(Settings(), **{name: value}))
 
 
+OLD = {name: parameter.key for name, parameter in PARAMETERS.items() if parameter.key != name}
+
+
+@pytest.mark.parametrize("name", OLD)
+def test_a_renamed_parameter_keeps_its_old_name_for_one_release(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As an option, in plan.toml and in Python; a line names the new one."""
+    option, value = "--" + name.replace("_", "-"), other(name)
+    expected = replace(Settings(), **{name: value})
+    flag = PARAMETERS[name].flag
+    assert main(["plan", "--print-config", *(word.replace(flag, option) for word in typed(name, value))]) == 0
+    printed = capsys.readouterr()
+    assert printed.err == f"stopgo: {option} is now called {flag}; the old name ends with 0.3\n"
+    file = tmp_path / "plan.toml"
+    file.write_text(printed.out, encoding="utf-8")
+    lines: list[str] = []
+    assert read_settings(file, {}, notify=lines.append) == expected
+    assert lines == []
+    file.write_text(printed.out.replace(f"\n{OLD[name]} = ", f"\n{name} = "), encoding="utf-8")
+    assert read_settings(file, {}, notify=lines.append) == expected
+    assert lines == [f"{file}: {name} is now called {OLD[name]}; the old name ends with 0.3"]
+    assert stopgo.settings(**{name: value}) == stopgo.settings(**{OLD[name]: value}) == expected
+
+
+def test_a_parameter_given_by_both_names_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text("[plan]\nd_sec = 0.8\nclearance = 0.9\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"clearance in \[plan\] is given by its old and new name"):
+        read_settings(tmp_path / "plan.toml", {})
+
+
 MESSAGES = {
-    "speed": (0.0, "speed = 0.0: must be at least 0.001"),
-    "range": (0.0, "range = 0.0: must be greater than 0"),
-    "settle": (-1.0, "settle = -1.0: must not be negative"),
-    "coverage": (90.0, "coverage = 90.0: must be above 0 and at most 1 (0.9 is 90 %)"),
-    "battery_min": (1.0, "battery_min = 1.0: must be at least 0 and below 1 (0.15 is 15 %)"),
-    "doors": ("ajar", "doors = ajar: known: open, closed"),
-    "start": ((1.0,), "start = 1: write X,Y,HEADING, such as 2.5,3.0,90"),
-    "use": ((1.0,), "use = 1: write X,Y for each, such as 2.5,3.0"),
-    "fov": ("far", "fov = far: Expected `float`, got `str`"),
+    "speed": (0.0, "--speed 0.0: must be at least 0.001"),
+    "range": (0.0, "--range 0.0: must be greater than 0"),
+    "settle": (-1.0, "--settle -1.0: must not be negative"),
+    "coverage": (90.0, "--coverage 90.0: must be above 0 and at most 1 (0.9 is 90 %)"),
+    "battery_min": (1.0, "--battery-min 1.0: must be at least 0 and below 1 (0.15 is 15 %)"),
+    "doors": ("ajar", "--doors ajar: known: open, closed"),
+    "start": ((1.0,), "--start 1: write X,Y,HEADING, such as 2.5,3.0,90"),
+    "use": ((1.0,), "--require-stop 1: write X,Y for each, such as 2.5,3.0"),
+    "fov": ("far", "--fov far: Expected `float`, got `str`"),
 }
 
 
@@ -182,15 +214,15 @@ def test_a_scanner_gives_what_is_not_given_besides(tmp_path: Path) -> None:
     settings = read_settings(tmp_path / "plan.toml", {"near": 1.0})
     assert (settings.range, settings.near, settings.blind_cone, settings.scan_time) == (8.0, 1.0, 60.0, 51.0)
     assert settings.angular_step == pytest.approx(math.degrees(0.0006), rel=1e-4)
-    assert read_settings(None, told_of(settings)) == settings
-    with pytest.raises(InputError, match=r"^scanner = none: known: rtc360-high, "):
+    assert read_settings(None, recorded_values(settings)) == settings
+    with pytest.raises(InputError, match=r"^--scanner none: known: rtc360-high, "):
         stopgo.settings(scanner="none")
 
 
 def test_limits_that_need_more_say_what(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"^density = 5: needs the scanner's angular_step; .*rtc360-high, "):
+    with pytest.raises(InputError, match=r"^--density 5: needs the scanner's --angular-step; .*rtc360-high"):
         stopgo.settings(density=5)
-    with pytest.raises(InputError, match=r"^views = 2: is not done with fov = 120"):
+    with pytest.raises(InputError, match=r"^--min-views 2: does not work with --fov 120"):
         stopgo.settings(views=2, fov=120)
 
 
@@ -201,5 +233,5 @@ def test_a_parameter_that_is_none_is_named() -> None:
 
 def test_the_printed_file_explains_itself() -> None:
     lines = settings_toml(Settings()).splitlines()
-    assert lines[lines.index("d_sec = 0.7") - 1] == "# Stop to element, m"
-    assert "# robot_radius = (half of door_access)" in lines
+    assert lines[lines.index("clearance = 0.7") - 1] == "# Minimum distance stop to element, m"
+    assert "# robot_radius = (half of min_door_width)" in lines

@@ -19,7 +19,7 @@ from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.plan import Plan
-from stopgo.mission.settings import Settings, told_of
+from stopgo.mission.settings import Settings, recorded_values
 from stopgo.mission.stages import Route
 from stopgo.planner import plan
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, top_up
@@ -77,7 +77,7 @@ def test_a_person_reads_both_numbers() -> None:
 
 
 def test_without_it_plans_and_ids_are_what_they_were() -> None:
-    assert "minimise" not in told_of(Settings(minimise="stops"))
+    assert "minimise" not in recorded_values(Settings(minimise="stops"))
     plain, asked = made(), made(minimise="stops")
     assert plain.mission == asked.mission
     assert plain.route.time is None

@@ -22,7 +22,7 @@ from stopgo.mission.files.coverage_json import coverage_json
 from stopgo.mission.files.plan_svg import plan_svg
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.plan import DividedPlan, Plan
-from stopgo.mission.settings import Settings, told_of
+from stopgo.mission.settings import Settings, recorded_values
 from stopgo.mission.settings.parameter import seconds
 from stopgo.mission.stages import Route
 from stopgo.mission.stages.network import network_of
@@ -158,7 +158,7 @@ def test_the_same_plan_is_shared_out_the_same() -> None:
 
 
 def test_missions_that_are_not_shared_out_tell_nothing_of_it() -> None:
-    told = told_of(Settings(start=START))
+    told = recorded_values(Settings(start=START))
     assert not {"robots", "shift", "battery", "further_starts"} & set(told)
 
 
@@ -207,15 +207,15 @@ def test_a_stop_too_far_for_a_shift_is_named() -> None:
     ("changes", "told"),
     [
         ({"robots": 2, "start": None}, "no robot has a start"),
-        ({"robots": 3, "further_starts": [[1, 1, 0]]}, "robots = 3: 2 starts are given"),
-        ({"further_starts": [[1, 1, 0]]}, "robots = 1: 2 starts are given"),
-        ({"robots": 0}, "robots = 0: must be between 1 and 50"),
-        ({"shift": 30.0}, "shift = 30 s: is shorter than one stop"),
-        ({"battery": 30.0, "shift": 600.0}, "battery = 30 s: is shorter than one stop"),
-        ({"shift": math.nan}, "shift = nan: must be a finite number"),
-        ({"robots": 2, "shift": 600.0}, "robots and shift are both given"),
-        ({"shift": 600.0, "tour": "open"}, "tour = open"),
-        ({"robots": 2, "end": [1, 1]}, "end and robots are both given"),
+        ({"robots": 3, "further_starts": [[1, 1, 0]]}, "--robots 3: 2 starts are given"),
+        ({"further_starts": [[1, 1, 0]]}, "--robots 1: 2 starts are given"),
+        ({"robots": 0}, "--robots 0: must be between 1 and 50"),
+        ({"shift": 30.0}, "--shift 30 s: is shorter than one stop"),
+        ({"battery": 30.0, "shift": 600.0}, "--battery-life 30 s: is shorter than one stop"),
+        ({"shift": math.nan}, "--shift nan: must be a finite number"),
+        ({"robots": 2, "shift": 600.0}, "--robots and --shift are both given"),
+        ({"shift": 600.0, "tour": "open"}, "--tour open"),
+        ({"robots": 2, "end": [1, 1]}, "--end and --robots are both given"),
     ],
     ids=str,
 )

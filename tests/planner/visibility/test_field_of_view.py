@@ -9,7 +9,8 @@ import pytest
 
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
-from stopgo.mission.settings import Settings, check_settings
+from stopgo.mission.settings import Settings
+from stopgo.mission.settings.parameter_checks import check_settings
 from stopgo.mission.stages import KEPT, Candidates, Route, Visibility
 from stopgo.planner.candidates import candidates
 from stopgo.planner.space.navigable import navigable
@@ -123,5 +124,5 @@ def test_observed_candidates_are_positions() -> None:
 
 @pytest.mark.parametrize("fov", [9.9, 0.0, -90.0, 361.0])
 def test_views_outside_the_range_are_refused(fov: float) -> None:
-    with pytest.raises(InputError, match="fov = "):
+    with pytest.raises(InputError, match="--fov "):
         check_settings(Settings(fov=fov))

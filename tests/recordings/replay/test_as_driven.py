@@ -98,7 +98,7 @@ def test_the_command_tells_coverage_and_writes_the_top_up(
 
 def test_limits_on_views_hold_as_driven_and_for_the_top_up(tmp_path: Path) -> None:
     """Each wall is to be seen from two stops: left by one, what only one other sees counts no more."""
-    limits = ["--views", "2", "--max-incidence", "65", "--near", "0.9"]
+    limits = ["--min-views", "2", "--max-incidence", "65", "--min-range", "0.9"]
     floor = drawn(tmp_path / "floor.dxf")
     assert main(["plan", str(floor), "-o", str(tmp_path), *PLAN, *limits]) == 0
     planned = planned_floor(floor, read(tmp_path / "mission.json"))
