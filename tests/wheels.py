@@ -28,11 +28,11 @@ EXTRAS: dict[str, Sequence[tuple[int, str, tuple[str, ...]]]] = {
     "": (
         (0, "stopgo", ("--help",)),
         (2, 'pip install "stopgo[plan]"', PLAN),
-        (0, "in order", ("check", "mission.json")),
+        (0, "valid", ("check", "mission.json")),
     ),
     "plan": (
         (0, "mission.json", PLAN),
-        (0, "in order", ("check", "out/mission.json", "--floor", str(OFFICE))),
+        (0, "valid", ("check", "out/mission.json", "--floor", str(OFFICE))),
         (2, 'pip install "stopgo[prove]"', PROVE),
     ),
     "prove": ((0, "mission.json", PLAN), (0, "promise is met", PROVE)),
@@ -58,10 +58,11 @@ def main(pythons: Sequence[str]) -> int:
 
 
 def built(folder: Path) -> Path:
-    """The wheel, built from the source archive, once both hold what they must."""
+    """The wheel, built from the source archive, once both hold what they must; of a tree without links."""
     tree = folder / "tree"
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
-    for name in listed.splitlines():
+    files = {name for name in listed.splitlines() if not (ROOT / name).is_symlink()}
+    for name in files:
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tree / name)
     run(sys.executable, "-m", "venv", str(folder / "builder"))
@@ -70,7 +71,7 @@ def built(folder: Path) -> Path:
     (archive,) = folder.glob("*.tar.gz")
     with tarfile.open(archive) as opened:
         held = {name.partition("/")[2] for name in opened.getnames()}
-    assert set(listed.splitlines()) - {".gitignore"} <= held, set(listed.splitlines()) - held
+    assert files - {".gitignore"} <= held, files - held
     (wheel,) = folder.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     top = {name.partition("/")[0] for name in names if ".dist-info/" not in name}
