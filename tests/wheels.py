@@ -61,7 +61,8 @@ def built(folder: Path) -> Path:
     """The wheel, built from the source archive, once both hold what they must."""
     tree = folder / "tree"
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
-    for name in listed.splitlines():
+    links = {name for name in listed.splitlines() if (ROOT / name).is_symlink()}
+    for name in set(listed.splitlines()) - links:
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tree / name)
     run(sys.executable, "-m", "venv", str(folder / "builder"))
@@ -70,7 +71,8 @@ def built(folder: Path) -> Path:
     (archive,) = folder.glob("*.tar.gz")
     with tarfile.open(archive) as opened:
         held = {name.partition("/")[2] for name in opened.getnames()}
-    assert set(listed.splitlines()) - {".gitignore"} <= held, set(listed.splitlines()) - held
+    needed = set(listed.splitlines()) - links - {".gitignore"}
+    assert needed <= held, needed - held
     (wheel,) = folder.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     top = {name.partition("/")[0] for name in names if ".dist-info/" not in name}
