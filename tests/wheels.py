@@ -71,8 +71,8 @@ def built(folder: Path) -> Path:
     (archive,) = folder.glob("*.tar.gz")
     with tarfile.open(archive) as opened:
         held = {name.partition("/")[2] for name in opened.getnames()}
-    needed = set(listed.splitlines()) - links - {".gitignore"}
-    assert needed <= held, needed - held
+    packed = set(listed.splitlines()) - links - {".gitignore"}
+    assert packed <= held, packed - held
     (wheel,) = folder.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     top = {name.partition("/")[0] for name in names if ".dist-info/" not in name}
