@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # Windows has no such locks: one process runs all tests there
+    fcntl = None  # type: ignore[assignment]
 
 
 @contextmanager
@@ -18,7 +22,8 @@ def first_alone(what: str) -> Iterator[None]:
     folder = Path(os.environ["XDG_STATE_HOME"])
     done = folder / f"{what}.done"
     with (folder / f"{what}.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        if fcntl is not None:
+            fcntl.flock(lock, fcntl.LOCK_EX)
         if not done.exists():
             yield
             done.touch()

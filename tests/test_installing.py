@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -153,3 +154,10 @@ def test_every_folder_is_typed_and_every_extra_of_a_user_is_in_all() -> None:
     )
     for folder in stopgo.FOLDERS:
         assert (ROOT / folder / "py.typed").exists()
+
+
+def test_the_hooks_run_ruff_at_the_pinned_version() -> None:
+    pinned = re.search(r"^ruff==(.*)$", (ROOT / "constraints.txt").read_text(encoding="utf-8"), re.MULTILINE)
+    hooks = (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
+    assert pinned is not None
+    assert f"rev: v{pinned[1]}\n" in hooks

@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 OURS: dict[str, Any] = {"sim": None, "mavlink:URL": None}
 """What `--controller` takes besides."""
-NOT_EVERYONES = ("health", "what_became")
+NOT_EVERYONES = ("health", "scan_outcome")
 """What a base or a scanner need not tell."""
 
 
@@ -160,7 +160,7 @@ class GuardedScanner:
 
     def scan_outcome(self, label: str) -> ScanResult | ScanFailed | None:
         """What it says of a scan that was cut off; nothing, where it has no such word."""
-        if not hasattr(self._scanner, "what_became"):
+        if not hasattr(self._scanner, "scan_outcome"):
             return None
         try:
             with self._made.blamed():
