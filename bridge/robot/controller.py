@@ -412,7 +412,7 @@ class Controller:
             reason = self._blocked("the way home", here)
             self._advance(run, lambda now: runs.held(now, reason))
         elif outcome == "arrived":
-            self._advance(run, lambda now: runs.came_home_by(now, mission))
+            self._advance(run, lambda now: runs.home_leg_driven(now, mission))
 
     def _blocked(self, way: str, here: Pose) -> str:
         why = self._base.blocked_by()

@@ -18,7 +18,7 @@ from stopgo.mission.frames.geodesy import heading_of
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.read_back import point_at
 from stopgo.mission.run.events import Pose
-from stopgo.mission.run.scans import ScanFailed, ScanResult, missing_in
+from stopgo.mission.run.scans import ScanFailed, ScanResult, missing_fields
 from stopgo.mission.run.tolerance import deviation, is_outside
 
 NEAR_M = 0.5
@@ -94,7 +94,7 @@ def read_file_url(url: str) -> ScanResult | ScanFailed:
         points=_count(told.get("points", "")),
         sha256=told.get("sha256", "").lower(),
     )
-    missing = missing_in(scan)
+    missing = missing_fields(scan)
     return ScanFailed(reason=f"the vehicle told {url!r}, without {', '.join(missing)}") if missing else scan
 
 

@@ -113,7 +113,7 @@ def test_a_scan_from_outside_its_tolerance_is_told_by_log_report_and_plot(
         for report in run.reports(mission):
             moved = isinstance(report, Scanned) and report.stop == first.id
             tell(recording, msgspec.structs.replace(report, pose=aside) if moved else report)
-    words = "120 mm beside its place (50 mm are tolerated)"
+    words = "120 mm from its stop (50 mm are tolerated)"
     names = entities.RunEntities(run.RUN)
     log = on(path, names.log, "TextLog:text", entities.MISSION_TIME)
     levels = on(path, names.log, "TextLog:level", entities.MISSION_TIME)

@@ -27,7 +27,7 @@ from stopgo.mission.mavlink.following.steps import (
 from stopgo.mission.mavlink.telemetry import Message, began_again
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import AnyEvent, Arrived
-from stopgo.mission.run.states import Change, Run, changed, told_of
+from stopgo.mission.run.states import Change, Run, changed, events_of
 
 
 class FollowedRun:
@@ -131,7 +131,7 @@ class FollowedRun:
 
     def _take(self, change: Change, now_ns: int) -> None:
         self._run = change.run
-        for event in told_of(change, robot=self._robot, boot_id="", now_ns=now_ns):
+        for event in events_of(change, robot=self._robot, boot_id="", now_ns=now_ns):
             self.events.append(changed(event, number=len(self.events) + 1))
 
     def _arrived(self) -> Arrived | None:

@@ -18,7 +18,7 @@ from stopgo.mission.document import Stop
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, StopItems
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import Pose, Settled, Unconfirmed
-from stopgo.mission.run.scans import ScanFailed, ScanResult, turned_away
+from stopgo.mission.run.scans import ScanFailed, ScanResult, heading_error
 from stopgo.mission.run.states import Change, Run, changed
 from stopgo.mission.run.tolerance import deviation, is_outside
 
@@ -234,7 +234,7 @@ def misplaced(pose: Pose, run: Run, listed: ListedMission) -> str:
         return (
             f"{away:.3f} m from the stop, tolerance is {stop.tolerance_m:g} m; the vehicle calls it reached"
         )
-    turned = turned_away(listed.mission.scanner, stop.heading, pose.heading)
+    turned = heading_error(listed.mission.scanner, stop.heading, pose.heading)
     if turned:
         return f"turned {math.degrees(turned):.1f}° from the heading that its scanner needs"
     return ""

@@ -402,6 +402,6 @@ def test_a_scan_during_which_the_estimate_jumps_is_told_as_made_beside_its_stop(
         state = watch_showing(station, heard, Lines(said.append))
         assert station.status().outside == ("s1",)
     (line,) = [line for line in said if "Scanned         s1" in line]
-    away = float(re.findall(r"(\d+) mm beside its place \(50 mm are tolerated\)", line)[0])
+    away = float(re.findall(r"(\d+) mm from its stop \(50 mm are tolerated\)", line)[0])
     assert 85 <= away <= 155 and state.outside == ("s1",)
     assert tell_compared(heard, state, json_=True) == 1
