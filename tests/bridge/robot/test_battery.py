@@ -9,7 +9,7 @@ import pytest
 from stopgo.bridge.robot.simulator import Fault, Faults
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import NegativeResult
-from stopgo.mission.run.battery import time_left, battery_shortfall
+from stopgo.mission.run.battery import battery_shortfall, time_left
 from tests.bridge.world import EXACT, Field, corridor
 
 TOTAL_S = schedule(corridor()).total_s
