@@ -62,11 +62,7 @@ def _totals(comparison: Comparison) -> list[str]:
     several = [f"revisions {', '.join(revisions)} of the mission, one after another"]
     return [
         *(several if len(revisions) > 1 else []),
-        *(
-            [printable(apart)]
-            if (apart := apart_in_words(comparison.mission, _expected(comparison)))
-            else []
-        ),
+        *([printable(apart)] if (apart := apart_in_words(comparison.mission, _expected(comparison))) else []),
         f"run {printable(comparison.run_id or 'without a name')}: {comparison.scanned} of "
         f"{len(comparison.asked)} stops scanned; planned {duration(comparison.planned_s)}, driven {driven}"
         + (f", of which paused or held {duration(paused_s)}" if paused_s else ""),
@@ -138,11 +134,7 @@ def _ended(comparison: Comparison) -> str | None:
 def _pieces(comparison: Comparison) -> list[list[str]] | None:
     """Return the connected scans, with those that may still be made; None if no network was planned."""
     network = network_of(comparison.mission)
-    return (
-        None
-        if network is None
-        else [list(piece) for piece in network.among(_expected(comparison)).pieces]
-    )
+    return None if network is None else [list(piece) for piece in network.among(_expected(comparison)).pieces]
 
 
 def _stop_json(item: StopComparison) -> dict[str, Any]:

@@ -94,7 +94,7 @@ def form_of(name: str) -> Format:
 
 def _form(name: str) -> Variant[Format]:
     found = variant("format", name, FORMATS, said=f"--to {name}")
-    found.noun(found.what, Format)
+    found.of_kind(found.what, Format)
     return found
 
 
@@ -123,8 +123,8 @@ def exported(mission: Mission, name: str, supplements: Supplements) -> bytes:
             f"{mission.name}: has no georeference, and {form.title} holds latitudes and longitudes; "
             "give --origin LAT,LON,ALT,HEADING, or plan with it"
         )
-    with found.blamed():
-        data = found.noun(form.write(mission, supplements), bytes)
+    with found.named_errors():
+        data = found.of_kind(form.write(mission, supplements), bytes)
         places = form.read_back(data, mission, supplements)
     if not found.ours:
         found.array(places, "read_back", (None, 2))

@@ -14,7 +14,7 @@ from stopgo.mission.console.table import printable
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.waypoints import frame_name, mapped
-from stopgo.mission.frames.frame_transform import SAME, turned_back
+from stopgo.mission.frames.frame_transform import SAME, from_map_point
 
 _NUMBER = r"(-?\d+\.\d+)"
 _POSE = re.compile(rf"^    pose: \[{_NUMBER}, {_NUMBER}, {_NUMBER}\]$", re.MULTILINE)
@@ -35,7 +35,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
     """The poses' places, back on the site."""
     to_map = mission.frame.to_map or SAME
     places = [(float(x), float(y)) for x, y, _ in _POSE.findall(data.decode())]
-    return [turned_back(to_map, place) for place in places]
+    return [from_map_point(to_map, place) for place in places]
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
