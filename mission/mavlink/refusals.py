@@ -1,4 +1,4 @@
-"""Why a mission is not sent: it makes no sense as items, or it needs what the vehicle would drop."""
+"""Reasons not to send a mission: it is implausible as items, or it needs values that the vehicle drops."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ LATITUDE_LIMIT = 89.0
 
 
 def origin_of(mission: Mission) -> SiteOrigin:
-    """Where on earth the mission's site is."""
+    """Return the site's origin on the earth."""
     if mission.georeference is None:
         raise InputError(
-            f"{mission.name}: no georeference, and autopilots know only degrees; "
+            f"{mission.name}: no georeference; autopilots use only degrees; "
             "plan again with --origin LAT,LON,ALT,HEADING"
         )
     return mission.georeference
 
 
 def check(mission: Mission, numbers: tuple[int, ...], options: TranslationOptions) -> None:
-    """Refuses what cannot be written as items so that the vehicle does what the mission says."""
+    """Refuse a mission that the vehicle would not execute as written."""
     _check_manner(options)
     _check_origin(mission, options.origin)
     for problem in problems_of(mission):
@@ -46,7 +46,7 @@ def check(mission: Mission, numbers: tuple[int, ...], options: TranslationOption
 
 
 def check_fields(mission: Mission, placed: Sequence[Placed]) -> None:
-    """Refuses numbers that a float32 on the wire does not hold; NaN is meant where it stands."""
+    """Refuse numbers that a float32 on the link does not hold; NaN is allowed where it is intended."""
     for one in placed:
         for number, (value, sent) in enumerate(
             zip(one.item.params, as_sent(one.item).params, strict=True), start=1
@@ -60,7 +60,7 @@ def check_fields(mission: Mission, placed: Sequence[Placed]) -> None:
 
 
 def check_count(mission: Mission, placed: Sequence[Placed], vehicle: Autopilot, most: int) -> None:
-    """Refuses more items than the vehicle holds, home included where it holds that too."""
+    """Refuse more items than the vehicle holds, with home if it holds that too."""
     count = vehicle.sequence(len(placed))
     if count <= most:
         return
@@ -98,7 +98,7 @@ def _check_origin(mission: Mission, origin: SiteOrigin) -> None:
 
 
 def _check_heading(mission: Mission, vehicle: Autopilot) -> None:
-    """A scanner that does not look all round needs the heading it was planned with."""
+    """Refuse a scanner with a limited view on a vehicle that ignores the planned heading."""
     if needs_heading(mission.scanner) and not vehicle.turns:
         stop, fov = mission.stops[0], mission.scanner.fov_deg
         heading = math.degrees(stop.heading)

@@ -1,7 +1,7 @@
-"""Mission -> the items of one autopilot, in the order in which no scan begins before the robot stands.
+"""Mission -> the items of one autopilot, in an order in which no scan begins before the robot is stationary.
 
 At each stop: drive there, settle, trigger, wait for the scan. A command that is no NAV command runs together
-with the NAV command after it, so the trigger stands between two waits: it fires when the first is over.
+with the NAV command after it. So the trigger is between two waits: it fires when the first is over.
 """
 
 from __future__ import annotations
@@ -75,14 +75,14 @@ def translate(
 
 
 def _meant(vehicle: Autopilot, trigger: Trigger) -> Trigger:
-    """The trigger that `auto` stands for."""
+    """Return the trigger that `auto` means."""
     if trigger != "auto":
         return trigger
     return "script" if Command.DO_SEND_SCRIPT_MESSAGE in vehicle.commands else "camera"
 
 
 def _placed(mission: Mission, numbers: Sequence[int], options: TranslationOptions) -> Iterator[Placed]:
-    """Where the robot starts is no item: it stands there."""
+    """Yield all items; the robot is already at its start, so that this needs no item."""
     yield Placed(speed_change(mission.robot.speed), "speed")
     for stop, number in zip(mission.stops, numbers, strict=True):
         for point in corners(stop.approach, within=options.max_lateral_m)[1:-1]:
@@ -106,7 +106,7 @@ def _visited(stop: Stop, number: int, options: TranslationOptions) -> Iterator[P
 
 
 def _without_repeats(placed: Iterable[Placed]) -> Iterator[Placed]:
-    """Leaves out a corner that lies, in steps of 1e-7 degrees, where the waypoint before it is."""
+    """Leave out a corner that equals the waypoint before it, in steps of 1e-7 degrees."""
     before: Item | None = None
     for one in placed:
         passing = one.role in ("corner", "return")

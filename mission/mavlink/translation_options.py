@@ -1,4 +1,4 @@
-"""How a mission is written as items, once every choice is made."""
+"""Options of a mission's translation to items, with every choice made."""
 
 from __future__ import annotations
 

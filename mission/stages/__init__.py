@@ -215,6 +215,7 @@ class Visibility:
 
     Run k of candidate row c, `pointer[c] <= k < pointer[c + 1]`, means that units `first[k]` to `last[k]`
     (inclusive, counted over all targets) are visible on `segment[k]`.
+    """
 
     candidates: Candidates
     pointer: IntArray

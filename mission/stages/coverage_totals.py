@@ -128,14 +128,14 @@ class CoverageTotals:
 def ledger_of(visibility: Visibility, why: Mapping[str, str] | None = None) -> CoverageTotals:
     """Return the totals of a plan; `why` has the reason by room where the robot does not go."""
     space, targets = visibility.candidates.space, visibility.targets
-    settings, told, asked = space.settings, why or {}, space.settings.least_of_room
+    settings, reasons, asked = space.settings, why or {}, space.settings.least_of_room
     return CoverageTotals(
         rule=settings.coverage_rule,
         weight=weights_of(targets, settings),
         visible=visibility.visible,
         room=space.unit_room,
         element=frozen(targets.element[targets.unit_segment], np.int64),
-        rooms=tuple(Group(room.name, asked, told.get(room.name, "")) for room in space.rooms),
+        rooms=tuple(Group(room.name, asked, reasons.get(room.name, "")) for room in space.rooms),
         elements=tuple(Seen(item.id, item.kind) for item in space.floor.elements),
         required=settings.coverage,
         kind_required=settings.least_of_kind,

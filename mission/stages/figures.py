@@ -77,7 +77,7 @@ class LimitCost:
     """Lower bound of the stops without this limit."""
 
     @property
-    def told(self) -> str:
+    def text(self) -> str:
         """The cost in words."""
         more = self.stops - self.without
         cost = "costs no stop" if more <= 0 else f"costs about {more} stop{'s' * (more > 1)}"
@@ -94,7 +94,7 @@ class Quality:
     possible: float
     """Part of it that enough candidates see within the limits."""
 
-    def told(self, unit: str) -> str:
+    def text(self, unit: str) -> str:
         """Return the possible part in words."""
         share = percent(self.possible / self.in_sight if self.in_sight else None)
         return f"{share} of the {self.in_sight:.0f} {unit} in sight can be seen as asked"

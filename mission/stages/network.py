@@ -42,7 +42,7 @@ class Network:
         taken: list[Overlap] = []
         end_of = {stop: stop for stop in self.stops}
         for overlap in sorted(self.overlaps, key=lambda item: -item.hold_m):
-            a, b = _last(end_of, overlap.a), _last(end_of, overlap.b)
+            a, b = _root(end_of, overlap.a), _root(end_of, overlap.b)
             if a != b:
                 end_of[a] = b
                 taken.append(overlap)
@@ -73,13 +73,15 @@ def apart_in_words(mission: Mission, acquired: Collection[str]) -> str:
     planned = network_of(mission)
     if planned is None or not acquired:
         return ""
-    left = planned.among(acquired)
+    remaining = planned.among(acquired)
     missing = [stop for stop in planned.stops if stop not in acquired]
-    if len(left.pieces) <= max(1, len(planned.pieces)):
+    if len(remaining.pieces) <= max(1, len(planned.pieces)):
         return ""
-    told = f" without {', '.join(missing)}" if missing else ""
-    pieces = "; ".join(" ".join(piece) for piece in left.pieces[1:])
-    return f"the scans fall into {len(left.pieces)} pieces{told}: apart from the others {pieces}"
+    without = f" without {', '.join(missing)}" if missing else ""
+    others = "; ".join(" ".join(piece) for piece in remaining.pieces[1:])
+    return (
+        f"the scans are in {len(remaining.pieces)} components{without}; separate: {others}"
+    )
 
 
 def network_table(network: Network | None) -> dict[str, Any]:
@@ -101,19 +103,19 @@ def network_lines(network: Network | None) -> list[str]:
         return []
     number, pairs = len(network.pieces), len(network.overlaps)
     lines = [
-        f"  network     {'one piece' if number == 1 else f'{number} PIECES'}: "
+        f"  network     {'connected' if number == 1 else f'{number} COMPONENTS'}: "
         f"{pairs} pair{'s' * (pairs != 1)} of {len(network.stops)} scans register with one another"
     ]
     if network.weakest is not None:
         lines.append(f"    weakest   {pair_in_words(network.weakest)}")
     if network.bridges:
-        told = ", ".join(f"{item.a}-{item.b}" for item in network.bridges[:MOST_TOLD])
-        more = f" and {len(network.bridges) - MOST_TOLD} more" if len(network.bridges) > MOST_TOLD else ""
-        lines.append(f"    bridges   {told}{more}: without one of these the scans fall apart")
+        listed = ", ".join(f"{item.a}-{item.b}" for item in network.bridges[:MOST_LISTED])
+        more = f" and {len(network.bridges) - MOST_LISTED} more" if len(network.bridges) > MOST_LISTED else ""
+        lines.append(f"    bridges   {listed}{more}: without one of these the scans are not connected")
     return lines
 
 
-MOST_TOLD = 12
+MOST_LISTED = 12
 
 
 def pair_in_words(pair: Overlap) -> str:
@@ -124,7 +126,7 @@ def pair_in_words(pair: Overlap) -> str:
     )
 
 
-def _last(end_of: dict[str, str], stop: str) -> str:
+def _root(end_of: dict[str, str], stop: str) -> str:
     while end_of[stop] != stop:
         stop = end_of[stop]
     return stop
@@ -133,10 +135,10 @@ def _last(end_of: dict[str, str], stop: str) -> str:
 def _pieces(stops: Iterable[str], overlaps: Iterable[Overlap]) -> tuple[tuple[str, ...], ...]:
     end_of = {stop: stop for stop in stops}
     for item in overlaps:
-        end_of[_last(end_of, item.a)] = _last(end_of, item.b)
+        end_of[_root(end_of, item.a)] = _root(end_of, item.b)
     by_end: dict[str, list[str]] = {}
     for stop in end_of:
-        by_end.setdefault(_last(end_of, stop), []).append(stop)
+        by_end.setdefault(_root(end_of, stop), []).append(stop)
     return tuple(tuple(piece) for piece in sorted(by_end.values(), key=lambda piece: -len(piece)))
 
 

@@ -17,7 +17,7 @@ NEARLY = 0.8
 SAME = 0.5
 """… and at least this fraction of it in the same units: candidates of other rooms are no alternatives."""
 MOST_RUNNERS = 3
-LEAST_TOLD = 0.05
+LEAST_PRINTED = 0.05
 """Smaller amounts would be printed as 0.0 and are left out."""
 MOST_ROOMS = 4
 """Number of rooms and candidates listed for one stop."""
@@ -86,22 +86,22 @@ class StopReason:
     def _offered(self) -> str:
         if not self.runners:
             return f"No other candidate there would have seen {NEARLY:.0%} as much that was new."
-        told = ", ".join(
+        listed = ", ".join(
             f"candidate {item.candidate} at ({item.x:.2f}, {item.y:.2f}) {item.new:.1f} {self.unit}"
             for item in self.runners
         )
-        return f"Runners-up at that step: {told}."
+        return f"Runners-up at that step: {listed}."
 
     def _lost(self) -> str:
         if not self.alone_units:
             return "Without it nothing would be lost: other stops see all that it sees."
-        told = [
+        losses = [
             f"{room.name} {lost:.1f} {self.unit}" + ("" if room.met else " (then below what is asked)")
             for room, lost in zip(self.rooms, self.lost, strict=True)
-            if lost >= LEAST_TOLD
+            if lost >= LEAST_PRINTED
         ]
-        where = ", ".join(told[:MOST_ROOMS]) or "less than that in any room"
-        more = f" and {len(told) - MOST_ROOMS} more rooms" if len(told) > MOST_ROOMS else ""
+        where = ", ".join(losses[:MOST_ROOMS]) or "less than that in any room"
+        more = f" and {len(losses) - MOST_ROOMS} more rooms" if len(losses) > MOST_ROOMS else ""
         return (
             f"It alone sees {self.alone_units} units, {self.alone:.1f} {self.unit} or"
             f" {percent(self.lost_share)} of what is visible; lost without it: {where}{more}."
@@ -204,8 +204,8 @@ class _Offers:
         best = rows[np.argsort(-gain[rows], kind="stable")][:MOST_RUNNERS]
         places = candidates.xy[candidates.kept[best]].tolist()
         amounts = (gain[best] * self._ledger.scale).tolist()
-        told = zip(best.tolist(), places, amounts, strict=True)
-        return tuple(RunnerUp(row, x, y, new) for row, (x, y), new in told)
+        columns = zip(best.tolist(), places, amounts, strict=True)
+        return tuple(RunnerUp(row, x, y, new) for row, (x, y), new in columns)
 
     def _shared(self, fresh: IntArray) -> IntArray:
         """Return the amount of some units (ascending) that each candidate sees."""
