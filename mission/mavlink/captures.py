@@ -52,14 +52,14 @@ class Capture:
     """Pose of the vehicle; `None` if it is not reported."""
     result: ScanResult | ScanFailed
 
-    def at(self, stop: Stop) -> bool:
+    def may_be_of(self, stop: Stop) -> bool:
         """True if it may be of this stop; a report without a position may be of any."""
         if self.pose is None:
             return True
         within_m = NEAR_M if isinstance(self.result, ScanFailed) else stop.tolerance_m + STEPS_M
         return not is_outside(deviation(self.pose, stop), within_m)
 
-    def beside(self, at: int, stops: Sequence[Stop]) -> bool:
+    def is_nearest(self, at: int, stops: Sequence[Stop]) -> bool:
         """True if it was made near this stop, and no nearer to the one before or after."""
         if self.pose is None:
             return False
@@ -87,12 +87,12 @@ def result_of(message: CaptureMessage) -> ScanResult | ScanFailed:
 def read_file_url(url: str) -> ScanResult | ScanFailed:
     """Return the file of a `NAME.e57?size=N&points=N&sha256=HEX`."""
     name, _, query = url.partition("?")
-    told = dict(parse_qsl(query))
+    values = dict(parse_qsl(query))
     scan = ScanResult(
         file=name if name.removesuffix(".e57") not in ("", name) else "",
-        size=_count(told.get("size", "")),
-        points=_count(told.get("points", "")),
-        sha256=told.get("sha256", "").lower(),
+        size=_count(values.get("size", "")),
+        points=_count(values.get("points", "")),
+        sha256=values.get("sha256", "").lower(),
     )
     missing = missing_fields(scan)
     return ScanFailed(reason=f"the vehicle sent {url!r}, without {', '.join(missing)}") if missing else scan

@@ -69,22 +69,22 @@ def local_frame(site: SiteOrigin, origin: VehicleOrigin, rule: str) -> LocalFram
 
 def apart(site: SiteOrigin, origin: VehicleOrigin) -> str:
     """Return why an autopilot with this `origin` cannot drive in `site`; empty if it can."""
-    away = how_far_off(site, origin.place)
+    away = origin_distance(site, origin.place)
     return away and (
         f"the autopilot's origin ({origin.lat:.7f}, {origin.lon:.7f}) is {away} from the mission's"
         f" ({site.lat:.7f}, {site.lon:.7f}); set the same one (most take one per boot), or plan with that"
     )
 
 
-def how_far_off(site: SiteOrigin, origin: Geodetic) -> str:
+def origin_distance(site: SiteOrigin, origin: Geodetic) -> str:
     """Return the distance of an autopilot's origin from the site's, as "0.08 m"; empty if equal."""
-    if is_elsewhere(site, origin):
+    if is_other_site(site, origin):
         return "more than a kilometre"
     metres = math.hypot(*from_geodetic(site, origin))
     return "" if metres <= SAME_M else f"{metres:.2f} m"
 
 
-def is_elsewhere(site: SiteOrigin, origin: Geodetic) -> bool:
+def is_other_site(site: SiteOrigin, origin: Geodetic) -> bool:
     """Return True if an autopilot's origin belongs to another site."""
     d_lat, d_lon = origin.lat - site.lat, math.remainder(origin.lon - site.lon, 360.0)
     return max(abs(d_lat), abs(d_lon)) > FAR_DEG

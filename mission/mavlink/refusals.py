@@ -35,7 +35,7 @@ def origin_of(mission: Mission) -> SiteOrigin:
 
 def check(mission: Mission, numbers: tuple[int, ...], options: TranslationOptions) -> None:
     """Refuse a mission that the vehicle would not execute as written."""
-    _check_manner(options)
+    _check_options(options)
     _check_origin(mission, options.origin)
     for problem in problems_of(mission):
         raise InputError(f"{mission.name}: {problem}; correct the mission or plan it again")
@@ -66,14 +66,14 @@ def check_count(mission: Mission, placed: Sequence[Placed], vehicle: Autopilot, 
         return
     least = count - sum(one.role == "settle" for one in placed)
     enough = "which is enough" if least <= most else "which is not enough"
-    by_hold = f"--settle hold makes it {least}, {enough}; or " if least < count else ""
+    with_hold = f"--settle hold makes it {least}, {enough}; or " if least < count else ""
     raise NegativeResult(
         f"{mission.name}: {len(mission.stops)} stops make {count} items, {vehicle.name} holds {most}; "
-        f"{by_hold}plan fewer stops at once"
+        f"{with_hold}plan fewer stops at once"
     )
 
 
-def _check_manner(options: TranslationOptions) -> None:
+def _check_options(options: TranslationOptions) -> None:
     needs = {"script": Command.DO_SEND_SCRIPT_MESSAGE, "camera": Command.IMAGE_START_CAPTURE}
     taken, name = options.vehicle.commands, options.vehicle.name
     if options.trigger != "none" and needs.get(options.trigger) not in taken:

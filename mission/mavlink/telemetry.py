@@ -35,12 +35,12 @@ def is_lost(silent_s: float) -> bool:
     return silent_s > LOST_S
 
 
-def began_again(before_ms: int, now_ms: int) -> bool:
+def has_restarted(before_ms: int, now_ms: int) -> bool:
     """Return True if a vehicle restarted between two of its times since boot."""
     return now_ms + BACK_MS < before_ms
 
 
-def complains(text: str) -> bool:
+def is_arming_refusal(text: str) -> bool:
     """Return True if a STATUSTEXT says why the vehicle does not arm."""
     return text.startswith(COMPLAINTS)
 

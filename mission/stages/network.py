@@ -79,9 +79,7 @@ def apart_in_words(mission: Mission, acquired: Collection[str]) -> str:
         return ""
     without = f" without {', '.join(missing)}" if missing else ""
     others = "; ".join(" ".join(piece) for piece in remaining.pieces[1:])
-    return (
-        f"the scans are in {len(remaining.pieces)} components{without}; separate: {others}"
-    )
+    return f"the scans are in {len(remaining.pieces)} components{without}; separate: {others}"
 
 
 def network_table(network: Network | None) -> dict[str, Any]:

@@ -202,9 +202,9 @@ class _Offers:
         alike = (gain >= NEARLY * gain[row]) & (shared >= SAME * gain[row])
         rows = np.flatnonzero(alike & ~self._chosen)
         best = rows[np.argsort(-gain[rows], kind="stable")][:MOST_RUNNERS]
-        places = candidates.xy[candidates.kept[best]].tolist()
+        positions = candidates.xy[candidates.kept[best]].tolist()
         amounts = (gain[best] * self._ledger.scale).tolist()
-        columns = zip(best.tolist(), places, amounts, strict=True)
+        columns = zip(best.tolist(), positions, amounts, strict=True)
         return tuple(RunnerUp(row, x, y, new) for row, (x, y), new in columns)
 
     def _shared(self, fresh: IntArray) -> IntArray:

@@ -90,7 +90,7 @@ def test_a_mission_without_georeference_is_refused(tmp_path: Path) -> None:
 def test_a_mission_from_another_origin_is_refused(tmp_path: Path) -> None:
     elsewhere = msgspec.structs.replace(SITE, lat=SITE.lat + 5e-6)
     with rover(tmp_path, "ardupilot") as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
-        with pytest.raises(NegativeResult, match=r"origin \(47\.4.*\) lies 0\.56 m from the mission's"):
+        with pytest.raises(NegativeResult, match=r"origin \(47\.4.*\) is 0\.56 m from the mission's"):
             station.push(site_mission(site=elsewhere))
         with pytest.raises(NegativeResult, match="more than a kilometre"):
             station.push(site_mission(site=msgspec.structs.replace(SITE, lat=-SITE.lat)))
