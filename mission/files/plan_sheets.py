@@ -58,7 +58,7 @@ class Tile:
 
 
 def needs_sheets(made: Route, mission: Mission) -> bool:
-    """Whether one sheet shows the floor only smaller than can be read."""
+    """Return True if one sheet shows the floor too small to read."""
     return whole_sheet(made, mission).scale > READABLE
 
 

@@ -1,4 +1,4 @@
-"""Draws plan.svg: a mission on its floor, to scale in millimetres, as a surveyor prints it."""
+"""plan.svg: a mission on its floor, to scale in millimetres, as a surveyor prints it."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def overview(
     with_range: bool = False,
     with_table: bool = True,
 ) -> tuple[str, PaperSheet]:
-    """What stands on the one sheet that shows everything, and the sheet."""
+    """Return the blocks of the one sheet that shows everything, and the sheet."""
     stops = panel.shared_rows(shared) if shared else panel.stop_rows(mission)
     rows = [*stops, *(panel.figure_rows(figures) if figures else [])] if with_table else []
     facts = panel.facts_of(made, mission, shared, date=date)
@@ -85,7 +85,7 @@ def whole_sheet(
 def drawing_of(
     made: Route, mission: Mission, sheet: PaperSheet, shared: Sequence[Mission] = (), *, with_range: bool
 ) -> tuple[str, ...]:
-    """Everything to scale, from the floor up to the numbers."""
+    """Yield everything to scale, from the floor up to the numbers."""
     missions = shared or (mission,)
     space = made.selection.visibility.candidates.space
     parts = chain(
@@ -101,7 +101,7 @@ def drawing_of(
 
 
 def _busy(missions: Sequence[Mission], floor: FloorPlan, sheet: PaperSheet) -> Busy:
-    """What room names keep away from: stops above all, then the route, then elements."""
+    """Return the points that room names avoid: stops above all, then the route, then elements."""
     turns = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     disc = (STOP + 0.5) * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     centres = [

@@ -1,4 +1,4 @@
-"""plan.toml and options -> checked settings; settings -> a plan.toml that reads back the same."""
+"""plan.toml and options -> checked parameters; parameters -> a plan.toml that reads back the same."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stopgo.mission.settings.toml_file import read_toml
 
 
 def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
-    """Settings from plan.toml (if given) and then `overrides`; both are checked.
+    """Return the parameters from plan.toml (if given) and then `overrides`; both are checked.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def read_settings(path: Path | None, overrides: dict[str, Any]) -> Settings:
 
 
 def settings_toml(settings: Settings) -> str:
-    """The settings as a plan.toml that reads back the same; what is undecided stands as a comment."""
+    """Return the parameters as a plan.toml that reads back the same; undecided ones are comments."""
     lines: list[str] = []
     for table, parameters in _tables().items():
         lines.append(f"[{table}]")
@@ -54,7 +54,7 @@ def settings_toml(settings: Settings) -> str:
 
 
 def settings_json(settings: Settings) -> dict[str, dict[str, Any]]:
-    """The settings by their table in plan.toml; what is undecided is null."""
+    """Return the parameters by their table in plan.toml; undecided ones are null."""
     return {
         table: {parameter.name: getattr(settings, parameter.name) for parameter in parameters}
         for table, parameters in _tables().items()
@@ -62,7 +62,7 @@ def settings_json(settings: Settings) -> dict[str, dict[str, Any]]:
 
 
 def _said(error: str, values: dict[str, Any], path: Path | None) -> str:
-    """A refused value as one line: key, value, and what would be right."""
+    """Return a refused value as one line: key, value, and the valid values."""
     what, _, where = error.partition(" - at `$.")
     key = where.rstrip("`").partition("[")[0]
     return f"{f'{path}: ' if path else ''}{key} = {_shown(values[key])}: {PARAMETERS[key].right or what}"
@@ -81,7 +81,7 @@ def _values_of(path: Path) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for table, content in document.items():
         if not isinstance(content, dict):
-            raise InputError(f"{path}: {table} = {content} stands in no table; known: {known}")
+            raise InputError(f"{path}: {table} = {content} is in no table; known: {known}")
         if table not in tables:
             raise InputError(f"{path}: unknown table [{table}]; known: {known}")
         for key in content:
@@ -92,7 +92,7 @@ def _values_of(path: Path) -> dict[str, Any]:
 
 
 def _tables() -> dict[str, list[Parameter]]:
-    """The tables of plan.toml and the parameters in each."""
+    """Return the tables of plan.toml and the parameters in each."""
     found: dict[str, list[Parameter]] = {}
     for parameter in PARAMETERS.values():
         found.setdefault(parameter.section, []).append(parameter)

@@ -1,4 +1,4 @@
-"""Writes room names into a plan, where they cover as little as can be of stops, route and columns."""
+"""Room names on a plan, at positions that cover as little as possible of stops, route and columns."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _label(room: Room, sheet: PaperSheet, avoid: Busy, written: FloatArray) -> L
 
 
 def _layouts(room: Room, widest: float) -> Iterator[list[list[tuple[str, float]]]]:
-    """What a label may say, the fullest first: on one line or two, with and without the area."""
+    """Yield possible labels, the longest first: on one line or two, with and without the area."""
     area = (f"{room.area:.1f} m²", AREA)
     names = [wrapped(room.label, width=widest), wrapped(room.label, width=0.0, cut=widest)]
     different = names if names[0] != names[1] else names[:1]
@@ -191,7 +191,7 @@ def _covered(x: FloatArray, y: FloatArray, half: FloatArray, avoid: Busy) -> Flo
 
 
 def _outside(x: FloatArray, y: FloatArray, half: FloatArray, rings: list[FloatArray]) -> FloatArray:
-    """How many of a label's nine points lie outside the rings, at each place of the grid, row by row."""
+    """Return the number of a label's nine points outside the rings, at each grid position, row by row."""
     sides = np.array([-1.0, 0.0, 1.0])[:, None]
     within = inside((x + half[0] * sides).ravel(), (y + half[1] * sides).ravel(), rings)
     counts = (~within).reshape(3, len(y), 3, len(x)).sum(axis=(0, 2))
@@ -199,7 +199,7 @@ def _outside(x: FloatArray, y: FloatArray, half: FloatArray, rings: list[FloatAr
 
 
 def inside(x: FloatArray, y: FloatArray, rings: list[FloatArray]) -> BoolArray:
-    """Whether each point of the grid x by y is inside the rings, by the even-odd rule (rows of y)."""
+    """Return True for points of the grid x by y inside the rings, by the even-odd rule (rows of y)."""
     result = np.zeros((len(y), len(x)), dtype=bool)
     for ring in rings:
         after = np.roll(ring, -1, axis=0)

@@ -1,4 +1,4 @@
-"""Writes QGroundControl's .plan: the items an autopilot would be sent, with home at the site's origin."""
+"""QGroundControl's .plan: the items for an autopilot, with home at the site's origin."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ FILE_FRAMES = {
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:
-    """The plan; `stopgo` holds what items cannot: the stops' ids and the bearing of the site's +y axis."""
+    """Return the plan; `stopgo` holds what items cannot: stop ids and the bearing of the site's +y axis."""
     items = items_of(mission, supplements)
     origin, speed = items.origin, mission.robot.speed
     own = {"heading_deg": origin.heading_deg, "stops": _ids(items)}
@@ -83,7 +83,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
-    """What the autopilot does not do by itself."""
+    """Return the notes on what the autopilot does not do by itself."""
     return items_of(mission, supplements).notes
 
 

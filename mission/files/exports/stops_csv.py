@@ -16,7 +16,7 @@ from stopgo.mission.frames.geodesy import bearing_deg, to_geodetic
 from stopgo.mission.geometry import frozen, polyline_length
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'")
-"""What spreadsheets take for the beginning of a formula, and the apostrophe that guards against it."""
+"""First characters of a formula in a spreadsheet, and the apostrophe that prevents it."""
 PLACES = 6
 """Decimals of metres, as in mission.json."""
 DEGREES = 9
@@ -42,12 +42,12 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
-    """The table has no row for the way back."""
+    """Return the note that the table has no row for the return leg."""
     return () if mission.return_ is None else ("the way back to the start is not in a table of stops",)
 
 
 def guarded(text: str) -> str:
-    """Text that no spreadsheet takes for a formula."""
+    """Return text that no spreadsheet reads as a formula."""
     return f"'{text}" if text.startswith(FORMULA) else text
 
 

@@ -35,7 +35,7 @@ MODEL = "IFC"
 """Names the data of a line that hold the GlobalId of its element."""
 
 BROKEN_DRAWING = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
-"""What ezdxf raises where a drawing it read does not hold what it trusts in."""
+"""Errors of ezdxf for a drawing that is damaged inside."""
 
 DISC = 0.3
 """Radius of a stop's disc in metres."""
@@ -79,7 +79,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
-    """What the layers do without."""
+    """Return the notes on what the layers lack."""
     found = []
     if supplements.floor is None:
         found.append("no --floor: the layers stand alone, in metres, without the drawing")

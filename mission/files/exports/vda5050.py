@@ -23,17 +23,17 @@ from stopgo.mission.frames.frame_transform import SAME, from_map_point
 
 @dataclass(frozen=True)
 class Edition:
-    """What an order says otherwise in one version of VDA 5050 than in another."""
+    """Differences between two versions of VDA 5050 in an order."""
 
     version: str
     told: str
-    """How keys of texts for people end: `nodeDescriptor`."""
+    """Ending of keys of texts for people: `nodeDescriptor`."""
     max_speed: str
     edge_names_its_nodes: bool
     deviation: Callable[[float], object]
     """`allowedDeviationXY` for a tolerance in metres."""
     retriable: bool
-    """Whether an action can say that it may be tried again."""
+    """True if an action can be marked as repeatable."""
 
 
 def _ellipse(tolerance: float) -> object:
@@ -77,7 +77,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
-    """What the sender has to fill in."""
+    """Return the note on keys that the sender has to fill in."""
     header = "manufacturer and serialNumber are 'unknown': fleet control names the vehicle when it sends"
     return (header, *unmapped(mission))
 
@@ -111,7 +111,7 @@ def _node(waypoint: Waypoint, name: str, sequence: int, mission: Mission, editio
 
 
 def _arrival(waypoint: Waypoint, stop: Stop, mission: Mission, edition: Edition) -> dict[str, object]:
-    """How exactly a vehicle must stand at a stop; one that scans all round may face anywhere."""
+    """Return the tolerances of a vehicle at a stop; any heading for a scanner that sees all round."""
     arrival = {"theta": waypoint.heading, "allowedDeviationXY": edition.deviation(stop.tolerance_m)}
     if mission.scanner.fov_deg == 360.0:
         arrival["allowedDeviationTheta"] = math.pi

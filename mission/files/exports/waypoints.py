@@ -1,4 +1,4 @@
-"""The way of a mission as poses one after another: the start, corners, stops, and the way back."""
+"""Route of a mission as successive poses: the start, corners, stops, and the return leg."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from stopgo.mission.frames.transform import Transform
 
 @dataclass(frozen=True)
 class Waypoint:
-    """A pose on the way: a stop, or a place that is passed (`stop` is None)."""
+    """A pose on the route: a stop, or a corner (`stop` is None)."""
 
     x: float
     y: float
@@ -32,7 +32,7 @@ class Waypoint:
 
 
 def way(mission: Mission) -> tuple[Waypoint, ...]:
-    """Every pose of the way in the order of driving; the start is left out where it is the first stop."""
+    """Return the poses of the route in the order of driving; without the start if it is the first stop."""
     poses: list[Waypoint] = []
     for number, stop in enumerate(mission.stops):
         leg = _distinct(stop.approach)
@@ -47,7 +47,7 @@ def way(mission: Mission) -> tuple[Waypoint, ...]:
 
 
 def _distinct(leg: Sequence[Point]) -> list[Point]:
-    """A polyline without points that stand on the one before."""
+    """Return a polyline without repeated points."""
     return [point for number, point in enumerate(leg) if number == 0 or point != leg[number - 1]]
 
 
@@ -63,7 +63,7 @@ def frame_name(mission: Mission) -> str:
 
 
 def mapped(mission: Mission) -> Mission:
-    """The mission with all its places on the robot's map (`frame.to_map` applied)."""
+    """Return the mission with all its positions on the robot's map (`frame.to_map` applied)."""
     to_map = mission.frame.to_map
     if to_map is None:
         return mission

@@ -1,4 +1,4 @@
-"""Reads QGroundControl's .plan: its simple items, with home as the site's origin unless another is given."""
+"""Reader of QGroundControl's .plan: its simple items, with home as the site's origin unless given."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _home(mission: dict[str, Any], ours: object, source: str) -> SiteOrigin:
     lat, lon, alt = map(float, home)
     if not (abs(lat) <= 90 and abs(lon) <= 180) or lat == lon == 0:
         raise InputError(
-            f"{source}: home is at latitude {lat:g}, longitude {lon:g}, which is no place; "
+            f"{source}: home is at latitude {lat:g}, longitude {lon:g}, which is no position; "
             "give --origin LAT,LON,ALT,HEADING"
         )
     heading = ours.get("heading_deg", 0.0) if isinstance(ours, dict) else 0.0

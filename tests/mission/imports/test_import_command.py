@@ -42,7 +42,7 @@ def test_the_mission_passes_its_check(name: str, folder: Path, capsys: Captured)
     code, said, err = run([str(folder / name), "-o", out], capsys)
     assert code == 0
     assert said.startswith(f"{out}: ")
-    assert "stopgo check --floor FLOOR.dxf says" in err
+    assert "stopgo check --floor FLOOR.dxf tests" in err
     assert main(["check", out]) == 0
     mission = read(out)
     assert mission.origin.floor == name

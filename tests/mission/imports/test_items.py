@@ -120,9 +120,9 @@ REFUSED: dict[str, tuple[tuple[Row, ...], str]] = {
     "nothing to scan": ((waypoint(1), waypoint(2)), "the scan stops among the waypoints are unknown"),
     "nothing": ((), "the scan stops among"),
     "local frame": (((16, 1, (5, 0, 0, 0, 1.0, 2.0, 0)),), "item 1 .* is in frame 1"),
-    "no place": (((16, 3, (5, 0, 0, 0, 0.0, 0.0, 0)),), "item 1 .* which is no place"),
-    "beyond the pole": (((16, 3, (5, 0, 0, 0, 91.0, 8.0, 0)),), "item 1 .* which is no place"),
-    "place unsaid": (((16, 3, (5, 0, 0, 0, None, None, 0)),), "item 1 .* which is no place"),
+    "no place": (((16, 3, (5, 0, 0, 0, 0.0, 0.0, 0)),), "item 1 .* which is no position"),
+    "beyond the pole": (((16, 3, (5, 0, 0, 0, 91.0, 8.0, 0)),), "item 1 .* which is no position"),
+    "place unsaid": (((16, 3, (5, 0, 0, 0, None, None, 0)),), "item 1 .* which is no position"),
     "another town": ((waypoint(5000, hold=5),), "item 1 .* is 50 km from the site's origin"),
     "another continent": ((waypoint(-500_000, hold=5),), "km from the site's origin"),
 }
