@@ -84,7 +84,7 @@ def _time(seconds: float) -> str:
 
 
 def _whose(mission: Mission, shared: Sequence[Mission]) -> list[tuple[str, str]]:
-    """The mission, or those that share its stops."""
+    """The mission, or those that its stops are divided among."""
     if shared:
         return [(letter(k), f"{share_in_words(item)}: {item.id[:12]}") for k, item in enumerate(shared)]
     own = [] if mission.share is UNSET else [("Share", share_in_words(mission))]

@@ -21,7 +21,7 @@ from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures
 
 PADDING = 8.0
-"""Millimetres kept free round the floor, for coordinates and what stands on its edge."""
+"""Millimetres kept free round the floor, for coordinates and symbols on its edge."""
 
 
 def plan_svg(
@@ -33,11 +33,11 @@ def plan_svg(
     date: str,
     with_range: bool = False,
 ) -> bytes:
-    """The plan as SVG, with a table of its figures where they are given.
+    """Return the plan as SVG, with a table of its figures if they are given.
 
-    Where its stops are `shared` out among several missions, these are drawn in place of its own.
+    If several `shared` missions divide its stops, they are drawn instead of it.
 
-    `date` stands in the title block as given, so equal inputs give equal bytes.
+    `date` is printed in the title block as given, so equal inputs give equal bytes.
 
     `with_range` adds a faint ring of the scanner's range about each stop.
     """
@@ -75,7 +75,7 @@ def overview(
 def whole_sheet(
     made: Route, mission: Mission, shared: Sequence[Mission] = (), *, rows: int = 0
 ) -> PaperSheet:
-    """The sheet that shows everything, with so many rows of tables beside it."""
+    """Return the sheet that shows everything, with this number of table rows next to it."""
     entries = panel.legend_entries(made, mission, shared)
     facts = [*panel.facts_of(made, mission, shared, date=""), ("Scale", "")]
     blocks = (panel.legend_height(entries), panel.title_height(facts), rows)

@@ -27,7 +27,7 @@ OUTSIDE = 6.0
 LABEL = 2.0
 """Cost of each of 28 points of another label."""
 _TRIES = 28
-"""Places tried along each side of a room's bounding box."""
+"""Positions tried along each side of a room's bounding box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +86,10 @@ class Label:
 
 
 def room_labels(rooms: tuple[Room, ...], sheet: PaperSheet, *, avoid: Busy) -> str:
-    """Name and area of each room, off `avoid` and each other.
+    """Return name and area of each room, away from `avoid` and each other.
 
-    Where there is no room for both the name stands alone, then its first word; a room that has no place even
-    for that has no label here.
+    Without space for both, the name is alone, then only its first word; a room without space even for that
+    has no label here.
     """
     labels: list[Label] = []
     written = np.empty((0, 28, 2))
@@ -183,7 +183,7 @@ def _best_place(
 
 
 def _covered(x: FloatArray, y: FloatArray, half: FloatArray, avoid: Busy) -> FloatArray:
-    """Weight of the points that lie under a label at each place of the grid x by y, row by row."""
+    """Return the weight of the points under a label at each position of the grid x by y, row by row."""
     near_x = np.abs(avoid.xy[:, 0] - x[:, None]) < half[0]
     near_y = np.abs(avoid.xy[:, 1] - y[:, None]) < half[1]
     # einsum, not @: so small a product loses more time to BLAS's threads than it takes.

@@ -45,7 +45,7 @@ def route(
     back_way: dict[str, object] = BACK,
     after: str = "",
 ) -> Iterator[str]:
-    """Legs with direction arrows; the return leg dashed. `after` stands behind the layers' names."""
+    """Draw legs with direction arrows; the return leg dashed. `after` is appended to the layers' names."""
     legs = [_on_paper(stop.approach, sheet) for stop in mission.stops]
     back = _on_paper(mission.return_ or (), sheet)
     join: dict[str, object] = {"fill": "none", "stroke_linejoin": "round"}

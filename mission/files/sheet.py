@@ -34,7 +34,7 @@ class PaperBox:
 
 @dataclass(frozen=True)
 class Chunk:
-    """A piece of the table: `count` rows from row `first` on."""
+    """A part of the table: `count` rows from row `first` on."""
 
     box: PaperBox
     first: int

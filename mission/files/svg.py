@@ -80,7 +80,7 @@ def polygon(points: FloatArray, **style: object) -> str:
 
 
 def path(data: Iterable[str], **style: object) -> str:
-    """One path of many pieces; nothing when there are none."""
+    """Return one path of many parts; nothing when there are none."""
     joined = "".join(data)
     return f'<path d="{joined}"{attributes(style)}/>' if joined else ""
 

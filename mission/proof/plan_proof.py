@@ -108,7 +108,7 @@ class CloudQuality:
     total_m2: float
     seen_m2: float
     by_spacing_mm: dict[int, float]
-    """Fraction of the seen area where one scan's points are at most so far apart, the wider way."""
+    """Fraction of the seen area where one scan's points are at most so far apart, the wider direction."""
     by_incidence_deg: dict[int, float]
     """Fraction that some stop hits at most so far off the perpendicular."""
     by_stops: dict[int, float]

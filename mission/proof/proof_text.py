@@ -119,7 +119,7 @@ def _sections(proof: PlanProof) -> Iterator[tuple[str, list[str]]]:
 
 
 def missed_words(proof: PlanProof) -> list[str]:
-    """Return the missed part of the promise by reason, and the part nobody promised."""
+    """Return the missed part of the promise by reason, and the part that was not promised."""
     missed = [f"{amount:.1f} {proof.unit} missed: {reason}" for reason, amount in proof.missed.items()]
     beyond = f"{proof.whole.beyond:.1f} {proof.unit} acquired that were not promised"
     return [*missed, beyond] if proof.whole.beyond >= 0.05 else missed

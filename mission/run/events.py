@@ -236,7 +236,7 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     done_count: int = 0
     skipped_count: int = 0
     outside: tuple[str, ...] = ()
-    """Of those that are done, the newest that were scanned farther from their places than is tolerated."""
+    """Newest of the done stops that were scanned outside tolerance."""
     outside_count: int = 0
 
 

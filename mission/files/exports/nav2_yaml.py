@@ -1,6 +1,6 @@
-"""Writes the stops as the waypoints file of Nav2's RViz panel ("save WPs"), each with the leg to it.
+"""Waypoints file of Nav2's RViz panel ("save WPs"): each stop with the leg to it.
 
-The panel reads `pose` and `orientation` of every waypoint and passes over other keys: `approach` and `return`
+The panel reads `pose` and `orientation` of every waypoint and ignores other keys: `approach` and `return`
 are for programs that let Nav2 follow the mission's legs.
 """
 

@@ -29,7 +29,7 @@ FILE_FRAMES = {
     MavFrame.GLOBAL_INT: MavFrame.GLOBAL,
     MavFrame.GLOBAL_RELATIVE_ALT_INT: MavFrame.GLOBAL_RELATIVE_ALT,
 }
-"""In files places are degrees, so their frames are those without INT."""
+"""Files give positions in degrees, so their frames are those without INT."""
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:
@@ -88,7 +88,7 @@ def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
 
 
 def _simple(item: Item, number: int) -> dict[str, Any]:
-    """An item as QGroundControl writes it; null is NaN, "not said"."""
+    """Return an item in QGroundControl's form; null is NaN, "not given"."""
     numbers = [*item.params, *place(item), item.z]
     return {
         "type": "SimpleItem",
@@ -100,7 +100,7 @@ def _simple(item: Item, number: int) -> dict[str, Any]:
 
 
 def place(item: Item) -> tuple[float, float]:
-    """Latitude and longitude in degrees, or the two plain numbers of a command without a place."""
+    """Return latitude and longitude in degrees, or the two plain numbers of a command without a position."""
     if item.command in PLACED:
         return item.x / STEPS_PER_DEGREE, item.y / STEPS_PER_DEGREE
     return float(item.x), float(item.y)

@@ -1,7 +1,7 @@
-"""Writes the stops as a table, one row each, that a spreadsheet opens alike in every country.
+"""Table of stops, one row each, that opens the same in spreadsheets of every country.
 
-RFC 4180: commas, full stops in numbers, CRLF, UTF-8. Text that a spreadsheet would take for a formula gets
-an apostrophe in front, which `stopgo.mission.files.imports.stops_csv` takes off again.
+RFC 4180: commas, full stops in numbers, CRLF, UTF-8. Text that a spreadsheet would read as a formula gets
+an apostrophe in front, which `stopgo.mission.files.imports.stops_csv` removes again.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def write(mission: Mission, supplements: Supplements) -> bytes:
 
 
 def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
-    """The places in the table's columns x_m and y_m."""
+    """Return the positions in the table's columns x_m and y_m."""
     rows = csv.DictReader(io.StringIO(data.decode(), newline=""))
     return [(float(row["x_m"]), float(row["y_m"])) for row in rows]
 

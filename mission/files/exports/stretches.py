@@ -24,12 +24,12 @@ class Stretches:
     seen: FloatArray
     unseen: FloatArray
     seen_of: tuple[str, ...] = ()
-    """GlobalId of the element that each piece of `seen` is of, or an empty text; none without a model."""
+    """GlobalId of the element of each segment of `seen`, or an empty text; empty without a model."""
     unseen_of: tuple[str, ...] = ()
 
 
 def read_stretches(path: Path, mission: Mission) -> Stretches:
-    """The stretches in the coverage.json of `mission`.
+    """Return the stretches in the coverage.json of `mission`.
 
     Raises
     ------

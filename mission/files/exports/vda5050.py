@@ -1,7 +1,7 @@
-"""Writes the mission as an order of VDA 5050, version 3.0 or 2.1: what a fleet control sends to a vehicle.
+"""Order of VDA 5050, version 3.0 or 2.1, from a mission: the message of a fleet control to a vehicle.
 
-Every pose of the way is a node and every straight piece between two an edge, so that a vehicle drives the
-mission's legs and no others. A scan is an action at the stop's node.
+Every pose of the route is a node, and every straight segment between two is an edge, so that a vehicle drives
+exactly the mission's legs. A scan is an action at the stop's node.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ UNNAMED = "unknown"
 
 
 def write(mission: Mission, supplements: Supplements, *, edition: Edition = V3_0) -> bytes:
-    """The order; fleet control sets headerId, timestamp, manufacturer and serialNumber when it sends it."""
+    """Return the order; fleet control sets headerId, timestamp, manufacturer and serialNumber on sending."""
     poses = way(mapped(mission))
     nodes = [
         _node(waypoint, name, 2 * number, mission, edition)
@@ -69,7 +69,7 @@ def write(mission: Mission, supplements: Supplements, *, edition: Edition = V3_0
 
 
 def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
-    """The places of the nodes that have an action, back on the site."""
+    """Return the positions of the nodes that have an action, back in the site's frame."""
     nodes = msgspec.json.decode(data)["nodes"]
     places = [node["nodePosition"] for node in nodes if node["actions"]]
     to_map = mission.frame.to_map or SAME

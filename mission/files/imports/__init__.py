@@ -32,7 +32,7 @@ def read_mission(
     Raises
     ------
     InputError
-        Naming the file, what is wrong in it or means nothing to a mission, and the way out.
+        Naming the file, the problem in it, and the action.
     """
     reader = READERS[_kind(path, kind)]
     data = _bytes_of(path)

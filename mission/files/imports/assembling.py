@@ -84,7 +84,7 @@ def _legs(track: ImportedRoute, settings: Settings) -> Iterator[list[Point]]:
 
 
 def _distinct(leg: Sequence[Point]) -> list[Point]:
-    """Rounded to DECIMALS, without points that stand on the one before."""
+    """Round to DECIMALS, and leave out repeated points."""
     points = [(rounded(x), rounded(y)) for x, y in leg]
     return [point for number, point in enumerate(points) if number == 0 or point != points[number - 1]]
 

@@ -1,7 +1,7 @@
 """Mission items of a file -> track: waypoints with a wait or a trigger are stops.
 
-Only what a robot of stopgo would do in the same way is read; every other command is refused by its number,
-for a mission that leaves out half of a plan is worse than none.
+Only items that a stopgo robot executes in the same way are read. Every other command is refused by its
+number, because half of a plan is worse than none.
 """
 
 from __future__ import annotations

@@ -119,7 +119,7 @@ def _listed(value: object, number: int, source: str) -> Listed:
 
 
 def _named(item: Listed, ours: object) -> Listed:
-    """The item with the id that stopgo wrote beside the items, by their places."""
+    """Return the item with the id that stopgo wrote for its index."""
     stops = ours.get("stops") if isinstance(ours, dict) else None
     name = stops.get(str(item.number)) if isinstance(stops, dict) else None
     return Listed(item.number, item.command, item.frame, item.params, name if isinstance(name, str) else None)
