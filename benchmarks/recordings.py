@@ -65,7 +65,7 @@ from stopgo.planner import plan
 
 copyreg.pickle(MappingProxyType, lambda m: (eval, (f"__import__('types').MappingProxyType({dict(m)!r})",)))
 part = plan(office(float(sys.argv[1]), float(sys.argv[2]), seed=1), Settings()).parts[0]
-nouns = [*part.nouns(), schedule(part.mission), sight_of(part.route, part.mission, part.figures)]
+nouns = [*part.stage_results(), schedule(part.mission), sight_of(part.route, part.mission, part.figures)]
 with open(sys.argv[3], "wb") as file:
     pickle.dump((part, nouns), file)
 """

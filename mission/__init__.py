@@ -1,4 +1,4 @@
-"""The nouns of stopgo and the files they are written to. Imports nothing else of the project."""
+"""Data of every stage of stopgo, and the files it is written to. Imports nothing else of the project."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ __version__: str
 
 
 def __getattr__(name: str) -> str:
-    """The version, looked up when it is asked for: no command that does not print it waits for that."""
+    """Return the version; it is looked up on first use, so that other commands do not wait for it."""
     if name != "__version__":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib.metadata import PackageNotFoundError, version

@@ -1,6 +1,6 @@
-"""What can go wrong, each with the exit code it ends a command with.
+"""Errors that a user may see, each with the exit code of its command.
 
-An error's message is one line that names the thing, the value and the way out; the front door prints it.
+A message is one line: the object, its value, the problem and the action. The front door prints it.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ class MissingExtra(StopgoError):
 
 
 class RobotUnreachable(StopgoError):
-    """The robot was never reached and nothing was sent to it."""
+    """The robot was not reached and nothing was sent to it."""
 
     exit_code = 2
 
 
 class NegativeResult(StopgoError):
-    """Everything worked and the answer is no: refused, no candidate, coverage not reached."""
+    """Everything worked, and the result is negative: refused, no candidate, coverage not reached."""
 
     exit_code = 1
 
     def __init__(self, message: str = "", *, reason: str | None = None) -> None:
         super().__init__(message)
         self.reason = reason
-        """The robot's word for why it refused, if it is one of the protocol's."""
+        """Reason code of the robot's refusal, if it is one of the protocol's."""
 
 
 AnswerIsNo = NegativeResult
-"""The name of `NegativeResult` until 0.1; goes with 0.3."""
+"""Former name of `NegativeResult`, until 0.1; removed with 0.3."""
 
 
 class OutcomeUnknown(StopgoError):
-    """Something was sent and no answer came: it may or may not have taken effect."""
+    """A command was sent and no answer came: it may or may not have taken effect."""
 
     exit_code = 3

@@ -1,4 +1,4 @@
-"""Shapes that every folder shares: read-only arrays and polygons, in metres, x right, y up."""
+"""Shapes that all folders share: read-only arrays and polygons, in metres, x right, y up."""
 
 from __future__ import annotations
 

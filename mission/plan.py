@@ -1,4 +1,4 @@
-"""A plan: the missions of a floor, and every noun on the way to them."""
+"""A plan: the missions of a floor, and the results of all stages."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class PartPlan:
     def floor(self) -> FloorPlan:
         return self.space.floor
 
-    def nouns(self) -> Iterator[Any]:
-        """Every noun from the floor to the figures, in the order in which they are made."""
+    def stage_results(self) -> Iterator[Any]:
+        """Yield every stage result from the floor to the figures, in the order in which they are made."""
         yield from (self.floor, self.space, self.candidates, self.visibility)
         yield from (self.selection, self.route, self.figures)
 
@@ -54,7 +54,7 @@ class PartPlan:
 
 @dataclass(frozen=True, eq=False)
 class DividedPlan:
-    """A part's plan, shared out among robots or tours: a mission for each."""
+    """The plan of one part of a floor, divided among robots or tours: a mission for each."""
 
     kind: Literal["robot", "tour"]
     whole: PartPlan
@@ -63,7 +63,7 @@ class DividedPlan:
     limit_s: float | None
     """Seconds that every tour stays within; None for robots."""
     bound: float
-    """For robots, seconds that the longest takes at least; for tours, how many there are at least."""
+    """For robots, lower bound of the longest mission's seconds; for tours, lower bound of their number."""
     method: str
 
     @property
@@ -82,9 +82,9 @@ class Plan:
     """The plans of a floor's parts; the first is of the part that holds the start, else of the largest."""
 
     parts: tuple[PartPlan, ...]
-    """Each with its mission; of a plan that is shared out, a share each."""
+    """The plan of each part with its mission; of a divided plan, one for each robot or tour."""
     divided: DividedPlan | None = None
-    """How the stops are shared out; None where one mission has them all."""
+    """Division of the stops among robots or tours; None if one mission has them all."""
 
     @property
     def first(self) -> PartPlan:
@@ -101,7 +101,7 @@ class Plan:
 
     @property
     def shared(self) -> tuple[Mission, ...]:
-        """The missions among which the stops are shared out; none where one mission has them all."""
+        """Missions of a divided plan; empty if one mission has all stops."""
         return () if self.divided is None else tuple(share.mission for share in self.divided.shares)
 
     @property
@@ -118,7 +118,7 @@ class Plan:
 
     @property
     def whole(self) -> PartPlan:
-        """The first part's plan with all its stops, shared out or not."""
+        """The first part's plan with all its stops, divided or not."""
         return self.first if self.divided is None else self.divided.whole
 
     @property
@@ -137,7 +137,7 @@ class Plan:
         return f"Plan({', '.join(map(repr, self.parts))})"
 
     def _repr_svg_(self) -> str:
-        """The printed plan of the first part, for notebooks."""
+        """Return the printed plan of the first part, for notebooks."""
         from stopgo.mission.files.plan_svg import plan_svg
 
         whole = self.whole

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from stopgo.mission.console.json_answer import answering
 from stopgo.mission.console.notice import notice
-from stopgo.mission.console.process import PIPE_CLOSED, Signals, drop_output, have_output, reader_is_gone
+from stopgo.mission.console.process import PIPE_CLOSED, Signals, drop_output, have_output, output_is_closed
 from stopgo.mission.errors import InputError, MissingExtra, StopgoError
 from stopgo.renamed_options import with_new_names
 
@@ -153,7 +153,7 @@ def _ended_by(error: BaseException, signals: Signals) -> tuple[str, int]:
         return str(error), error.exit_code
     if isinstance(error, KeyboardInterrupt) or signals.first is not None:
         return _stopped(signals)
-    if isinstance(error, BrokenPipeError) and reader_is_gone():
+    if isinstance(error, BrokenPipeError) and output_is_closed():
         return "", PIPE_CLOSED
     if isinstance(error, ModuleNotFoundError):
         return _missing(error)

@@ -248,13 +248,13 @@ def report_answer(answer: Answer, robot: str, json_: bool) -> None:
 
 def state_line(report: StateReport) -> str:
     """The state as one line a person reads."""
-    from stopgo.mission.run.tolerance import told_outside
+    from stopgo.mission.run.tolerance import stops_outside_text
 
     mission = (
         f"mission {report.mission_id[:12]} revision {report.revision}" if report.mission_id else "no mission"
     )
     stop = f", {report.stop_state} at {report.stop}" if report.stop else ""
-    outside = told_outside(report.outside, report.outside_count)
+    outside = stops_outside_text(report.outside, report.outside_count)
     skipped = f", {report.skipped_count} skipped" if report.skipped_count else ""
     if report.next_revision is not None:
         mission += f" (revision {report.next_revision} from the next stop on)"

@@ -12,7 +12,7 @@ from stopgo.mission.mavlink.accuracy import LEAVES_LEGS
 from stopgo.mission.mavlink.autopilots.kind import Autopilot, ParameterRule, why_no_rover
 from stopgo.mission.mavlink.enums import MessageId
 from stopgo.mission.mavlink.items import Command
-from stopgo.mission.mavlink.telemetry import charge_of, complains
+from stopgo.mission.mavlink.telemetry import charge_of, is_arming_refusal
 
 PREARM_BIT = 0x10000000
 """MAV_SYS_STATUS_PREARM_CHECK."""
@@ -91,7 +91,7 @@ def _arming(peer: Peer) -> Iterator[Check]:
         until = time.monotonic() + (COMPLAIN_S if accepted else 0.0)
         while (message := waiting.get(until - time.monotonic())) is not None:
             words = "".join(letter for letter in message.text if letter.isprintable()).strip()
-            if complains(words) and words not in said:
+            if is_arming_refusal(words) and words not in said:
                 said.append(words)
     for words in said:
         yield Check("arming", False, f'it says "{words}"', "see to that first: it does not arm like this")

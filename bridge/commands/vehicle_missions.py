@@ -35,7 +35,7 @@ from stopgo.mission.files.atomic import write_atomic
 from stopgo.mission.files.exports import qgc_plan, qgc_waypoints
 from stopgo.mission.frames.geodesy import STEPS_PER_DEGREE
 from stopgo.mission.frames.transform import SiteOrigin
-from stopgo.mission.mavlink.accuracy import why_beside
+from stopgo.mission.mavlink.accuracy import accuracy_warning
 from stopgo.mission.mavlink.autopilots import AUTOPILOTS, autopilot_named
 from stopgo.mission.mavlink.fields import PLACED
 from stopgo.mission.mavlink.items import Command, Item, ItemList, MavFrame
@@ -170,7 +170,7 @@ def _peer(line: Line) -> Iterator[tuple[Url, Peer]]:
 def _why_beside(peer: Peer, mission: Mission) -> str:
     """What its own parameters make of the mission's legs and tolerances, as far as it tells them."""
     kind = peer.autopilot
-    return why_beside(
+    return accuracy_warning(
         mission, kind, read_parameters(peer, [kind.radius_parameter, *kind.steering.parameters])
     )
 

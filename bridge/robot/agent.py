@@ -44,7 +44,7 @@ from stopgo.bridge.robot.runner import Position, Runner, state_report
 from stopgo.mission import __version__
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.run.events import PoseReport, StateReport
-from stopgo.mission.run.lease import Lease, kept
+from stopgo.mission.run.lease import Lease, renewed
 from stopgo.mission.run.orders import Order
 from stopgo.mission.run.states import Run
 
@@ -94,10 +94,10 @@ def _boot_in(answer: bytes) -> Booted | None:
 
 def keep_lease(journal: Journal, commander: str, *, now_ns: int) -> None:
     """Renew the lease if it is the commander's; a journal that takes nothing shows in what matters more."""
-    if kept(journal.fact("lease", Lease), commander, now_ns=now_ns) is None:
+    if renewed(journal.fact("lease", Lease), commander, now_ns=now_ns) is None:
         return
     with suppress(sqlite3.OperationalError), journal.transaction():
-        lease = kept(journal.fact("lease", Lease), commander, now_ns=now_ns)  # nobody else's by now
+        lease = renewed(journal.fact("lease", Lease), commander, now_ns=now_ns)  # nobody else's by now
         if lease is not None:
             journal.store_fact("lease", lease)
 

@@ -412,7 +412,7 @@ class Controller:
             reason = self._blocked("the way home", here)
             self._advance(run, lambda now: runs.held(now, reason))
         elif outcome == "arrived":
-            self._advance(run, lambda now: runs.came_home_by(now, mission))
+            self._advance(run, lambda now: runs.home_leg_driven(now, mission))
 
     def _blocked(self, way: str, here: Pose) -> str:
         why = self._base.blocked_by()
@@ -452,7 +452,7 @@ class Controller:
 
     def _told_of(self, change: Change) -> Iterator[AnyEvent]:
         now_ns = self._clock.now_ns()
-        return runs.told_of(change, robot=self.robot, boot_id=self.boot_id, now_ns=now_ns)
+        return runs.events_of(change, robot=self.robot, boot_id=self.boot_id, now_ns=now_ns)
 
     def _adopt(self, run: Run, *, ordered: bool = False) -> None:
         """What is stored is now what is; an order interrupts the work, except a scan that may end."""

@@ -25,7 +25,7 @@ from stopgo.bridge.robot.sealed_rows import DamagedRow, NewestTransaction, put, 
 from stopgo.mission.errors import InputError
 from stopgo.mission.run.events import AnyEvent, event_of
 from stopgo.mission.run.orders import Answer
-from stopgo.mission.run.states import Change, told_of
+from stopgo.mission.run.states import Change, events_of
 
 ANSWERS_KEPT = 10_000
 NONCES_KEPT = 10_000
@@ -130,7 +130,7 @@ class Journal:
         """A step of the run, and the events that tell of it."""
         with self.transaction():
             self.store_fact("run", change.run)
-            for event in told_of(change, robot=robot, boot_id=boot_id, now_ns=now_ns):
+            for event in events_of(change, robot=robot, boot_id=boot_id, now_ns=now_ns):
                 self.append(event)
 
     def append(self, event: AnyEvent) -> AnyEvent:

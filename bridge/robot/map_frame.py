@@ -70,7 +70,7 @@ class OnMap:
 
 def turned_point(point: Point, to_map: Transform) -> Point:
     """Site to map: turned by `heading`, then shifted."""
-    return frame_transform.turned(to_map, point)
+    return frame_transform.to_map_point(to_map, point)
 
 
 def turned(pose: Pose, to_map: Transform) -> Pose:
@@ -83,6 +83,6 @@ def turned_back(pose: Pose, to_map: Transform) -> Pose:
     """A pose of the map in the site's frame; exactly itself where there is nothing to turn."""
     if to_map == SAME:
         return pose
-    x, y = frame_transform.turned_back(to_map, (pose.x, pose.y))
+    x, y = frame_transform.from_map_point(to_map, (pose.x, pose.y))
     heading = math.remainder(pose.heading - to_map.heading, math.tau)
     return Pose(x=x, y=y, heading=heading)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from stopgo.bridge.robot.base import Base
 from stopgo.mission.document import Mission
 from stopgo.mission.run import revision
-from stopgo.mission.run.battery import what_is_missing
+from stopgo.mission.run.battery import battery_shortfall
 from stopgo.mission.run.orders import Refused
 from stopgo.mission.run.revision import RevisionPolicy
 from stopgo.mission.run.states import Run
@@ -31,13 +31,13 @@ def _unfit_now(mission: Mission, run: Run, held: Mission, revisions: RevisionPol
         return Refused("running", f"the robot is {run.state} and takes no revision during a run")
     if run.homing and run.then != "PAUSED":
         return Refused("running", "the robot is on its way home for good")
-    differs = revision.what_differs(run, held, mission)
+    differs = revision.driven_route_change(run, held, mission)
     return Refused("way_differs", f"revision {mission.revision}: {differs}") if differs else None
 
 
 def _too_long(mission: Mission, base: Base, *, first: int) -> Refused | None:
     battery, endurance_s = base.battery(), base.endurance_s()
-    missing = what_is_missing(mission, battery=battery, endurance_s=endurance_s, first=first)
+    missing = battery_shortfall(mission, battery=battery, endurance_s=endurance_s, first=first)
     return Refused("infeasible", missing) if missing else None
 
 

@@ -78,7 +78,7 @@ class GuardedBase:
     def _tried(self, call: Callable[[], T], otherwise: T, right: Callable[[T], bool]) -> T:
         """What the base answers, or `otherwise` where it fails or answers nonsense."""
         try:
-            with self._made.blamed():
+            with self._made.named_errors():
                 answer = call()
             if right(answer):
                 return answer
@@ -150,7 +150,7 @@ class GuardedScanner:
     def scan(self, label: str, scan: Scan, *, interrupt: Event) -> ScanResult | ScanFailed:
         """A scan's result, or why there is none."""
         try:
-            with self._made.blamed():
+            with self._made.named_errors():
                 result = self._scanner.scan(label, scan, interrupt=interrupt)
             if isinstance(result, ScanResult | ScanFailed):
                 return result
@@ -163,7 +163,7 @@ class GuardedScanner:
         if not hasattr(self._scanner, "scan_outcome"):
             return None
         try:
-            with self._made.blamed():
+            with self._made.named_errors():
                 result = self._scanner.scan_outcome(label)
         except InputError:
             return None

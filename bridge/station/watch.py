@@ -15,7 +15,7 @@ from stopgo.bridge.station.follow import Followed, Silence
 from stopgo.bridge.station.record import Past
 from stopgo.bridge.station.station import Station
 from stopgo.mission.comparing.run_collector import RunSink
-from stopgo.mission.comparing.spans import stood_s
+from stopgo.mission.comparing.spans import paused_s
 from stopgo.mission.console.table import printable
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.document.schedule import schedule
@@ -35,7 +35,7 @@ from stopgo.mission.run.events import (
     StateReport,
     UnknownKind,
 )
-from stopgo.mission.run.tolerance import scanned_beside, told_outside
+from stopgo.mission.run.tolerance import outside_tolerance_text, stops_outside_text
 
 REDRAW_S = 0.2
 LOST_S = 3.0
@@ -173,7 +173,7 @@ class EventObjects:
         if isinstance(report, PosesMissing):
             self._write({"missing": msgspec.to_builtins(report)})
         elif not isinstance(report, StateReport | PoseReport | Silence | Past):
-            beside = scanned_beside(report, self._stops.get(getattr(report, "stop", "")))
+            beside = outside_tolerance_text(report, self._stops.get(getattr(report, "stop", "")))
             self._write(msgspec.to_builtins(report) | ({"beside": beside} if beside else {}))
 
 
@@ -235,7 +235,7 @@ def table_lines(
     stop = f"{state.stop} {state.stop_state}" if state.stop else "-"
     elapsed = pose.mission_time_s if pose and pose.mission_time_s is not None else 0.0
     left = None if mission is None else remaining_s(mission, state, events, elapsed)
-    outside = told_outside(state.outside, state.outside_count)
+    outside = stops_outside_text(state.outside, state.outside_count)
     rows = [
         ("robot", f"{state.robot}  run {state.run_id or 'none yet'}"),
         ("state", f"{state.state}  {stop}"),
@@ -265,7 +265,7 @@ def remaining_s(
         last = mission.stops[behind - 1]
         begun = float(plan.arrival_s[behind - 1]) + last.settle_s + last.scan.duration_s
     since = max((event.mission_time_s for event in events if isinstance(event, Scanned)), default=0.0)
-    worked = elapsed_s - since - stood_s(events, since_s=since, until_s=elapsed_s)
+    worked = elapsed_s - since - paused_s(events, since_s=since, until_s=elapsed_s)
     return max(0.0, plan.total_s - begun - max(0.0, worked))
 
 
@@ -295,5 +295,5 @@ def event_line(event: AnyEvent, stops: Mapping[str, Stop]) -> str:
         detail = f"{event.deviation_m * 1000:.0f} mm beside"
     if isinstance(event, Scanned):
         detail = f"{event.file}, {event.points / 1e6:.1f} million points"
-    detail = "; ".join(word for word in (scanned_beside(event, stops.get(about)), detail) if word)
+    detail = "; ".join(word for word in (outside_tolerance_text(event, stops.get(about)), detail) if word)
     return f"{event.mission_time_s:8.1f} s  {name:15} {about:6} {detail}".rstrip()

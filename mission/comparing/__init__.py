@@ -1,1 +1,1 @@
-"""Sets a run beside its mission: stops, states, distance from the route, and coverage as acquired."""
+"""Comparison of a run with its mission: stops, states, distance from the route, and acquired coverage."""

@@ -1,4 +1,4 @@
-"""Coverage as acquired: what the scans of a run really saw, beside what its plan would have seen."""
+"""Acquired coverage: the targets that a run's scans saw, compared with the planned ones."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ Certainty = Literal["yes", "no", "unknown"]
 
 @dataclass(frozen=True, eq=False)
 class Acquired:
-    """What stops saw that were scanned, recomputed from what each stop sees."""
+    """Units seen by the scanned stops, computed again from the visibility of each stop."""
 
     sight: Sight
-    """The plan, by the revision that the run followed last of those that are known."""
+    """Plan of the newest known revision that the run followed."""
     seen: BoolArray
-    """Whether enough scanned stops saw each unit (n,)."""
+    """True for units that enough scanned stops saw (n,)."""
     perhaps: BoolArray
-    """The same, if every stop was scanned of which nobody says so, though the robot was through with it."""
+    """The same, if every passed stop was scanned for which no scan is confirmed."""
     lost: dict[str, float]
-    """What of all that is visible a scan at each missing stop would still bring, by stop."""
+    """Gain of a scan at each missing stop, as a fraction of all that is visible."""
     unknown: tuple[str, ...] = ()
-    """Stops that were scanned and of which no plan tells what they see: more was seen than is told."""
+    """Scanned stops without visibility data: more was seen than is counted."""
 
     @cached_property
     def shares(self) -> Shares:
@@ -43,7 +43,7 @@ class Acquired:
 
     @cached_property
     def rooms(self) -> tuple[tuple[Share, Share], ...]:
-        """Every room with targets as planned and as acquired, least seen first; last what faces none."""
+        """Rooms with targets as planned and as acquired, least seen first; last, units in no room."""
         ledger = self.sight.ledger
         planned, acquired = ledger.rooms_seen(self.sight.all_seen), ledger.rooms_seen(self.seen)
         return (*_paired(planned[:-1], acquired[:-1]), *_paired(planned[-1:], acquired[-1:]))
@@ -56,7 +56,7 @@ class Acquired:
 
     @cached_property
     def answer(self) -> Certainty:
-        """Whether all is seen that the plan was asked for: of the whole, of every room and every kind."""
+        """Answer to: is all seen that was required, of the whole, every room and every kind?"""
         if not self.shares.short:
             return "yes"
         if self.unknown or not self.sight.ledger.shares(self.perhaps).short:

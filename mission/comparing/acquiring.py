@@ -1,4 +1,4 @@
-"""What the scanned stops of a run really saw, and what the others cost."""
+"""Computation of the acquired coverage of a run, and of the loss by each missing scan."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import IntArray, frozen
 from stopgo.mission.stages.sight import Sight
 
-SCANNED, UNSURE = "scanned", "unconfirmed"
+SCANNED, UNCONFIRMED = "scanned", "unconfirmed"
 
 
 def acquired_by(
     stops: Sequence[StopComparison], missions: Sequence[Mission], sights: Iterable[Sight]
 ) -> Acquired | None:
-    """What the stops of a run saw; None where no plan of this mission tells what they see.
+    """Return the acquired coverage; None if no plan of this mission contains visibility data.
 
     `missions` are the revisions that were followed. Their plans are of one floor and one set of
     parameters, which the mission's id is a hash of, so that their targets are the same.
     """
-    known = _of(missions[-1], sights)
-    if not known:
+    plans = _plans_of(missions[-1], sights)
+    if not plans:
         return None
-    last = known[-1]
-    places = {stop.id: stop for mission in missions for stop in mission.stops}
+    last = plans[-1]
+    planned = {stop.id: stop for mission in missions for stop in mission.stops}
     done = [item.stop for item in stops if item.outcome == SCANNED]
-    unsure = [item.stop for item in stops if item.outcome == UNSURE]
-    views = _views(done, places, known)
+    unconfirmed = [item.stop for item in stops if item.outcome == UNCONFIRMED]
+    views = _views(done, planned, plans)
     seen = last.ledger.enough(views)
-    wanted = [item.stop for item in stops if item.outcome not in (SCANNED, UNSURE)]
+    wanted = [item.stop for item in stops if item.outcome not in (SCANNED, UNCONFIRMED)]
     return Acquired(
         sight=last,
         seen=seen,
-        perhaps=last.ledger.enough(views + _views(unsure, places, known)),
+        perhaps=last.ledger.enough(views + _views(unconfirmed, planned, plans)),
         lost={stop: last.brings(stop, views) for stop in wanted if stop in last.ids},
-        unknown=tuple(stop for stop in done if _knowing(stop, places, known) is None),
+        unknown=tuple(stop for stop in done if _plan_with(stop, planned, plans) is None),
     )
 
 
-def _of(mission: Mission, sights: Iterable[Sight]) -> list[Sight]:
-    """The plans of this mission, by revision; those of other targets than the newest are left out."""
+def _plans_of(mission: Mission, sights: Iterable[Sight]) -> list[Sight]:
+    """Return the plans of this mission, by revision; those of other targets than the newest are left out."""
     mine = sorted(
         (item for item in sights if item.mission_id == mission.id and item.revision <= mission.revision),
         key=lambda item: item.revision,
@@ -51,18 +51,18 @@ def _of(mission: Mission, sights: Iterable[Sight]) -> list[Sight]:
     return [item for item in mine if len(item.ledger.weight) == len(mine[-1].ledger.weight)]
 
 
-def _views(stops: Iterable[str], places: dict[str, Stop], sights: Sequence[Sight]) -> IntArray:
-    """How many of these stops see each unit."""
+def _views(stops: Iterable[str], planned: dict[str, Stop], sights: Sequence[Sight]) -> IntArray:
+    """Return the number of these stops that see each unit."""
     views = np.zeros(len(sights[-1].ledger.weight), dtype=np.int64)
     for stop in stops:
-        sight = _knowing(stop, places, sights)
+        sight = _plan_with(stop, planned, sights)
         if sight is not None:
             views += sight.views_from([stop])
     return frozen(views, np.int64)
 
 
-def _knowing(stop: str, places: dict[str, Stop], sights: Sequence[Sight]) -> Sight | None:
-    """The newest plan that tells what is seen from where this stop is."""
-    place = places.get(stop)
-    having = [sight for sight in sights if place is not None and sight.knows(place)]
-    return having[-1] if having else None
+def _plan_with(stop: str, planned: dict[str, Stop], sights: Sequence[Sight]) -> Sight | None:
+    """Return the newest plan that has visibility data for this stop at its position."""
+    position = planned.get(stop)
+    found = [sight for sight in sights if position is not None and sight.knows(position)]
+    return found[-1] if found else None

@@ -1,4 +1,4 @@
-"""Coverage as driven: what can be seen from where a robot really stood, beside what its plan reckons with."""
+"""Coverage as driven: the targets visible from the robot's real standstills, compared with the plan."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from stopgo.mission.stages.figures import Share, Shares
 
 @dataclass(frozen=True, eq=False)
 class AsDriven:
-    """What was in sight from the places where a robot stood long enough for a scan."""
+    """Targets visible from the positions where a robot was stationary long enough for a scan."""
 
     ledger: CoverageTotals
     """The units of the floor, n of them."""
     planned: BoolArray
-    """Whether enough of the mission's stops see each unit (n,)."""
+    """True for units that enough stops of the mission see (n,)."""
     driven: BoolArray
-    """Whether enough of the places where the robot stood see it (n,)."""
+    """True for units that enough of the robot's standstills see (n,)."""
 
     @cached_property
     def shares(self) -> Shares:
@@ -27,7 +27,7 @@ class AsDriven:
 
     @cached_property
     def pairs(self) -> tuple[tuple[Share, Share], ...]:
-        """Of the whole, of every kind and of every room with targets: as planned, and as driven."""
+        """Fractions of the whole, of every kind and of every room with targets: as planned, and as driven."""
         planned = {share.name: share for share in _all(self.ledger.shares(self.planned))}
         return tuple((planned[share.name], share) for share in _all(self.shares))
 
@@ -38,7 +38,7 @@ class AsDriven:
 
     @property
     def enough(self) -> bool:
-        """Whether all that was asked for was in sight."""
+        """True if all that was required was visible."""
         return not self.shares.short
 
 

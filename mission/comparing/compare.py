@@ -11,7 +11,7 @@ import numpy as np
 from stopgo.mission.comparing.acquired import Acquired
 from stopgo.mission.comparing.acquiring import acquired_by
 from stopgo.mission.comparing.comparison import Comparison, StopComparison
-from stopgo.mission.comparing.path_deviation import beside
+from stopgo.mission.comparing.path_deviation import cross_track_of
 from stopgo.mission.comparing.spans import spans_of
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.document.schedule import schedule
@@ -43,12 +43,11 @@ def compare(log: RunLog, missions: Sequence[Mission], sights: Iterable[Sight] = 
     ----------
     log
         The run, in the mission's frame.
-    missions
-        The mission's revisions in ascending order; of those that the run followed, the last one counts, and
-        each stop is compared with the revision by which it was reached. Stops that a revision withdrew
-        come last, and then stops that only the run tells of.
+    The mission's revisions in ascending order. Of those that the run followed, the last one counts, and
+    each stop is compared with the revision by which it was reached. Stops that a revision withdrew come
+    last, and after them stops that only the run contains.
     sights
-        What stops see, of any revisions.
+        Visibility data of stops, of any revisions.
     """
     followed = _followed(log, missions)
     plans = [_Planned(item) for item in followed]
@@ -61,7 +60,7 @@ def compare(log: RunLog, missions: Sequence[Mission], sights: Iterable[Sight] = 
         log=log,
         stops=tuple(replace(item, lost=_lost(item, acquired, log.ended)) for item in stops),
         spans=spans_of(log),
-        beside=beside(log, followed),
+        cross_track=cross_track_of(log, followed),
         planned_s=schedule(followed[-1]).total_s,
         driven_s=_end_s(log),
         acquired=acquired,
@@ -69,7 +68,7 @@ def compare(log: RunLog, missions: Sequence[Mission], sights: Iterable[Sight] = 
 
 
 def _followed(log: RunLog, missions: Sequence[Mission]) -> tuple[Mission, ...]:
-    """The revisions that the run followed; all where it tells of none of them."""
+    """Return the revisions that the run followed; all, if its events name none of them."""
     found = tuple(mission for mission in missions if mission.revision in log.revisions)
     return found or tuple(missions)
 
@@ -80,13 +79,13 @@ def _end_s(log: RunLog) -> float | None:
 
 
 def _lost(item: StopComparison, acquired: Acquired | None, ended: bool) -> float | None:
-    """What a stop's missing scan costs; nothing yet where the run still goes there."""
-    gone = item.outcome in ("skipped", "failed") or ended
-    return acquired.lost.get(item.stop) if gone and acquired is not None else None
+    """Return the loss by a stop's missing scan; None while the run may still go there."""
+    final = item.outcome in ("skipped", "failed") or ended
+    return acquired.lost.get(item.stop) if final and acquired is not None else None
 
 
 class _Planned:
-    """One revision's stops, when it plans to arrive there, and from which direction."""
+    """Stops of one revision, with planned arrivals."""
 
     def __init__(self, mission: Mission) -> None:
         self.revision = mission.revision
@@ -100,7 +99,7 @@ def _stop(stop: str, plans: list[_Planned], events: Sequence[AnyEvent]) -> StopC
     arrivals = [event for event in mine if isinstance(event, Arrived)]
     ends = [event for event in mine if isinstance(event, Scanned | Unconfirmed)]
     plan = _reached_by(stop, plans, mine[-1].revision if mine else None)
-    told = StopComparison(
+    item = StopComparison(
         stop=stop,
         planned_s=None if plan is None else plan.arrival_s[stop],
         arrived_s=arrivals[0].mission_time_s if arrivals else None,
@@ -109,22 +108,22 @@ def _stop(stop: str, plans: list[_Planned], events: Sequence[AnyEvent]) -> StopC
         outcome=_outcome(mine) if mine or stop in plans[-1].stops else "withdrawn",
         reason=_reason(mine),
     )
-    where = next((event.pose for event in reversed([*arrivals, *ends]) if event.pose is not None), None)
-    return told if plan is None or where is None else _placed(told, where, plan.stops[stop])
+    pose = next((event.pose for event in reversed([*arrivals, *ends]) if event.pose is not None), None)
+    return item if plan is None or pose is None else _with_offset(item, pose, plan.stops[stop])
 
 
 def _reached_by(stop: str, plans: list[_Planned], revision: int | None) -> _Planned | None:
-    """The plan by which a stop was reached, else the last one that has it."""
+    """Return the plan by which a stop was reached, else the last one that has it."""
     having = [plan for plan in plans if stop in plan.stops]
     found = [plan for plan in having if plan.revision == revision] or having
     return found[-1] if found else None
 
 
-def _placed(told: StopComparison, pose: Pose, stop: Stop) -> StopComparison:
-    """With the offset of a pose from the stop."""
-    x, y, ahead = pose.x - stop.x, pose.y - stop.y, arriving(stop)
+def _with_offset(item: StopComparison, pose: Pose, stop: Stop) -> StopComparison:
+    """Add the offset of a pose from the stop."""
+    x, y, ahead = pose.x - stop.x, pose.y - stop.y, arrival_direction(stop)
     return replace(
-        told,
+        item,
         deviation_m=deviation(pose, stop),
         along_m=x * math.cos(ahead) + y * math.sin(ahead),
         across_m=y * math.cos(ahead) - x * math.sin(ahead),
@@ -133,23 +132,23 @@ def _placed(told: StopComparison, pose: Pose, stop: Stop) -> StopComparison:
     )
 
 
-def arriving(stop: Stop) -> float:
-    """The direction in which a stop is driven to; where nothing is driven, that of its heading."""
-    way = np.asarray(stop.approach, dtype=np.float64).reshape(-1, 2)
-    moves = np.diff(way, axis=0)
+def arrival_direction(stop: Stop) -> float:
+    """Return the direction in which the robot arrives; without a leg, the stop's heading."""
+    leg = np.asarray(stop.approach, dtype=np.float64).reshape(-1, 2)
+    moves = np.diff(leg, axis=0)
     moves = moves[np.any(moves != 0, axis=1)]
     return float(np.arctan2(moves[-1, 1], moves[-1, 0])) if len(moves) else stop.heading
 
 
 def _settling_s(events: Sequence[AnyEvent]) -> float | None:
-    """Seconds from the last arrival before the last standing still to that."""
+    """Return the seconds between the last arrival and the following standstill."""
     settled = [k for k, event in enumerate(events) if isinstance(event, Settled)]
     before = [event for event in events[: settled[-1]] if isinstance(event, Arrived)] if settled else []
     return (events[settled[-1]].robot_ns - before[-1].robot_ns) / 1e9 if before else None
 
 
 def _tries(events: Sequence[AnyEvent]) -> int:
-    """How often it stood still; a robot that does not tell that had a try if it was through with the stop."""
+    """Return the number of standstills; at least 1 if the robot scanned or passed the stop."""
     settled = sum(isinstance(event, Settled) for event in events)
     return max(settled, int(any(isinstance(event, Scanned | Unconfirmed) for event in events)))
 
@@ -162,8 +161,8 @@ def _outcome(events: Sequence[AnyEvent]) -> str:
 
 
 def _reason(events: Sequence[AnyEvent]) -> str:
-    """Why a stop was not scanned: what was told last, and with a skip after a failure both."""
-    told = [event for event in events if type(event) in OUTCOMES]
-    both = [type(event) for event in told[-2:]] == [Failed, Skipped]
-    reasons = [getattr(event, "reason", "") for event in told[-2 if both else -1 :]]
+    """Return why a stop was not scanned: the last reason, or both of a failure and the following skip."""
+    ends = [event for event in events if type(event) in OUTCOMES]
+    both = [type(event) for event in ends[-2:]] == [Failed, Skipped]
+    reasons = [getattr(event, "reason", "") for event in ends[-2 if both else -1 :]]
     return "; ".join(dict.fromkeys(reason for reason in reasons if reason))

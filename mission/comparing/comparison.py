@@ -1,4 +1,4 @@
-"""Plan against run: what each stop was planned to be, and what it was."""
+"""Comparison of a plan with a run: each stop as planned, and as driven."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stopgo.mission.document import Mission
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.run.events import State
 from stopgo.mission.run.run_log import RunLog
-from stopgo.mission.run.tolerance import beside, is_outside
+from stopgo.mission.run.tolerance import is_outside, position_error_text
 
 DONE = {"scanned": "scanned", "unconfirmed": "passed"}
 """Outcomes of a stop that is done, in words."""
@@ -20,7 +20,7 @@ DONE = {"scanned": "scanned", "unconfirmed": "passed"}
 
 @dataclass(frozen=True, kw_only=True)
 class StopComparison:
-    """One stop; what did not happen is None."""
+    """Comparison of one stop; a value is None if it did not happen."""
 
     stop: str
     planned_s: float | None = None
@@ -30,23 +30,23 @@ class StopComparison:
     deviation_m: float | None = None
     """Distance of the robot from the stop when it scanned or passed there, else when it last arrived."""
     along_m: float | None = None
-    """The part of it in the direction in which the robot was to arrive, positive where it went too far."""
+    """Along-track error: its part in the planned direction of arrival, positive beyond the stop."""
     across_m: float | None = None
-    """The part of it to the left of that direction."""
+    """Its part to the left of that direction."""
     heading_rad: float | None = None
-    """How much farther to the left the robot was turned than planned."""
+    """Heading error of the robot, positive to the left."""
     tolerance_m: float | None = None
     settle_s: float | None = None
-    """How long it stood until it was still, the last time."""
+    """Settle time: from the last arrival to the standstill."""
     tries: int = 0
-    """How often it was ready to scan there."""
+    """Number of times that the robot was ready to scan there."""
     outcome: str
     """`scanned`, `unconfirmed`, `skipped`, `failed`, `arrived` or `not reached`; `withdrawn` if a revision
     dropped it unreached."""
     reason: str = ""
-    """Why it was not scanned, in the robot's words."""
+    """Reason why it was not scanned, in the robot's words."""
     lost: float | None = None
-    """Share of all that is visible that its scan would have added; None where it is not missing."""
+    """Fraction of all visible that its scan would have added; None if it is not missing."""
 
     @property
     def late_s(self) -> float | None:
@@ -56,16 +56,16 @@ class StopComparison:
 
     @property
     def outside_tolerance(self) -> bool:
-        """Whether the robot was farther from the stop than the mission tolerates."""
+        """True if the position error is greater than the mission tolerates."""
         away, limit = self.deviation_m, self.tolerance_m
         return away is not None and limit is not None and is_outside(away, limit)
 
     @property
-    def seen_beside(self) -> str:
-        """That it was scanned, or passed, from elsewhere, in words; empty if it was not."""
+    def outside_text(self) -> str:
+        """Position error of a scanned or passed stop outside tolerance, in words; empty if within."""
         if self.outcome not in DONE or not self.outside_tolerance:
             return ""
-        return f"{DONE[self.outcome]} {beside(self.deviation_m or 0.0, self.tolerance_m or 0.0)}"
+        return f"{DONE[self.outcome]} {position_error_text(self.deviation_m or 0.0, self.tolerance_m or 0.0)}"
 
 
 @dataclass(frozen=True)
@@ -83,19 +83,19 @@ class Span:
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
-    """How far the robot was beside the legs it drove, at every pose of its run."""
+class CrossTrack:
+    """Cross-track error: distance of the robot from the legs that it drove, at every pose of its run."""
 
     ns: IntArray
-    """When (n,)."""
+    """Times (n,), nanoseconds on the robot's clock."""
     metres: FloatArray
-    """Signed, positive to the left of the driving direction (n,); NaN where there is no leg to drive."""
+    """Signed distance, positive to the left of the driving direction (n,); NaN where no leg is driven."""
     arc: FloatArray
-    """How far along the way since the last stop (n,)."""
+    """Distance along the path since the last stop (n,)."""
 
     @property
     def greatest(self) -> int | None:
-        """Index of the pose that was farthest beside the way; None if there is none."""
+        """Index of the pose with the greatest cross-track error; None if there is none."""
         away = np.where(np.isfinite(self.metres), np.abs(self.metres), -1.0)
         return int(np.argmax(away)) if len(away) and away.max() >= 0 else None
 
@@ -107,19 +107,19 @@ class Beside:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A run beside its mission."""
+    """Comparison of a run with its mission."""
 
     missions: tuple[Mission, ...]
     """The revisions that were followed, the last one last."""
     log: RunLog
     stops: tuple[StopComparison, ...]
     spans: tuple[Span, ...]
-    beside: Beside
+    cross_track: CrossTrack
     planned_s: float
     driven_s: float | None
     """Duration of the run; None if it has not ended."""
     acquired: Acquired | None = None
-    """None where no plan tells what the stops see."""
+    """None if no plan contains visibility data."""
 
     @property
     def mission(self) -> Mission:
@@ -142,19 +142,19 @@ class Comparison:
 
     @cached_property
     def missing(self) -> tuple[StopComparison, ...]:
-        """Those of them that were not scanned, unless only nobody says so."""
+        """Those of them that were not scanned; unconfirmed ones are not counted."""
         return tuple(item for item in self.asked if item.outcome not in DONE)
 
     @cached_property
     def outside(self) -> tuple[StopComparison, ...]:
-        """Stops that were scanned, or passed unconfirmed, from elsewhere than the plan reckons with."""
-        return tuple(item for item in self.stops if item.seen_beside)
+        """Stops that were scanned, or passed unconfirmed, outside tolerance."""
+        return tuple(item for item in self.stops if item.outside_text)
 
     @property
     def greatest_deviation_m(self) -> float | None:
-        """Of all stops where the robot was; None if it was at none."""
+        """Greatest position error of all stops that the robot reached; None if it reached none."""
         return max((item.deviation_m for item in self.stops if item.deviation_m is not None), default=None)
 
-    def stood_s(self, *states: State) -> float:
+    def seconds_in(self, *states: State) -> float:
         """Seconds that the run spent in these states."""
         return sum(span.seconds for span in self.spans if span.state in states)

@@ -1,4 +1,4 @@
-"""A comparison as a person reads it on a terminal, and as one JSON object."""
+"""Text of a comparison for a terminal, and the same as one JSON object."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_ROOMS = 12
 
 
 def comparison_text(comparison: Comparison) -> str:
-    """The stops as a table, what was acquired, and the answer."""
+    """Return the table of stops, the acquired coverage, and the verdict."""
     lines = [comparison_table(comparison), ""]
     if comparison.acquired is not None:
         lines += [*_coverage_lines(comparison.acquired), ""]
@@ -30,12 +30,12 @@ def comparison_text(comparison: Comparison) -> str:
 
 
 def comparison_table(comparison: Comparison) -> str:
-    """Times in seconds from the run's start, offsets in millimetres against the direction of arrival."""
+    """Return the table: times in seconds from the run's start, offsets in mm in the direction of arrival."""
     return table(HEADER, [stop_cells(item) for item in comparison.stops])
 
 
 def stop_cells(item: StopComparison) -> tuple[str, ...]:
-    """A row of the table, as HEADER names its columns."""
+    """Return a row of the table, with the columns of HEADER."""
     return (
         *(item.stop, item.outcome, _number(item.planned_s), _number(item.arrived_s)),
         *(_number(item.late_s, sign="+"), _number(item.along_m, 1000, sign="+")),
@@ -43,35 +43,35 @@ def stop_cells(item: StopComparison) -> tuple[str, ...]:
         _number(item.heading_rad, 180 / math.pi, sign="+"),
         *(_number(item.settle_s), str(item.tries)),
         _number(item.lost, 100),
-        "; ".join(why for why in (item.seen_beside, item.reason) if why),
+        "; ".join(why for why in (item.outside_text, item.reason) if why),
     )
 
 
 def _number(value: float | None, scale: float = 1.0, *, sign: str = "-") -> str:
-    """A number with one decimal; `-` where there is none, and never a minus before a zero."""
+    """Format a number with one decimal; `-` for None, and never a minus before a zero."""
     if value is None:
         return "-"
     return f"{round(value * scale, 1) + 0.0:{sign}.1f}"
 
 
 def _totals(comparison: Comparison) -> list[str]:
-    away, beside = comparison.greatest_deviation_m, comparison.beside.greatest_m
+    position, cross_track = comparison.greatest_deviation_m, comparison.cross_track.greatest_m
     driven = "not ended" if comparison.driven_s is None else duration(comparison.driven_s)
-    stood = comparison.stood_s("PAUSED", "HELD")
+    paused_s = comparison.seconds_in("PAUSED", "HELD")
     revisions = [str(mission.revision) for mission in comparison.missions]
     several = [f"revisions {', '.join(revisions)} of the mission, one after another"]
     return [
         *(several if len(revisions) > 1 else []),
-        *([printable(apart)] if (apart := apart_in_words(comparison.mission, _made(comparison))) else []),
+        *([printable(apart)] if (apart := apart_in_words(comparison.mission, _expected(comparison))) else []),
         f"run {printable(comparison.run_id or 'without a name')}: {comparison.scanned} of "
         f"{len(comparison.asked)} stops scanned; planned {duration(comparison.planned_s)}, driven {driven}"
-        + (f", of which paused or held {duration(stood)}" if stood else ""),
-        f"greatest deviation at a stop {_millimetres(away)}, beside the route {_millimetres(beside)}",
+        + (f", of which paused or held {duration(paused_s)}" if paused_s else ""),
+        f"greatest position error {_millimetres(position)}, cross-track error {_millimetres(cross_track)}",
     ]
 
 
-def _made(comparison: Comparison) -> list[str]:
-    """Stops whose scans are there, or may still be made."""
+def _expected(comparison: Comparison) -> list[str]:
+    """Return the stops that are scanned, or may still be scanned."""
     ended = _ended(comparison) is not None
     lost = {"skipped", "failed", "withdrawn", *(("arrived", "not reached") if ended else ())}
     return [item.stop for item in comparison.stops if item.outcome not in lost]
@@ -87,7 +87,7 @@ def _coverage_lines(acquired: Acquired) -> list[str]:
     rows = [_share_cells(planned, share) for planned, share in pairs]
     lines = [table(("coverage", "planned %", "acquired %", "asked %", ""), rows)]
     rest = len(acquired.rooms) - MOST_ROOMS
-    return [*lines, f"and {rest} rooms of which more was seen"] if rest > 0 else lines
+    return [*lines, f"and {rest} more rooms, with higher coverage"] if rest > 0 else lines
 
 
 def _share_cells(planned: Share, share: Share) -> tuple[str, ...]:
@@ -97,7 +97,7 @@ def _share_cells(planned: Share, share: Share) -> tuple[str, ...]:
 
 
 def comparison_json(comparison: Comparison) -> dict[str, Any]:
-    """The same and more, for programs: metres, radians and seconds; shares from 0 to 1."""
+    """Return the same and more, for programs: metres, radians and seconds; fractions from 0 to 1."""
     judgement = judge(comparison)
     return {
         "run_id": comparison.run_id,
@@ -110,10 +110,10 @@ def comparison_json(comparison: Comparison) -> dict[str, Any]:
         "asked": len(comparison.asked),
         "planned_s": comparison.planned_s,
         "driven_s": comparison.driven_s,
-        "paused_s": comparison.stood_s("PAUSED"),
-        "held_s": comparison.stood_s("HELD"),
+        "paused_s": comparison.seconds_in("PAUSED"),
+        "held_s": comparison.seconds_in("HELD"),
         "greatest_deviation_m": comparison.greatest_deviation_m,
-        "greatest_beside_route_m": comparison.beside.greatest_m,
+        "greatest_beside_route_m": comparison.cross_track.greatest_m,
         "travelled_m": comparison.log.poses.length_m if len(comparison.log.poses) else None,
         "pieces": _pieces(comparison),
         "coverage": None if comparison.acquired is None else _acquired_json(comparison.acquired),
@@ -126,15 +126,15 @@ def comparison_json(comparison: Comparison) -> dict[str, Any]:
 
 
 def _ended(comparison: Comparison) -> str | None:
-    """The event by which the run ended."""
+    """Return the name of the event that ended the run."""
     ends = [type(event).__name__ for event in comparison.log.events if isinstance(event, Finished | Aborted)]
     return ends[-1] if ends else None
 
 
 def _pieces(comparison: Comparison) -> list[list[str]] | None:
-    """Scans that hang together, those included that may still be made; None where no network was planned."""
+    """Return the connected scans, with those that may still be made; None if no network was planned."""
     network = network_of(comparison.mission)
-    return None if network is None else [list(piece) for piece in network.among(_made(comparison)).pieces]
+    return None if network is None else [list(piece) for piece in network.among(_expected(comparison)).pieces]
 
 
 def _stop_json(item: StopComparison) -> dict[str, Any]:
@@ -142,7 +142,7 @@ def _stop_json(item: StopComparison) -> dict[str, Any]:
         *("stop", "outcome", "reason", "planned_s", "arrived_s", "late_s", "deviation_m", "along_m"),
         *("across_m", "heading_rad", "tolerance_m", "settle_s", "tries", "lost"),
     )
-    return {**{key: getattr(item, key) for key in keys}, "outside_tolerance": bool(item.seen_beside)}
+    return {**{key: getattr(item, key) for key in keys}, "outside_tolerance": bool(item.outside_text)}
 
 
 def _acquired_json(acquired: Acquired) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Measures poses beside their way though events come late, as from a journal after a gap in the line."""
+"""Measures cross-track errors although events come late, as from a journal after a link loss."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections import deque
 
 import numpy as np
 
-from stopgo.mission.comparing.path_deviation import WayFollower
+from stopgo.mission.comparing.path_deviation import PathFollower
 from stopgo.mission.document import Mission
 from stopgo.mission.geometry import FloatArray, IntArray, frozen
 from stopgo.mission.run.events import AnyEvent
 from stopgo.mission.run.run_log import Track
 
 
-class LateBeside:
-    """Keeps poses until all events before them are known; then they are measured as in a log that is read."""
+class DelayedDeviation:
+    """Keeps poses until all earlier events are known; then measures them as in a complete log."""
 
     def __init__(self, mission: Mission) -> None:
-        self._follower = WayFollower(mission)
+        self._follower = PathFollower(mission)
         self._events: deque[tuple[AnyEvent, Mission]] = deque()
         self._poses: list[Track] = []
         self._newest = 0
@@ -32,23 +32,23 @@ class LateBeside:
         self._poses.append(track)
 
     def knows(self, number: int) -> bool:
-        """Whether an event of this number, and with it every earlier one, has come."""
+        """True if an event of this number, and with it every earlier one, has come."""
         return number <= self._newest
 
     def measured(self, until_ns: int | None = None) -> tuple[IntArray, FloatArray]:
-        """When (n,) and how far beside the way (n,) the robot was at all poses up to a time, or at all."""
+        """Return times (n,) and cross-track errors (n,) of all poses up to a time, or of all."""
         track = _joined(self._poses)
         end = len(track) if until_ns is None else int(np.searchsorted(track.ns, until_ns, side="right"))
-        found, begin = [np.empty((0, 2))], 0
+        parts, begin = [np.empty((0, 2))], 0
         while self._events and (until_ns is None or self._events[0][0].robot_ns <= until_ns):
             event, mission = self._events.popleft()
             behind = max(begin, min(end, int(np.searchsorted(track.ns, event.robot_ns, side="right"))))
-            found.append(self._follower.measure(track.xy[begin:behind]))
-            self._follower.tell(event, mission)
+            parts.append(self._follower.measure(track.xy[begin:behind]))
+            self._follower.take(event, mission)
             begin = behind
-        found.append(self._follower.measure(track.xy[begin:end]))
+        parts.append(self._follower.measure(track.xy[begin:end]))
         self._poses = [Track(track.ns[end:], track.xy[end:], track.heading[end:])]
-        return frozen(track.ns[:end], np.int64), frozen(np.concatenate(found)[:, 0])
+        return frozen(track.ns[:end], np.int64), frozen(np.concatenate(parts)[:, 0])
 
 
 def _joined(tracks: list[Track]) -> Track:

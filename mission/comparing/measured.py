@@ -1,4 +1,4 @@
-"""What a scanner's points show of a floor: targets that were hit, how far off, and what is unplanned."""
+"""A scanner's points on a floor: targets that were hit, their deviations, and unplanned objects."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from stopgo.mission.stages.figures import Shares
 
 @dataclass(frozen=True, eq=False)
 class Unplanned:
-    """Something on the floor that the plan does not know."""
+    """An object on the floor that is not in the plan."""
 
     outline: Polygon
-    """Convex, a little wider than what was hit."""
+    """Convex, a little wider than the points."""
     hits: int
-    """In how many sweeps it was hit, at its most visible place."""
+    """Number of sweeps that hit it, at its most visible position."""
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -34,12 +34,12 @@ class Unplanned:
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Points laid on the floor's targets."""
+    """Points assigned to the floor's targets."""
 
     ledger: CoverageTotals
     """The units of the floor, n of them."""
     hit: BoolArray
-    """Whether a point lies within the tolerance of each unit (n,)."""
+    """True for units with a point within the tolerance (n,)."""
     tolerance_m: float
     points: int
     edges_m: FloatArray
@@ -54,7 +54,7 @@ class Measured:
 
     @cached_property
     def deviations(self) -> tuple[tuple[str, int, float, float], ...]:
-        """Of every element with points: its id, how many, and their mean and rms deviation in metres."""
+        """Each element with points: id, number of points, and their mean and rms deviation in metres."""
         middles = (self.edges_m[1:] + self.edges_m[:-1]) / 2
         found = []
         for element, counts in zip(self.ledger.elements, self.histogram, strict=True):

@@ -1,9 +1,42 @@
-"""How far a robot is beside the way it drives: measured along the legs, forward only, as events tell of them.
+"""Cross-track error: a robot's signed distance from the legs that it drives, at every pose of a run.
 
-A leg may pass itself or another one, so the nearest point of all legs tells nothing. The way that is
-driven is the legs from the stop where the robot was last to the one it works on; a skipped stop's leg is
-part of it, because it is still driven. Poses are laid on the way's straight pieces one after another, none
-on a piece before that of an earlier pose, so that the sum of squared distances is least.
+The nearest point of all legs is not enough, because a leg may cross itself or run along another leg. So each
+pose is measured to the path that the robot drives at that time, and only forward on this path.
+
+Data
+----
+`PathFollower`
+    Takes events and poses in the order of their times. Two stop numbers say which legs are driven: `_from`,
+    the first leg that is not complete, and `_to`, the leg to the stop where the robot drives.
+    The number `len(stops)` stands for the return leg.
+`_DrivenPath`
+    These legs as a row of straight segments. Each segment has its ends, its length, and its distance from
+    the beginning of the path. Each has also a cost: the least sum of squared distances (m²) of all poses so
+    far, if the newest pose is on this segment. A segment between that has no pose costs `SKIP_COST` per
+    metre. The cost is infinite if the robot cannot be there yet.
+
+Events replace the path that is measured:
+
+========================  ===============================================================================
+event                     path after the event
+========================  ===============================================================================
+Started                   the first leg; the robot may begin anywhere on it
+Arrived, Settled          the same; the leg to this stop is complete; extended if events are missing
+Scanned, Unconfirmed      a new one from this stop to the next
+Skipped, never arrived    extended by the next leg, because the robot still drives the skipped stop's leg
+Skipped, after Arrived    a new one from this stop to the next
+RevisionTaken             with the legs of the new revision; extended while the robot is on an earlier leg
+Homing                    the return leg if all stops are done, else the driven legs in reverse
+Finished                  empty: errors are NaN from here on
+========================  ===============================================================================
+
+Invariants
+----------
+1. A segment's cost assumes that every earlier pose was on this segment or on one before it.
+2. A pose is measured to the segment of least cost at this pose; of equal costs, to the first.
+3. Later poses and events never change an error that was returned, so calls may divide the poses anywhere.
+4. An extended path keeps the costs of its segments, so the robot keeps its position on it.
+5. Only differences of costs count; after each call the least cost is set to 0.
 """
 
 from __future__ import annotations
@@ -14,7 +47,7 @@ from typing import Any
 
 import numpy as np
 
-from stopgo.mission.comparing.comparison import Beside
+from stopgo.mission.comparing.comparison import CrossTrack
 from stopgo.mission.document import Mission, Point
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.run.events import (
@@ -31,14 +64,14 @@ from stopgo.mission.run.events import (
 )
 from stopgo.mission.run.run_log import RunLog
 
-SKIPPING = 1e-3
-"""What it costs to leave out a metre of the way, in m² of squared distance: enough to decide between pieces
-that lie on one another, far too little to keep a pose on a piece that it has left."""
+SKIP_COST = 1e-3
+"""Cost of a metre of path without a pose, in m² of squared distance: enough to decide between segments that
+lie on one another, far too little to keep a pose on a segment that it has left."""
 
 
-def beside(log: RunLog, missions: Sequence[Mission]) -> Beside:
-    """Measure every pose of a run that was logged, from its start to its end."""
-    follower = WayFollower(missions[0])
+def cross_track_of(log: RunLog, missions: Sequence[Mission]) -> CrossTrack:
+    """Measure every pose of a logged run, from its start to its end."""
+    follower = PathFollower(missions[0])
     poses = log.poses.between(log.began_ns or 0, log.ended_ns or 0)
     revised = {mission.revision: mission for mission in missions}
     measured, at = [], 0
@@ -46,33 +79,33 @@ def beside(log: RunLog, missions: Sequence[Mission]) -> Beside:
         behind = int(np.searchsorted(poses.ns, event.robot_ns, side="right"))
         measured.append(follower.measure(poses.xy[at:behind]))
         at = max(at, behind)
-        follower.tell(event, revised.get(event.revision))
+        follower.take(event, revised.get(event.revision))
     measured.append(follower.measure(poses.xy[at:]))
     table = np.concatenate(measured)
-    return Beside(poses.ns, frozen(table[:, 0]), frozen(table[:, 1]))
+    return CrossTrack(poses.ns, frozen(table[:, 0]), frozen(table[:, 1]))
 
 
-class WayFollower:
-    """Knows from a run's events which legs are driven, and measures poses beside them as they come."""
+class PathFollower:
+    """Follows the driven legs by a run's events, and measures poses against them as they come."""
 
     def __init__(self, mission: Mission) -> None:
         self._mission = mission
         self._follow(mission)
         self._from = 0
         self._to = 0
-        self._path = _Path(self._legs(), anywhere=True)
+        self._path = _DrivenPath(self._legs(), anywhere=True)
 
-    def tell(self, event: AnyEvent, revised: Mission | None = None) -> None:
-        """Take an event, and with a revision that was taken its mission."""
+    def take(self, event: AnyEvent, revised: Mission | None = None) -> None:
+        """Take an event; for a `RevisionTaken`, `revised` is the new mission."""
         if isinstance(event, RevisionTaken) and revised is not None:
             self._follow(revised)
             self._head_for(min(self._to, len(revised.stops)), leaving=self._from >= self._to)
-        tell = _TOLD.get(type(event))
-        if tell is not None:
-            tell(self, event)
+        handler = _HANDLERS.get(type(event))
+        if handler is not None:
+            handler(self, event)
 
     def measure(self, xy: FloatArray) -> FloatArray:
-        """Of poses (n, 2) in the order of driving: metres beside the way, and along it (n, 2)."""
+        """Return cross-track error and distance along the path (n, 2) of poses (n, 2) in order, metres."""
         return self._path.measure(np.asarray(xy, dtype=np.float64).reshape(-1, 2))
 
     def _follow(self, mission: Mission) -> None:
@@ -81,19 +114,19 @@ class WayFollower:
 
     def _start(self, event: Started) -> None:
         self._from = self._to = 0
-        self._path = _Path(self._legs(), anywhere=True)
+        self._path = _DrivenPath(self._legs(), anywhere=True)
 
     def _arrive(self, event: Any) -> None:
-        """The robot stands at a stop: the way there is behind, and ends where it stands."""
+        """Complete the leg to the stop where the robot has arrived."""
         number = self._number.get(event.stop)
         if number is not None and self._from <= number:
-            if number > self._to:  # nothing was heard of the stops between
+            if number > self._to:  # events of the stops between are missing
                 self._to = number
                 self._path = self._path.extended(self._legs())
             self._from = number + 1
 
     def _leave(self, event: Any) -> None:
-        """A stop is behind: on by the next leg, or beyond a stop that was never come to."""
+        """Go on to the next leg after a stop that is done, or that was skipped."""
         number = self._number.get(event.stop)
         if number is None:
             return
@@ -104,19 +137,19 @@ class WayFollower:
     def _head_for(self, number: int, *, leaving: bool) -> None:
         self._to = number
         legs = self._legs()
-        self._path = _Path(legs) if leaving else self._path.extended(legs)
+        self._path = _DrivenPath(legs) if leaving else self._path.extended(legs)
 
     def _home(self, event: Homing) -> None:
-        """By the return where all legs are behind, else back the way it came."""
+        """Take the return leg if all legs are complete, else the driven legs in reverse."""
         count = len(self._mission.stops)
         if self._mission.return_ is not None and self._from >= count:
-            self._path = _Path([self._mission.return_])
+            self._path = _DrivenPath([self._mission.return_])
             return
         legs = [stop.approach for stop in self._mission.stops[: min(self._to, count - 1) + 1]]
-        self._path = _Path([tuple(reversed(leg)) for leg in reversed(legs)], anywhere=True)
+        self._path = _DrivenPath([tuple(reversed(leg)) for leg in reversed(legs)], anywhere=True)
 
     def _legs(self) -> list[tuple[Point, ...]]:
-        """The legs that are driven now."""
+        """Return the legs that are driven now."""
         stops = self._mission.stops
         legs = [stop.approach for stop in stops[self._from : self._to + 1]]
         if self._to >= len(stops) and self._mission.return_ is not None and self._from >= len(stops):
@@ -124,24 +157,24 @@ class WayFollower:
         return legs
 
     def _end(self, event: AnyEvent) -> None:
-        self._path = _Path([])
+        self._path = _DrivenPath([])
 
 
-_TOLD: dict[type, Callable[[WayFollower, Any], None]] = {
-    Started: WayFollower._start,
-    Arrived: WayFollower._arrive,
-    Settled: WayFollower._arrive,
-    Scanned: WayFollower._leave,
-    Unconfirmed: WayFollower._leave,
-    Skipped: WayFollower._leave,
-    Homing: WayFollower._home,
-    Finished: WayFollower._end,
+_HANDLERS: dict[type, Callable[[PathFollower, Any], None]] = {
+    Started: PathFollower._start,
+    Arrived: PathFollower._arrive,
+    Settled: PathFollower._arrive,
+    Scanned: PathFollower._leave,
+    Unconfirmed: PathFollower._leave,
+    Skipped: PathFollower._leave,
+    Homing: PathFollower._home,
+    Finished: PathFollower._end,
 }
 
 
 @dataclass(eq=False)
-class _Path:
-    """The straight pieces of a way, and what it has cost to have come to each of them."""
+class _DrivenPath:
+    """The straight segments of the driven path, and the least cost of being on each of them."""
 
     a: FloatArray
     b: FloatArray
@@ -149,49 +182,50 @@ class _Path:
     cost: FloatArray
 
     def __init__(self, legs: Iterable[Sequence[Point]], *, anywhere: bool = False) -> None:
-        pieces = [np.stack([leg[:-1], leg[1:]], axis=1) for leg in map(_distinct, legs) if len(leg) > 1]
-        both = np.concatenate(pieces) if pieces else np.empty((0, 2, 2))
+        segments = [np.stack([leg[:-1], leg[1:]], axis=1) for leg in map(_distinct, legs) if len(leg) > 1]
+        both = np.concatenate(segments) if segments else np.empty((0, 2, 2))
         self.a, self.b = both[:, 0], both[:, 1]
         self.length = np.hypot(*(self.b - self.a).T)
         self.begin = np.concatenate([[0.0], np.cumsum(self.length)])[:-1]
         self.cost = np.full(len(both), 0.0 if anywhere else np.inf)
         self.cost[:1] = 0.0
 
-    def extended(self, legs: Iterable[Sequence[Point]]) -> _Path:
-        """A way that goes on from this one, at the place that was come to."""
-        path = _Path(legs)
-        kept = min(len(self.cost), len(path.cost))
-        path.cost[:kept] = self.cost[:kept]
+    def extended(self, legs: Iterable[Sequence[Point]]) -> _DrivenPath:
+        """Return a path of these legs that keeps the costs of this one's segments."""
+        path = _DrivenPath(legs)
+        same = min(len(self.cost), len(path.cost))
+        path.cost[:same] = self.cost[:same]
         return path
 
     def measure(self, xy: FloatArray) -> FloatArray:
-        """Metres beside and along of poses (n, 2), in their order; the way remembers where it was come to."""
+        """Return cross-track error and distance along the path of poses (n, 2); update the costs."""
         count = len(xy)
         best = np.full(count, np.inf)
         found = np.full((count, 2), np.nan)
-        before = np.full(count, np.inf)
-        """Least cost of having been on an earlier piece at the pose before."""
-        came = np.inf
+        left = np.full(count, np.inf)
+        """Least cost of having left an earlier segment after each pose, less the skip cost of its end."""
+        left_before = np.inf
+        """The same, before the first pose."""
         for k in range(len(self.cost) if count else 0):
-            side, along, away = self._beside(k, xy)
+            side, along, away = self._project(k, xy)
             square = np.cumsum(away**2)
-            enter = np.concatenate([[min(self.cost[k], came + SKIPPING * self.begin[k])], before[:-1]])
-            enter[1:] += SKIPPING * self.begin[k]
+            enter = np.concatenate([[min(self.cost[k], left_before + SKIP_COST * self.begin[k])], left[:-1]])
+            enter[1:] += SKIP_COST * self.begin[k]
             earlier = np.concatenate([[0.0], square[:-1]])
             total = square + np.minimum.accumulate(enter - earlier)
             better = total < best - 1e-12
             best[better] = total[better]
             found[better] = np.stack([side, along], axis=1)[better]
-            left = self.begin[k] + self.length[k]
-            came = min(came, self.cost[k] - SKIPPING * left)
-            before = np.minimum(before, total - SKIPPING * left)
+            end = self.begin[k] + self.length[k]
+            left_before = min(left_before, self.cost[k] - SKIP_COST * end)
+            left = np.minimum(left, total - SKIP_COST * end)
             self.cost[k] = total[-1]
         if count and len(self.cost):
             self.cost -= self.cost.min()
         return found
 
-    def _beside(self, k: int, xy: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Signed distance from piece k, place along the way, and distance of poses (n, 2)."""
+    def _project(self, k: int, xy: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return signed distance from segment k, distance along the path, and distance of poses (n, 2)."""
         along, to_pose = self.b[k] - self.a[k], xy - self.a[k]
         t = np.clip(to_pose @ along / self.length[k] ** 2, 0.0, 1.0)
         away = np.hypot(*(to_pose - t[:, None] * along).T)
@@ -200,7 +234,7 @@ class _Path:
 
 
 def _distinct(leg: Sequence[Point]) -> FloatArray:
-    """The points of a leg (n, 2), none like the one before."""
+    """Return the points of a leg (n, 2) without repeated ones."""
     points = np.asarray(leg, dtype=np.float64).reshape(-1, 2)
     same = np.all(points[1:] == points[:-1], axis=1)
     return points[np.concatenate([[True], ~same])[: len(points)]]

@@ -1,4 +1,4 @@
-"""A run as it is heard, report by report; gives its log, and its comparison, whenever they are asked for."""
+"""Collects a run report by report; returns its log, and its comparison, on request."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SOURCE = LogSource(name="heard", format="live", digest="", messages=0)
 
 
 class RunSink(Protocol):
-    """What takes a run as it is told, such as a recording."""
+    """Receiver of a run's reports, such as a recording."""
 
     def mission(self, mission: Mission) -> None: ...
 
@@ -29,19 +29,19 @@ class RunSink(Protocol):
 
     def event(self, event: AnyEvent) -> None: ...
 
-    def health(self, told: Health) -> None: ...
+    def health(self, health: Health) -> None: ...
 
     def missing(self, gap: PosesMissing) -> None: ...
 
 
 class RunCollector:
-    """Keeps what is told of the newest run, and hands everything on to a recording, if there is one.
+    """Keeps the reports of the newest run, and passes every report on to a sink, if there is one.
 
-    `sights` tell what the stops of its plan see.
+    `sights` hold the visibility data of its plan's stops.
     """
 
-    def __init__(self, onward: RunSink | None = None, sights: Sequence[Sight] = ()) -> None:
-        self._onward = onward
+    def __init__(self, sink: RunSink | None = None, sights: Sequence[Sight] = ()) -> None:
+        self._sink = sink
         self.sights = sights
         self._run_id: str | None = None
         self._missions: dict[str, Mission] = {}
@@ -50,41 +50,41 @@ class RunCollector:
     def mission(self, mission: Mission) -> None:
         """Take the mission that is run, or a revision of it."""
         self._missions[mission.digest] = mission
-        if self._onward is not None:
-            self._onward.mission(mission)
+        if self._sink is not None:
+            self._sink.mission(mission)
 
     def state(self, report: StateReport) -> None:
-        """Hand a state on."""
-        if self._onward is not None:
-            self._onward.state(report)
+        """Pass a state on."""
+        if self._sink is not None:
+            self._sink.state(report)
 
     def pose(self, report: PoseReport) -> None:
         """Take a pose, if it is of a run."""
         if self._is_of(report.run_id):
             self._ns.append(report.robot_ns)
             self._poses.extend((report.pose.x, report.pose.y, report.pose.heading))
-        if self._onward is not None:
-            self._onward.pose(report)
+        if self._sink is not None:
+            self._sink.pose(report)
 
     def event(self, event: AnyEvent) -> None:
-        """Take an event, if it is of a run; one that is told again counts once."""
+        """Take an event, if it is of a run; a repeated one counts once."""
         if self._is_of(event.run_id):
             self._events[event.number] = event
-        if self._onward is not None:
-            self._onward.event(event)
+        if self._sink is not None:
+            self._sink.event(event)
 
-    def health(self, told: Health) -> None:
-        """Hand on how the robot's base was."""
-        if self._onward is not None:
-            self._onward.health(told)
+    def health(self, health: Health) -> None:
+        """Pass the health of the robot's base on."""
+        if self._sink is not None:
+            self._sink.health(health)
 
     def missing(self, gap: PosesMissing) -> None:
-        """Hand on that nobody knows where the robot was for a time."""
-        if self._onward is not None:
-            self._onward.missing(gap)
+        """Pass a gap in the poses on."""
+        if self._sink is not None:
+            self._sink.missing(gap)
 
     def log(self) -> RunLog | None:
-        """What was heard of the newest run; None if it told nothing yet."""
+        """Return the log of the newest run; None before its first event."""
         events = tuple(self._events[number] for number in sorted(self._events))
         if not events:
             return None
@@ -93,7 +93,7 @@ class RunCollector:
         return RunLog(last.robot, last.run_id, last.mission_id, last.revision, SOURCE, poses, events)
 
     def compared(self) -> Comparison | None:
-        """The newest run beside its mission; None if nothing was heard of either."""
+        """Return the comparison of the newest run; None if its events or its mission are missing."""
         log = self.log()
         mine = [item for item in self._missions.values() if log is not None and item.id == log.mission_id]
         if log is None or not mine:
@@ -101,7 +101,7 @@ class RunCollector:
         return compare(log, sorted(mine, key=lambda mission: mission.revision), self.sights)
 
     def _is_of(self, run_id: str | None) -> bool:
-        """Whether it is a run's; what was kept of another is let go."""
+        """True if the run id is not empty; the data of another run is dropped."""
         if run_id and run_id != self._run_id:
             self._run_id = run_id
             self._forget()
@@ -113,7 +113,7 @@ class RunCollector:
 
 
 def track_of(reports: Sequence[PoseReport]) -> Track:
-    """Poses that were told one by one."""
+    """Return the track of single pose reports."""
     return Track.of(
         [item.robot_ns for item in reports],
         [(item.pose.x, item.pose.y) for item in reports],

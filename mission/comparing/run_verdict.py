@@ -1,4 +1,4 @@
-"""Whether a run brought what its plan was made for: one answer, whoever asks, and the words for it."""
+"""Verdict on a run: did it acquire what its plan was made for? Decided only here, with its words."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from stopgo.mission.stages.figures import percent
 EXIT_CODES: dict[Certainty, int] = {"yes": 0, "no": 1, "unknown": 3}
 HEADLINES: dict[Certainty, str] = {"yes": "Acquired", "no": "Not acquired", "unknown": "Not known"}
 MOST_NAMED = 6
-"""Stops that are named in a sentence; of more, how many."""
+"""Number of stops named in a sentence; of more, only their number is given."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """An answer, and why in sentences."""
+    """A verdict, and its reasons in sentences."""
 
     answer: Certainty
     sentences: tuple[str, ...]
@@ -37,9 +37,9 @@ class Judgement:
 
 
 def judge(comparison: Comparison) -> Judgement:
-    """Whether the scans saw what was asked, each from within its stop's tolerance.
+    """Return the verdict: did the scans see what was required, each from within its stop's tolerance?
 
-    Where no plan tells what stops see, all of them must have been scanned.
+    Without visibility data, all stops must have been scanned.
     """
     return Judgement(_answer(comparison), tuple(_sentences(comparison)))
 
@@ -62,11 +62,11 @@ def _sentences(comparison: Comparison) -> Iterator[str]:
     else:
         yield (
             f"{comparison.scanned} of {len(comparison.asked)} stops were scanned; "
-            "what they saw is not known without the plan's recording."
+            "their coverage is unknown without the plan's recording."
         )
     yield from _outcomes(comparison)
     for item in comparison.outside:
-        yield f"{item.stop} was {item.seen_beside}."
+        yield f"{item.stop} was {item.outside_text}."
     if not comparison.log.ended:
         yield "The run has not ended."
     for event in comparison.log.events:
@@ -85,7 +85,7 @@ def _coverage(acquired: Acquired) -> Iterator[str]:
     for share in [share for share in acquired.shares.short if share is not whole][:MOST_NAMED]:
         yield f"Of {share.name}, {percent(share.coverage)} was scanned; {percent(share.required)} was asked."
     if acquired.unknown:
-        yield f"What {named(acquired.unknown)} saw is not known: no plan of that revision was given."
+        yield f"Coverage of {named(acquired.unknown)} is unknown: no plan of that revision was given."
 
 
 def _outcomes(comparison: Comparison) -> Iterator[str]:
@@ -95,11 +95,11 @@ def _outcomes(comparison: Comparison) -> Iterator[str]:
             yield f"{named(stops)} {'were' if len(stops) > 1 else 'was'} {_WORDS.get(outcome, outcome)}."
 
 
-_WORDS = {"arrived": "reached and not scanned", "unconfirmed": "passed, and nobody says that it was scanned"}
+_WORDS = {"arrived": "reached and not scanned", "unconfirmed": "passed without a confirmed scan"}
 
 
 def named(stops: Sequence[str]) -> str:
-    """Stops in a sentence: `s04 and s06`."""
+    """Return stops as part of a sentence: `s04 and s06`."""
     if len(stops) > MOST_NAMED:
         return f"{len(stops)} stops ({', '.join(stops[:MOST_NAMED])}, …)"
     *others, last = stops

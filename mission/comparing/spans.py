@@ -1,4 +1,4 @@
-"""The states that a run went through, from what it told."""
+"""States that a run went through, from its events."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OVER: tuple[State, ...] = ("FINISHED", "ABORTED")
 
 
 def spans_of(log: RunLog) -> tuple[Span, ...]:
-    """One after another without a gap, from the run's start to its end; none where nothing was told."""
+    """Return them without a gap, from the run's start to its end; none if there are no events."""
     changes = list(_changes(log))
     if not changes:
         return ()
@@ -37,8 +37,8 @@ def spans_of(log: RunLog) -> tuple[Span, ...]:
     )
 
 
-def stood_s(events: Iterable[AnyEvent], *, since_s: float, until_s: float) -> float:
-    """Seconds of mission time that a run was paused or held between two times, as its events tell."""
+def paused_s(events: Iterable[AnyEvent], *, since_s: float, until_s: float) -> float:
+    """Return the seconds of mission time between two times in which the run was paused or held."""
     state: State | None = None
     homing, stood, begun = False, 0.0, since_s
     for event in events:
@@ -50,7 +50,7 @@ def stood_s(events: Iterable[AnyEvent], *, since_s: float, until_s: float) -> fl
 
 
 def _changes(log: RunLog) -> Iterator[tuple[float, State, str]]:
-    """When the run came into which state, and why."""
+    """Yield each change of state: its time, the new state, and the reason."""
     state, homing = None, False
     for event in log.events:
         homing = homing or isinstance(event, Homing)
@@ -61,7 +61,7 @@ def _changes(log: RunLog) -> Iterator[tuple[float, State, str]]:
 
 
 def _after(event: AnyEvent, state: State | None, homing: bool) -> State | None:
-    """The state that an event leads to; None where it changes none."""
+    """Return the state that an event leads to; None if it changes none."""
     goes_on = isinstance(event, Resumed) or (isinstance(event, Skipped) and state == "HELD")
     if goes_on:
         return "HOMING" if homing else "RUNNING"
@@ -78,4 +78,4 @@ STATES: dict[type, State] = {
     Finished: "FINISHED",
     Aborted: "ABORTED",
 }
-"""What the run is after an event that says so by itself."""
+"""State of the run after an event that determines it alone."""

@@ -1,1 +1,1 @@
-"""What every command shares: the process and its signals, tables, JSON answers, plug-ins and ports."""
+"""Shared parts of all commands: the process and its signals, tables, JSON answers, plug-ins and ports."""

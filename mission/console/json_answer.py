@@ -1,4 +1,4 @@
-"""The answer of a command that was asked for JSON: one object on stdout, also where the command fails."""
+"""JSON answer of a command with `--json`: one object on stdout, also if the command fails."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, TextIO
 
 
 class JsonAnswer:
-    """Stdout of a command, which knows whether anything was written to it."""
+    """Stdout of a command, with a record of whether anything was written to it."""
 
     def __init__(self, stream: TextIO, *, wanted: bool) -> None:
         self._stream = stream
@@ -26,7 +26,7 @@ class JsonAnswer:
         return getattr(self._stream, name)
 
     def fail(self, message: str, code: int) -> None:
-        """Say as JSON how the command failed, unless it has answered in JSON before."""
+        """Print the command's error as JSON, unless it has printed an answer before."""
         if not self._wanted or self._begun or not message:
             return
         told = {"error": {"message": " ".join(message.split()), "exit_code": code}}
@@ -37,7 +37,7 @@ class JsonAnswer:
 
 @contextlib.contextmanager
 def answering(arguments: Sequence[str]) -> Iterator[JsonAnswer]:
-    """Lets what is printed in the block be the answer of a command with these arguments."""
+    """Make the output of the block the answer of a command with these arguments."""
     before = sys.stdout
     answer = JsonAnswer(before, wanted="--json" in arguments)
     if answer._wanted:

@@ -1,7 +1,7 @@
 """Variants of a stage: ours by name, those of installed packages by name, or `package.module:function`.
 
-What others wrote may be missing, fail, or return what no plan can be made of. Each of these ends in one line
-that names the stage, the variant and what is wrong with it.
+Third-party code may be missing, fail, or return an unusable result. Each fault becomes one line that names
+the stage, the variant and the problem.
 """
 
 from __future__ import annotations
@@ -27,45 +27,45 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Variant(Generic[T]):
-    """What carries out a stage, and what it is called in messages."""
+    """Function of a stage, and its name in messages."""
 
     said: str
-    """What stands before every message about it, such as `selector = my_lab:solve`."""
+    """Beginning of every message about it, such as `selector = my_lab:solve`."""
     name: str
     what: T
-    """A function, or whatever else the stage asks for."""
+    """A function, or another object that the stage requires."""
     ours: bool = True
 
     def called(self, *arguments: Any, **options: Any) -> Any:
-        """What the function returns; if it is another's, what goes wrong in it is told in its name."""
+        """Return the function's result; an error of a third-party function is raised in its name."""
         if not callable(self.what):
             raise self.wrong(f"is {_kind_of(self.what)}, not a function")
-        with self.blamed():
+        with self.named_errors():
             return self.what(*arguments, **options)
 
-    def blamed(self) -> AbstractContextManager[None]:
-        """Within it, whatever goes wrong in another's code is told in the variant's name."""
-        return nullcontext() if self.ours else _blaming(self.said)
+    def named_errors(self) -> AbstractContextManager[None]:
+        """Return a context that raises errors of third-party code in the variant's name."""
+        return nullcontext() if self.ours else _errors_named(self.said)
 
     def wrong(self, problem: str) -> InputError:
-        """The error that says what is wrong with what it gave."""
+        """Return the error with this problem of the variant."""
         return InputError(f"{self.said}: {problem}")
 
-    def noun(self, given: object, kind: type[Any]) -> Any:
-        """What was given, if it is of this kind."""
+    def of_kind(self, given: object, kind: type[Any]) -> Any:
+        """Return the given object, if it is of this kind."""
         if not isinstance(given, kind):
             raise self.wrong(f"gave {_kind_of(given)}, not a {kind.__name__}")
         return given
 
     def several(self, given: object, names: str, *, least: int = 2, most: int = 2) -> tuple[Any, ...]:
-        """What was given, if it is a tuple of `least` to `most` things."""
+        """Return the given object, if it is a tuple of `least` to `most` items."""
         if not isinstance(given, tuple) or not least <= len(given) <= most:
             size = f" of {len(given)}" if isinstance(given, tuple) else ""
             raise self.wrong(f"gave {_kind_of(given)}{size}, not ({names})")
         return given
 
     def array(self, given: object, name: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
-        """Finite numbers of this shape; None stands for any length."""
+        """Return finite numbers of this shape; None means any length."""
         try:
             found = np.asarray(given, dtype=np.float64)
         except (TypeError, ValueError):
@@ -80,14 +80,14 @@ class Variant(Generic[T]):
             raise self.wrong(f"{name} has {int((~np.isfinite(found)).sum())} numbers that are not finite")
         return found
 
-    def check_held(self, given: object, name: str, shape: tuple[int | None, ...]) -> None:
-        """Refuse what a noun holds, if it is not an array of finite numbers of this shape."""
+    def check_array(self, given: object, name: str, shape: tuple[int | None, ...]) -> None:
+        """Refuse a field of a stage result that is not an array of finite numbers of this shape."""
         if not isinstance(given, np.ndarray):
             raise self.wrong(f"{name} is {_kind_of(given)}, not an array")
         self.array(given, name, shape)
 
     def indices(self, given: object, name: str, *, length: int | None, below: int) -> NDArray[np.int64]:
-        """Whole numbers from 0 and below a limit, in one row."""
+        """Return whole numbers from 0 and below a limit, in one row."""
         found = self.array(given, name, (length,))
         bad = (found != np.rint(found)) | (found < 0) | (found >= below)
         if bad.any():
@@ -96,14 +96,14 @@ class Variant(Generic[T]):
 
 
 def variant(stage: str, name: str, known: Mapping[str, T], *, said: str = "") -> Variant[T]:
-    """The variant of a stage that has this name; `said` names it in messages.
+    """Return the variant of a stage that has this name; `said` names it in messages.
 
     Entry points of installed packages in the group `stopgo.<stage>` are known by their names.
 
     Raises
     ------
     InputError
-        Naming the stage, the variant, and which there are, or why it cannot be loaded.
+        Naming the stage, the variant, and the known variants, or why it cannot be loaded.
     """
     said = said or f"{stage} = {name}"
     if name in known:
@@ -116,7 +116,7 @@ def variant(stage: str, name: str, known: Mapping[str, T], *, said: str = "") ->
 
 
 def installed(stage: str) -> tuple[str, ...]:
-    """Names of the variants that installed packages bring for a stage."""
+    """Return the names of the variants that installed packages provide for a stage."""
     return tuple(sorted({point.name for point in entry_points(group=f"stopgo.{stage}")}))
 
 
@@ -124,7 +124,7 @@ def _loaded(said: str, name: str, point: EntryPoint | None) -> Any:
     module, _, function = (point.value if point else name).partition(":")
     if not module or not function:
         raise InputError(f"{said}: write package.module:function")
-    with _blaming(said), _working_folder_last():
+    with _errors_named(said), _working_folder_last():
         found: Any = import_module(module)
         for part in function.split("."):
             found = getattr(found, part)
@@ -133,7 +133,7 @@ def _loaded(said: str, name: str, point: EntryPoint | None) -> Any:
 
 @contextmanager
 def _working_folder_last() -> Iterator[None]:
-    """Modules in the working folder are found too, and shadow none."""
+    """Search modules in the working folder last, so that they hide no others."""
     here = os.getcwd()
     sys.path.append(here)
     try:
@@ -143,30 +143,32 @@ def _working_folder_last() -> Iterator[None]:
 
 
 @contextmanager
-def _blaming(who: str) -> Iterator[None]:
-    """One line that names `who`, for whatever goes wrong in the code of others."""
+def _errors_named(who: str) -> Iterator[None]:
+    """Turn every error of third-party code into one line that names `who`."""
     try:
         yield
     except StopgoError:
         raise
     except Exception as error:  # the code of others may raise anything; here it becomes one line
-        raise InputError(f"{who}: {_told(error)}") from error
+        raise InputError(f"{who}: {_error_text(error)}") from error
 
 
-def _told(error: Exception) -> str:
-    """What went wrong, and where in the file that was called."""
-    told = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    theirs = [
-        (frame.f_code.co_filename, line) for frame, line in walk_tb(error.__traceback__) if _is_theirs(frame)
+def _error_text(error: Exception) -> str:
+    """Return the error in words, with the line in the file that was called."""
+    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    frames = [
+        (frame.f_code.co_filename, line)
+        for frame, line in walk_tb(error.__traceback__)
+        if _is_third_party(frame)
     ]
-    if not theirs or isinstance(error, SyntaxError):  # which says itself where
-        return told
-    file, line = next(found for found in reversed(theirs) if found[0] == theirs[0][0])
-    return f"{told} ({os.path.basename(file)}, line {line})"
+    if not frames or isinstance(error, SyntaxError):  # which contains its line
+        return text
+    file, line = next(found for found in reversed(frames) if found[0] == frames[0][0])
+    return f"{text} ({os.path.basename(file)}, line {line})"
 
 
-def _is_theirs(frame: FrameType) -> bool:
-    """Whether what runs in a frame is neither ours nor what loads modules."""
+def _is_third_party(frame: FrameType) -> bool:
+    """True if a frame runs third-party code, and not the module loader."""
     package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
     return package not in (
         __name__.partition(".")[0],

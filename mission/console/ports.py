@@ -6,12 +6,12 @@ import random
 import socket
 
 LOWEST, HIGHEST = 26_000, 32_767
-"""Below what systems give to outgoing connections (from 32 768 on Linux, from 49 152 elsewhere): a port
-that is free now is then taken by nobody who did not choose it."""
+"""Below the ports that systems give to outgoing connections (from 32 768 on Linux, from 49 152 elsewhere).
+So a free port is taken only by a program that chooses it."""
 
 
 def free_port(lowest: int = LOWEST, highest: int = HIGHEST) -> int:
-    """A port of 127.0.0.1 between the two that is free, for TCP and for UDP, each time another one.
+    """Return a free port of 127.0.0.1 between the two, for TCP and for UDP, each time another one.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""The process of a command: a signal ends it by way of every open `with`, and so does a reader that has gone.
+"""The process of a command: a signal ends it through every open `with`, and so does a closed output pipe.
 
-Imports nothing that takes time, so that it stands while everything else is being loaded.
+Imports nothing slow, so that signals are handled while everything else is loaded.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ import threading
 from types import FrameType, TracebackType
 
 ENDING = ("SIGINT", "SIGTERM", "SIGHUP")
-"""What asks a command to end: Ctrl-C, a service manager, a terminal that was closed."""
+"""Signals that end a command: Ctrl-C, a service manager, a terminal that was closed."""
 PIPE_CLOSED = 141
-"""As of every program whose reader has gone: 128 and the number of SIGPIPE, which not every system has."""
+"""Exit code after a closed output pipe: 128 plus the number of SIGPIPE, which not every system has."""
 
 RAISED_AGAIN_S = 0.05
 
 
 class Signals:
-    """Heeds the signals that end a command, while the block runs; `first` is the one that came first.
+    """Handles the signals that end a command, during the block; `first` is the first of them.
 
-    Code that is interrupted may raise something else, as some modules do when their import is. Whoever
-    catches what the block raises can tell that from an error by `first`.
+    Interrupted code may raise another error, as some modules do during their import. The caller can
+    recognise that by `first`.
 
-    With `whole_process` the process is at its end behind the block, and further signals just kill it.
+    With `whole_process` the process ends with the block, and further signals kill it at once.
     """
 
     def __init__(self, *, whole_process: bool) -> None:
@@ -40,9 +40,9 @@ class Signals:
             return self
         if self._whole_process:
             sys.unraisablehook = _raise_again
-        for number in _ending():
+        for number in _ending_signals():
             if signal.getsignal(number) is not signal.SIG_IGN:  # as under nohup
-                self._before[number] = signal.signal(number, self._heed)
+                self._before[number] = signal.signal(number, self._handle)
         return self
 
     def __exit__(
@@ -53,23 +53,23 @@ class Signals:
 
     @property
     def exit_code(self) -> int:
-        """Of a process that a signal has ended."""
+        """Exit code of a process that a signal has ended."""
         return 128 + int(self.first or 0)
 
-    def _heed(self, number: int, frame: FrameType | None) -> None:
+    def _handle(self, number: int, frame: FrameType | None) -> None:
         self.first = self.first or signal.Signals(number)
         if number == signal.SIGINT:
             raise KeyboardInterrupt
         raise SystemExit(128 + number)
 
 
-def _ending() -> list[signal.Signals]:
-    """Those of ENDING that this system has."""
+def _ending_signals() -> list[signal.Signals]:
+    """Return the signals of ENDING that this system has."""
     return [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
 
 
 def _raise_again(lost: sys.UnraisableHookArgs) -> None:
-    """Let no Ctrl-C be lost in code that cannot raise, such as the end of an object."""
+    """Raise a Ctrl-C again that came in code that cannot raise, such as a destructor."""
     if isinstance(lost.exc_value, KeyboardInterrupt):
         # Later and from elsewhere: here it would be lost again.
         threading.Timer(RAISED_AGAIN_S, _thread.interrupt_main).start()
@@ -77,8 +77,8 @@ def _raise_again(lost: sys.UnraisableHookArgs) -> None:
         sys.__unraisablehook__(lost)
 
 
-def reader_is_gone() -> bool:
-    """Whether nobody reads what the command prints any more."""
+def output_is_closed() -> bool:
+    """True if the command's output has no reader any more."""
     if not hasattr(select, "poll"):
         return True
     poll = select.poll()
@@ -88,14 +88,14 @@ def reader_is_gone() -> bool:
 
 
 def drop_output() -> None:
-    """Let what is still to be printed go nowhere, where it could not be printed."""
+    """Discard the rest of the output, which cannot be printed."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for number in (1, 2):
         os.dup2(nowhere, number)
 
 
 def have_output() -> None:
-    """Open what the process was started without, so that no file of ours takes its number."""
+    """Open missing output streams, so that no file of ours gets their numbers."""
     for number, name in ((1, "stdout"), (2, "stderr")):
         if getattr(sys, name) is None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), number)

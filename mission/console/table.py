@@ -1,4 +1,4 @@
-"""Lays out plain text tables for the terminal: words to the left, numbers to the right."""
+"""Plain text tables for the terminal: words to the left, numbers to the right."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from io import StringIO
 
 ENDLESS = 100_000
-"""Columns of what is not a terminal: nothing is folded there."""
+"""Width of an output that is no terminal: nothing is folded there."""
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, width: int | None = None) -> str:
-    """Lines of a table; a column whose every cell reads as a number is set to the right.
+    """Return the lines of a table; a column of numbers only is aligned right.
 
-    Cells are folded where the table is wider than `width`: that of the terminal, if stdout is one.
+    Cells are folded if the table is wider than `width`: the terminal's width, if stdout is one.
     """
     from rich.console import Console
     from rich.rule import Rule
@@ -39,22 +39,22 @@ def _columns() -> int:
 
 
 def printable(content: str) -> str:
-    """Text from a file, with what would move the cursor or colour the terminal replaced."""
+    """Return text of a file without characters that move the cursor or colour the terminal."""
     return "".join(letter if letter.isprintable() else "\ufffd" for letter in content)
 
 
 def printable_lines(content: str) -> str:
-    """Text of several lines, each of them `printable`."""
+    """Return text of several lines, each of them `printable`."""
     return "\n".join(map(printable, content.split("\n")))
 
 
 def shortened(word: str, longest: int = 400) -> str:
-    """A word of an error's line; of one that is longer than any name, its beginning and its length."""
+    """Return a word of an error message; of a very long one, its beginning and its length."""
     return word if len(word) <= longest else f"{word[:80]}… ({len(word)} characters)"
 
 
 def duration(seconds: float) -> str:
-    """Seconds as a person reads them: `0:42`, `12:05`, `1:02:03`."""
+    """Return seconds as text: `0:42`, `12:05`, `1:02:03`."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

@@ -1,4 +1,4 @@
-"""A mission: what the robot is sent, exactly as mission.json holds it.
+"""A mission: the content of mission.json, as it is sent to the robot.
 
 Metres, radians counter-clockwise from +x, seconds; keys that end in `_deg` are degrees.
 """
@@ -43,37 +43,37 @@ class ScannerSpec(Document, frozen=True):
     range: float
     fov_deg: float = 360.0
     model: str | UnsetType = UNSET
-    """Its name among those that stopgo knows; what follows is left out where nobody tells."""
+    """Name among the scanners that stopgo knows; the following fields are absent if not given."""
     step_deg: float | UnsetType = UNSET
-    """Between neighbouring points."""
+    """Angle between neighbouring points."""
     near: float | UnsetType = UNSET
-    """What is nearer is not measured."""
+    """Minimum scanner range."""
     blind_cone_deg: float | UnsetType = UNSET
-    """The cone under the scanner that it does not see, from side to side."""
+    """Opening angle of the blind cone below the scanner, from side to side."""
     height: float | UnsetType = UNSET
-    """Above the floor."""
+    """Height above the floor."""
 
 
 class LimitsSpec(Document, frozen=True):
-    """When a target counts as seen; what is left out is no limit."""
+    """Limits at which a target counts as covered; an absent value is no limit."""
 
     max_incidence_deg: float | UnsetType = UNSET
-    """From square on."""
+    """Greatest angle from the surface normal."""
     near: float | UnsetType = UNSET
-    """Distance from the scanner, of a wall down to its foot."""
+    """Minimum distance from the scanner, for a wall measured to its foot."""
     density_mm: float | UnsetType = UNSET
-    """Between neighbouring points."""
+    """Greatest distance between neighbouring points."""
     wall_height: float | UnsetType = UNSET
-    """Incidence and spacing hold from the floor up to it; absent where only at the scanner's height."""
+    """Incidence and spacing hold from the floor up to it; if absent, only at the scanner's height."""
     views: int | UnsetType = UNSET
-    """Stops that must see it."""
+    """Number of stops that must see it."""
 
 
 class MissionShare(Document, frozen=True):
-    """Which of the missions that together see a floor this is."""
+    """Part of this mission in a floor that several missions cover together."""
 
     kind: Literal["robot", "tour"]
-    """Of robots that drive at the same time, or of tours that one robot drives one after another."""
+    """`robot`: robots drive at the same time. `tour`: one robot drives the tours one after another."""
     number: int
     """From 1."""
     of: int
@@ -94,9 +94,9 @@ class Scan(Document, frozen=True):
 
 class Sees(Document, frozen=True):
     units: int
-    """Target units this stop sees."""
+    """Target units that this stop sees."""
     new_units: int
-    """Of those, the ones that count as seen from this stop of the route on."""
+    """Those of them that count as seen from this stop of the route on."""
 
 
 class Stop(Document, frozen=True):
@@ -111,21 +111,21 @@ class Stop(Document, frozen=True):
     on_failure: OnFailure
     retries: int
     approach: tuple[Point, ...]
-    """Polyline from the stop before (or the start) to this stop, both ends included."""
+    """Polyline from the previous stop (or the start) to this stop, both ends included."""
     sees: Sees
 
 
 class Overlap(Document, frozen=True):
-    """Two stops whose scans register with one another, by the boundary that both see."""
+    """Two stops whose scans register with one another, and their common boundary."""
 
     a: str
     b: str
     common_m: float
     """Metres of boundary that both see."""
     share: float
-    """Of what the one of the two sees that sees less."""
+    """Overlap ratio: common boundary as a fraction of what the stop sees that sees less."""
     hold_m: float
-    """Metres of wall that face the weakest of all small moves in x, y and heading."""
+    """Registration strength: metres of wall that resist the weakest small move in x, y and heading."""
 
 
 class Policy(Document, frozen=True):
@@ -135,12 +135,12 @@ class Policy(Document, frozen=True):
 
 
 class Origin(Document, frozen=True):
-    """What the mission was made from."""
+    """Source of the mission: floor, parameters and version."""
 
     floor: str
     floor_digest: str
     parameters: dict[str, Any]
-    """The plan's settings by name; only a record, so that a robot older than the plan reads it."""
+    """The plan's parameters by name; only recorded, so that a robot older than the plan reads it."""
     stopgo: str
 
 
@@ -158,33 +158,33 @@ class Mission(Document, frozen=True, kw_only=True):
     robot: RobotSpec
     scanner: ScannerSpec
     limits: LimitsSpec | UnsetType = UNSET
-    """Absent where there are none."""
+    """Absent if there are no limits."""
     share: MissionShare | UnsetType = UNSET
-    """Absent where this mission alone sees its part of the floor."""
+    """Absent if this mission alone covers its part of the floor."""
     start: Start
     stops: tuple[Stop, ...]
     return_: tuple[Point, ...] | None = msgspec.field(name="return")
     policy: Policy
     origin: Origin
     network: tuple[Overlap, ...] | msgspec.UnsetType = msgspec.UNSET
-    """Pairs of stops that register with one another; left out where the plan does not ask for it."""
+    """Pairs of stops that register with one another; absent if the plan does not require it."""
 
 
 def stop_names(count: int) -> list[str]:
-    """The ids of so many stops, in the order of driving."""
+    """Return the ids of `count` stops, in the order of driving."""
     width = max(2, len(str(count)))
     return [f"s{number:0{width}d}" for number in range(1, count + 1)]
 
 
 def canonical(document: Any) -> bytes:
-    """Canonical JSON: keys sorted, no spaces, shortest numbers that read back the same."""
+    """Return canonical JSON: keys sorted, no spaces, shortest numbers that read back the same."""
     return msgspec.json.encode(document, order="deterministic")
 
 
 def digest_of(mission: Mission) -> str:
-    """sha256 of the mission's canonical JSON without its `digest`, hexadecimal.
+    """Return the sha256 of the mission's canonical JSON without its `digest`, hexadecimal.
 
-    Stop by stop, so that other threads have their turn meanwhile: a robot's must still hear a stop.
+    Hashed stop by stop, so that other threads can run: a robot must still receive a pause command.
     """
     document = msgspec.to_builtins(msgspec.structs.replace(mission, stops=()))
     del document["digest"]
@@ -209,14 +209,14 @@ def _add_stops(hashed: hashlib._Hash, stops: tuple[Stop, ...]) -> None:
 
 
 def sealed(mission: Mission) -> Mission:
-    """The same mission with its `digest` set."""
+    """Return the same mission with its `digest` set."""
     return msgspec.structs.replace(mission, digest=digest_of(mission))
 
 
 def mission_id(source: FloorSource, settings: Settings, version: str, part: int = 0) -> str:
-    """Hash of floor, parameters, version and part: known before planning, and the recording id.
+    """Return the hash of floor, parameters, version and part: known before planning, and the recording id.
 
-    What the settings tell the floor's reader is in the source.
+    Parameters of the floor's reader are hashed as part of the source.
     """
     parameters = {
         key: value for key, value in recorded_values(settings).items() if key not in FLOOR_PARAMETERS

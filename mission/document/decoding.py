@@ -1,4 +1,4 @@
-"""What others wrote as JSON: whatever is wrong with it is one kind of error."""
+"""Decoding of third-party JSON: every fault raises one kind of error."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import msgspec
 
 @contextmanager
 def one_decode_error() -> Iterator[None]:
-    """Let what cannot be decoded raise nothing but `msgspec.DecodeError` (of which `ValidationError` is one).
+    """Turn every decoding fault into `msgspec.DecodeError` (of which `ValidationError` is one).
 
-    Bytes that are no text, brackets nested too deeply, also in what is passed over, and values of a database
-    that are neither text nor bytes raise other errors by themselves.
+    Bytes that are no text, brackets nested too deeply (also in ignored parts), and database values that are
+    neither text nor bytes raise other errors by themselves.
     """
     try:
         yield

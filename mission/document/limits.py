@@ -1,4 +1,4 @@
-"""When a target counts as seen: how flat, how near, how finely scanned, and from how many stops."""
+"""Limits at which a target counts as covered: incidence, distance, point spacing, and number of stops."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from stopgo.mission.document import LimitsSpec
 from stopgo.mission.settings import Settings
 
 SCANNER_HEIGHT_M = 1.3
-"""Of a scanner of which nobody says how high it stands."""
+"""Assumed height of a scanner whose height is not given."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ViewLimits:
-    """What a line of sight must be, besides within range and free.
+    """Limits on a line of sight, in addition to being free and within range.
 
-    The spacing at a target, at distance d and incidence i, is d · step / cos i: how far two neighbouring
-    points lie apart on a wall.
+    The point spacing on a target at distance d and incidence i is d · step / cos i: the distance of two
+    neighbouring points on a wall.
     """
 
     max_incidence: float | None = None
-    """Radians from the face's normal; None where any will do."""
+    """Radians from the face's normal; None for any."""
     near: float = 0.0
-    """Metres from the scanner."""
+    """Minimum distance from the scanner in metres."""
     spacing: float | None = None
-    """Metres between neighbouring points; None where any will do."""
+    """Metres between neighbouring points; None for any."""
     step: float | None = None
-    """Radians between neighbouring rays; known where `spacing` is."""
+    """Radians between neighbouring rays; known if `spacing` is."""
     rise: float = 0.0
     """Metres above and below the scanner up to which incidence and spacing must hold."""
 
     @property
     def none(self) -> bool:
-        """Whether there is no limit at all."""
+        """True if there is no limit."""
         return self.max_incidence is None and self.near <= 0 and self.spacing is None
 
     @property
@@ -47,10 +47,10 @@ class ViewLimits:
 
 
 def limits_of(settings: Settings) -> ViewLimits:
-    """The limits that the settings ask for.
+    """Return the limits of the parameters.
 
-    Under the scanner lies a cone it does not see. A wall is seen down to its foot from as far as the cone
-    reaches on the floor: nearer than that counts as too near.
+    The scanner does not see a cone below it. A wall is visible down to its foot only from outside the cone's
+    radius on the floor, so that smaller distances count as too near.
     """
     incidence, density, step = settings.max_incidence, settings.density, settings.angular_step
     return ViewLimits(
@@ -63,7 +63,7 @@ def limits_of(settings: Settings) -> ViewLimits:
 
 
 def rise_of(settings: Settings) -> float:
-    """Metres from the scanner up to the height asked for, or down to the floor if that is more."""
+    """Return the metres from the scanner up to the required height, or down to the floor if that is more."""
     if settings.wall_height is None:
         return 0.0
     height = scanner_height(settings)
@@ -71,18 +71,18 @@ def rise_of(settings: Settings) -> float:
 
 
 def blind_range(settings: Settings) -> float:
-    """Metres round the scanner in which it does not see, or does not see the foot of a wall."""
+    """Return the radius in metres in which the scanner does not see, or does not see the foot of a wall."""
     cone = math.radians(settings.blind_cone or 0.0)
     return max(settings.near or 0.0, round(scanner_height(settings) * math.tan(cone / 2), 6))
 
 
 def scanner_height(settings: Settings) -> float:
-    """Metres from the floor to the scanner."""
+    """Return the metres from the floor to the scanner."""
     return settings.scanner_height or settings.scan_height or SCANNER_HEIGHT_M
 
 
 def limits_in_words(limits: LimitsSpec | UnsetType, *, brief: bool = False) -> dict[str, str]:
-    """The limits that there are, by the parameters that set them, as people read them."""
+    """Return the texts of the limits, by the parameters that set them."""
     if isinstance(limits, UnsetType):
         return {}
     told = {

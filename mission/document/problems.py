@@ -1,4 +1,4 @@
-"""Whether a well-formed mission makes sense: numbers that mean something, and legs that join up."""
+"""Plausibility of a well-formed mission: meaningful numbers, and legs that join."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stopgo.mission.document import Mission, Point, Start, Stop
 from stopgo.mission.frames.geodesy import out_of_reach
 
 JOIN = 1e-3
-"""Metres within which the ends of two legs are the same place."""
+"""Metres within which the ends of two legs are the same point."""
 FAR = 1e8
 """Metres beyond which no site's coordinates lie."""
 EXTENT = 20_000.0
@@ -22,7 +22,7 @@ EXTENT = 20_000.0
 
 @dataclass(frozen=True)
 class Problem:
-    """Something that makes no sense, at a JSON path."""
+    """An implausible value, at a JSON path."""
 
     path: str
     message: str
@@ -32,11 +32,11 @@ class Problem:
 
 
 def problems_of(mission: Mission) -> tuple[Problem, ...]:
-    """Everything in the mission that makes no sense, in the order of the document."""
+    """Return all implausible values of the mission, in the order of the document."""
     return (
         *_identity(mission),
         *_georeference(mission),
-        *_machine(mission),
+        *_robot_and_scanner(mission),
         *_start(mission.start),
         *_stops(mission),
         *_legs(mission),
@@ -53,18 +53,18 @@ def _identity(mission: Mission) -> Iterator[Problem]:
 
 
 def _georeference(mission: Mission) -> Iterator[Problem]:
-    place = mission.georeference
-    if place is not None and not (abs(place.lat) <= 90 and abs(place.lon) <= 180):
-        yield Problem("$.georeference", f"lat {place.lat}, lon {place.lon} is no place on earth")
+    site = mission.georeference
+    if site is not None and not (abs(site.lat) <= 90 and abs(site.lon) <= 180):
+        yield Problem("$.georeference", f"lat {site.lat}, lon {site.lon} is not a position on Earth")
     far = out_of_reach((mission.start.x, mission.start.y))
-    if place is not None and far:
+    if site is not None and far:
         yield Problem("$.georeference", f"the start {far}")
-    turn = mission.frame.to_map
-    if turn is not None:
-        yield from _pose("$.frame.to_map", (turn.x, turn.y), turn.heading)
+    to_map = mission.frame.to_map
+    if to_map is not None:
+        yield from _pose("$.frame.to_map", (to_map.x, to_map.y), to_map.heading)
 
 
-def _machine(mission: Mission) -> Iterator[Problem]:
+def _robot_and_scanner(mission: Mission) -> Iterator[Problem]:
     robot, scanner = mission.robot, mission.scanner
     for key in ("radius", "speed", "turn_rate", "acceleration"):
         yield from _positive(f"$.robot.{key}", getattr(robot, key))
@@ -95,10 +95,10 @@ def _stops(mission: Mission) -> Iterator[Problem]:
     for index, stop in enumerate(mission.stops):
         path = f"$.stops[{index}]"
         if stop.id in known:
-            yield Problem(f"{path}.id", f"is {stop.id!r}, which $.stops[{known[stop.id]}] has already")
+            yield Problem(f"{path}.id", f"is {stop.id!r}, already used by $.stops[{known[stop.id]}]")
         known.setdefault(stop.id, index)
         yield from _stop(path, stop)
-        yield from _far_off(path, (stop.x, stop.y), mission.start)
+        yield from _far_point(path, (stop.x, stop.y), mission.start)
 
 
 def _stop(path: str, stop: Stop) -> Iterator[Problem]:
@@ -113,7 +113,7 @@ def _stop(path: str, stop: Stop) -> Iterator[Problem]:
     yield from _not_negative(f"{path}.retries", stop.retries)
     if not 0 <= stop.sees.new_units <= stop.sees.units:
         seen = stop.sees
-        yield Problem(f"{path}.sees", f"{seen.new_units} new units of {seen.units}; they are part of them")
+        yield Problem(f"{path}.sees", f"{seen.new_units} new units of {seen.units}; new is a part of all")
 
 
 def _legs(mission: Mission) -> Iterator[Problem]:
@@ -121,14 +121,14 @@ def _legs(mission: Mission) -> Iterator[Problem]:
     for index, stop in enumerate(mission.stops):
         path = f"$.stops[{index}].approach"
         yield from _leg(path, stop.approach, begin=here, where=where)
-        yield from _strays(path, stop.approach, mission.start)
+        yield from _far_points(path, stop.approach, mission.start)
         here, where = (stop.x, stop.y), f"stop {stop.id}"
         if stop.approach and _apart(stop.approach[-1], here):
             end = len(stop.approach) - 1
-            yield Problem(f"{path}[{end}]", f"{_place(stop.approach[-1])} is not {where} at {_place(here)}")
+            yield Problem(f"{path}[{end}]", f"{_xy(stop.approach[-1])} is not {where} at {_xy(here)}")
     if mission.return_ is not None:
         yield from _leg("$.return", mission.return_, begin=here, where=where)
-        yield from _strays("$.return", mission.return_, mission.start)
+        yield from _far_points("$.return", mission.return_, mission.start)
 
 
 def _leg(path: str, leg: tuple[Point, ...], *, begin: Point, where: str) -> Iterator[Problem]:
@@ -136,29 +136,29 @@ def _leg(path: str, leg: tuple[Point, ...], *, begin: Point, where: str) -> Iter
         yield Problem(path, "is empty; a leg holds both its ends")
         return
     if _apart(leg[0], begin):
-        yield Problem(f"{path}[0]", f"{_place(leg[0])} is not {where} at {_place(begin)}")
+        yield Problem(f"{path}[0]", f"{_xy(leg[0])} is not {where} at {_xy(begin)}")
     for index, point in enumerate(leg):
         yield from _near(f"{path}[{index}]", point)
 
 
-def _strays(path: str, leg: tuple[Point, ...], start: Start) -> Iterator[Problem]:
+def _far_points(path: str, leg: tuple[Point, ...], start: Start) -> Iterator[Problem]:
     for index, point in enumerate(leg):
-        yield from _far_off(f"{path}[{index}]", point, start)
+        yield from _far_point(f"{path}[{index}]", point, start)
 
 
-def _far_off(path: str, place: Point, start: Start) -> Iterator[Problem]:
-    """Coordinates that are a survey's may be large; how far a mission reaches is another matter."""
-    away = math.dist(place, (start.x, start.y))
+def _far_point(path: str, point: Point, start: Start) -> Iterator[Problem]:
+    """Report a point too far from the start; large survey coordinates alone are allowed."""
+    away = math.dist(point, (start.x, start.y))
     if EXTENT < away <= FAR:
-        told = f"{_place(place)} is {away / 1000:.1f} km from the start"
-        yield Problem(path, f"{told}; no mission reaches beyond {EXTENT / 1000:g} km")
+        distance = f"{_xy(point)} is {away / 1000:.1f} km from the start"
+        yield Problem(path, f"{distance}; the limit is {EXTENT / 1000:g} km")
 
 
 def _apart(one: Point, other: Point) -> bool:
     return not math.dist(one, other) <= JOIN  # `not <=`, so that NaN is apart
 
 
-def _place(point: Point) -> str:
+def _xy(point: Point) -> str:
     return f"({point[0]:.3f}, {point[1]:.3f})"
 
 
@@ -176,7 +176,7 @@ def _network(mission: Mission) -> Iterator[Problem]:
         path = f"$.network[{index}]"
         for end in ("a", "b"):
             if getattr(item, end) not in stops:
-                yield Problem(f"{path}.{end}", f"is {getattr(item, end)!r}, which is no stop")
+                yield Problem(f"{path}.{end}", f"is {getattr(item, end)!r}, which is not a stop")
         pair = frozenset((item.a, item.b))
         if len(pair) < 2 or pair in pairs:
             yield Problem(path, f"{item.a} and {item.b} are {'a pair twice' if pair in pairs else 'no pair'}")
@@ -185,15 +185,15 @@ def _network(mission: Mission) -> Iterator[Problem]:
             yield from _not_negative(f"{path}.{key}", getattr(item, key))
 
 
-def _pose(path: str, place: Point, heading: float) -> Iterator[Problem]:
-    yield from _near(path, place)
+def _pose(path: str, point: Point, heading: float) -> Iterator[Problem]:
+    yield from _near(path, point)
     if not abs(heading) <= math.tau:
         yield Problem(f"{path}.heading", f"is {heading}; headings are radians within ±2π")
 
 
-def _near(path: str, place: Point) -> Iterator[Problem]:
-    if not (abs(place[0]) <= FAR and abs(place[1]) <= FAR):
-        yield Problem(path, f"({place[0]:g}, {place[1]:g}) is not within {FAR:g} m of the origin")
+def _near(path: str, point: Point) -> Iterator[Problem]:
+    if not (abs(point[0]) <= FAR and abs(point[1]) <= FAR):
+        yield Problem(path, f"({point[0]:g}, {point[1]:g}) is not within {FAR:g} m of the origin")
 
 
 def _positive(path: str, value: float) -> Iterator[Problem]:

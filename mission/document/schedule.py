@@ -1,4 +1,4 @@
-"""How long a mission takes: a differential drive that stops, turns in place, drives straight, and scans."""
+"""Duration of a mission: a differential drive that stops, turns in place, drives straight, and scans."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stopgo.mission.geometry import FloatArray, frozen
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """How long the mission is planned to take, in seconds."""
+    """Planned duration of a mission, in seconds."""
 
     drive_s: float
     turn_s: float
@@ -30,11 +30,11 @@ class Schedule:
 
 
 def schedule(mission: Mission) -> Schedule:
-    """Times of a mission in which nothing goes wrong.
+    """Return the times of a mission without failures.
 
-    The robot turns in place at every corner of a leg, and at each stop to the stop's heading, and
-    drives each straight piece from rest to rest. A stop's arrival is when it stands there, turned,
-    and begins to settle. The return leg ends where it ends, without a last turn.
+    The robot turns in place at every corner of a leg, and at each stop to the stop's heading. It drives each
+    straight segment from rest to rest. The arrival at a stop is the time when the robot is stationary there,
+    at its heading, and begins to settle. The return leg ends without a last turn.
     """
     drive_s = turn_s = settle_s = scan_s = 0.0
     heading = mission.start.heading
@@ -52,7 +52,7 @@ def schedule(mission: Mission) -> Schedule:
 
 
 def leg_times(leg: Sequence[Point], *, heading: float, robot: RobotSpec) -> tuple[float, float, float]:
-    """Seconds driving, seconds turning, and the heading at the end of a polyline."""
+    """Return seconds driving, seconds turning, and the heading at the end of a polyline."""
     drive_s = turn_s = 0.0
     for (x0, y0), (x1, y1) in pairwise(leg):
         length = math.hypot(x1 - x0, y1 - y0)
@@ -66,18 +66,18 @@ def leg_times(leg: Sequence[Point], *, heading: float, robot: RobotSpec) -> tupl
 
 
 def turn_time(angle: float, *, turn_rate: float) -> float:
-    """Seconds to turn in place by `angle` radians, the short way round."""
+    """Return the seconds to turn in place by `angle` radians, the short way round."""
     return abs(math.remainder(angle, math.tau)) / turn_rate
 
 
 def straight_time(length: float, *, speed: float, acceleration: float) -> float:
-    """Seconds for `length` metres from rest to rest: trapezoid, or triangle when speed is not reached."""
+    """Return the seconds for `length` metres from rest to rest: trapezoid, or triangle below full speed."""
     if length >= speed**2 / acceleration:
         return length / speed + speed / acceleration
     return 2 * math.sqrt(length / acceleration)
 
 
 def straight_times(lengths: FloatArray, *, speed: float, acceleration: float) -> FloatArray:
-    """`straight_time` of many lengths at once, to the same last digit."""
+    """Return `straight_time` of many lengths at once, to the same last digit."""
     short: FloatArray = 2 * np.sqrt(lengths / acceleration)
     return np.where(lengths >= speed**2 / acceleration, lengths / speed + speed / acceleration, short)

@@ -1,4 +1,4 @@
-"""What a mission takes from the settings alone, whether it is planned or imported."""
+"""Parts of a mission that follow from the parameters alone, planned or imported."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.settings import FLOOR_PARAMETERS, Settings, recorded_values
 
 DECIMALS = 6
-"""Missions hold micrometres and microradians: finer would be float noise."""
+"""Missions hold micrometres and microradians: more digits would be float noise."""
 SCAN_TIMEOUT = 2.0
-"""A scan may take this many times as long as planned, and at least SCAN_PATIENCE more."""
+"""A scan may take this many times its planned duration, and at least SCAN_PATIENCE more."""
 SCAN_PATIENCE = 30.0
 
 
 def robot_of(settings: Settings) -> RobotSpec:
-    """The robot, turning in radians per second."""
+    """Return the robot, with its turn rate in radians per second."""
     return RobotSpec(
         radius=settings.radius,
         speed=settings.speed,
@@ -32,7 +32,7 @@ def robot_of(settings: Settings) -> RobotSpec:
 
 
 def scanner_of(settings: Settings) -> ScannerSpec:
-    """The scanner, and what is known of it besides."""
+    """Return the scanner, with all that is known of it."""
     facts: dict[str, Any] = {
         "model": settings.scanner,
         "step_deg": settings.angular_step,
@@ -45,7 +45,7 @@ def scanner_of(settings: Settings) -> ScannerSpec:
 
 
 def limits_spec_of(settings: Settings) -> LimitsSpec | UnsetType:
-    """When a target counts as seen; absent where there is no limit."""
+    """Return the limits at which a target counts as covered; absent if there is no limit."""
     limits = {
         "max_incidence_deg": settings.max_incidence,
         "near": blind_range(settings) or None,
@@ -58,7 +58,7 @@ def limits_spec_of(settings: Settings) -> LimitsSpec | UnsetType:
 
 
 def policy_of(settings: Settings) -> Policy:
-    """What the robot does when something goes wrong on the way."""
+    """Return the robot's reaction to failures during the run."""
     return Policy(
         link_loss=settings.link_loss,
         link_loss_after_s=settings.link_loss_after,
@@ -67,13 +67,13 @@ def policy_of(settings: Settings) -> Policy:
 
 
 def scan_of(profile: str, duration_s: float) -> Scan:
-    """A scan, and after how long it has failed."""
+    """Return a scan, with its timeout."""
     timeout_s = max(SCAN_TIMEOUT * duration_s, duration_s + SCAN_PATIENCE)
     return Scan(profile=profile, duration_s=duration_s, timeout_s=timeout_s)
 
 
 def site_origin_of(settings: Settings) -> SiteOrigin | None:
-    """The georeference, if one is set."""
+    """Return the georeference, if one is set."""
     if settings.origin is None:
         return None
     lat, lon, alt, heading_deg = settings.origin
@@ -81,7 +81,7 @@ def site_origin_of(settings: Settings) -> SiteOrigin | None:
 
 
 def origin_of(settings: Settings, *, floor: str, digest: str) -> Origin:
-    """What the mission was made from: a file's name and digest, and every setting that was decided."""
+    """Return the mission's source: the file's name and digest, and every parameter that was decided."""
     told = msgspec.json.decode(msgspec.json.encode(recorded_values(settings)))
     parameters = {
         key: value for key, value in told.items() if value not in (None, []) or key not in FLOOR_PARAMETERS
@@ -90,5 +90,5 @@ def origin_of(settings: Settings, *, floor: str, digest: str) -> Origin:
 
 
 def rounded(value: float) -> float:
-    """A plain number without float noise, and never minus zero."""
+    """Return a plain number without float noise, and never minus zero."""
     return round(float(value), DECIMALS) + 0.0

@@ -1,4 +1,4 @@
-"""Writes files whole or not at all: a reader, a full disk, a crash or Ctrl-C never meets half of one."""
+"""Atomic writing of files: after an error, a full disk, a crash or Ctrl-C no partial file remains."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def write_atomic(path: Path | str, data: bytes) -> None:
 
 
 def write_checked(path: Path | str, data: bytes) -> None:
-    """Write as `write_atomic`, and see that the file holds what was written."""
+    """Write as `write_atomic`, and verify that the file holds the data."""
     write_atomic(path, data)
     if Path(path).read_bytes() != data:
         raise InputError(f"{path}: does not hold what was written; is another program writing to it?")
@@ -33,10 +33,10 @@ def write_checked(path: Path | str, data: bytes) -> None:
 
 @contextlib.contextmanager
 def replacing(*paths: Path | str) -> Iterator[list[Path]]:
-    """Empty files beside `paths`, for the block to fill; they take the places of `paths` when it ends well.
+    """Yield empty files next to `paths` for the block to fill; they replace `paths` when it ends well.
 
     All are synced to disk before the first is renamed, and they are renamed in the order given. Symbolic
-    links are followed; whatever was there before stays until the rename, and for good if the block raises.
+    links are followed; the old files stay until the rename, and for good if the block raises.
 
     Raises
     ------
@@ -68,26 +68,26 @@ def replacing(*paths: Path | str) -> Iterator[list[Path]]:
 
 
 def must_be_writable(path: Path) -> None:
-    """Refuse a place where no file can be made, before anything is done for it.
+    """Refuse a path where no file can be created, before any work is done for it.
 
     Raises
     ------
     InputError
-        Naming the path and what is wrong with it.
+        Naming the path and the problem.
     """
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give the name of a file in it")
     if path.exists() and not path.is_file():
-        raise InputError(f"{path}: is no file but a device or the like; give another name")
+        raise InputError(f"{path}: is not a file (a device or similar); give another name")
     if path.parent.exists() and not path.parent.is_dir():
-        raise InputError(f"{path}: {path.parent} is a file, not a folder; give another place")
+        raise InputError(f"{path}: {path.parent} is a file, not a folder; give another path")
     if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}; make it first")
+        raise InputError(f"{path}: folder {path.parent} does not exist; create it first")
     _try_beside(path)
 
 
 def must_not_replace(out: Path | None, *inputs: Path | None) -> None:
-    """Refuse to write over what is read.
+    """Refuse to overwrite an input file.
 
     Raises
     ------
@@ -96,17 +96,17 @@ def must_not_replace(out: Path | None, *inputs: Path | None) -> None:
     """
     for path in inputs:
         if out is not None and path is not None and out.exists() and path.exists() and out.samefile(path):
-            raise InputError(f"{out}: is read, and would be written over; choose another file")
+            raise InputError(f"{out}: is also an input and would be overwritten; choose another file")
 
 
 def _try_beside(path: Path) -> None:
-    """Make a file beside `path` and take it away: what is allowed does not tell what is possible."""
+    """Create a file next to `path` and remove it: permissions alone do not prove that it is possible."""
     try:
         with NamedTemporaryFile(dir=path.parent, prefix=f"{path.stem}.partial-", suffix=path.suffix):
             pass
     except OSError as error:
         raise InputError(
-            f"{path}: no such file can be made in {path.parent} ({error.strerror}); give another place"
+            f"{path}: no file can be created in {path.parent} ({error.strerror}); give another path"
         ) from None
 
 
@@ -115,7 +115,7 @@ def _target(path: Path | str) -> Path:
         raise InputError("-: results are written to files, checked and whole; give a file's name")
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
-        raise InputError(f"{path}: the folder {target.parent} does not exist; create it first")
+        raise InputError(f"{path}: folder {target.parent} does not exist; create it first")
     if target.exists() and not target.is_file():
         raise InputError(f"{path}: is not a regular file; choose another name")
     return target
@@ -135,7 +135,7 @@ def _sync(path: Path) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the rename itself survive a power cut; only POSIX lets a folder be opened."""
+    """Make the rename itself survive a power loss; only POSIX can open a folder."""
     if os.name != "posix":
         return
     descriptor = os.open(folder, os.O_RDONLY)

@@ -1,4 +1,4 @@
-"""coverage.json: what of each building element the mission's stops see, and where along its faces."""
+"""coverage.json: the covered part of each building element, and its position along the faces."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DIGITS = 6
 
 
 class CoverageSegment(msgspec.Struct, frozen=True):
-    """A straight piece of boundary in metres, and what of it is seen as fractions from a to b."""
+    """A straight segment of boundary in metres; `seen` holds its covered fractions from a to b."""
 
     a: tuple[float, float]
     b: tuple[float, float]
@@ -34,7 +34,7 @@ class CoverageSegment(msgspec.Struct, frozen=True):
 
 
 class CoverageCounts(msgspec.Struct, frozen=True):
-    """Units in all, those that can be seen, those that the stops see, and the share of the latter two."""
+    """Units in all, the visible ones, the seen ones, and the coverage of the visible ones."""
 
     units: int
     visible: int
@@ -50,7 +50,7 @@ class CoverageElement(CoverageCounts, frozen=True):
 
 
 class CoverageRoom(msgspec.Struct, frozen=True):
-    """A room by name, and the share that the stops see of what is visible there."""
+    """A room by name, and the coverage of its visible targets."""
 
     room: str
     coverage: float | None
@@ -74,12 +74,12 @@ class Coverage(msgspec.Struct, frozen=True):
 
 
 def read_coverage(path: Path, mission: Mission) -> Coverage:
-    """The coverage.json of `mission`.
+    """Return the coverage.json of `mission`.
 
     Raises
     ------
     InputError
-        When the file cannot be read, or tells the coverage of another mission.
+        When the file cannot be read, or holds the coverage of another mission.
     """
     try:
         with one_decode_error():
@@ -106,7 +106,7 @@ def _check_mission(of: CoverageOf, mission: Mission, path: Path) -> None:
 
 
 def coverage_json(route: Route, mission: Mission, figures: Figures | None = None) -> bytes:
-    """The coverage of every target element as JSON, one boundary segment a line; rooms where given.
+    """Return the coverage of every target element as JSON, one boundary segment a line; rooms if given.
 
     `visible` counts the units that any reachable candidate sees, `seen` those of them that the stops see,
     `visible_m` and `seen_m` are their metres. `coverage` is seen / visible by the plan's rule, in metres or
@@ -150,12 +150,12 @@ def write_coverage(route: Route, mission: Mission, path: Path | str, figures: Fi
 
 @dataclass(frozen=True, eq=False)
 class _Counts:
-    """Of each element of the floor: all, visible and seen (elements, 3)."""
+    """Sums of each element of the floor: all, visible and seen (elements, 3)."""
 
     units: IntArray
     metres: FloatArray
     by_units: bool
-    """Whether coverage is a share of units, the paper's rule."""
+    """True if coverage is a fraction of units, the paper's rule."""
 
     @classmethod
     def of(cls, route: Route) -> _Counts:
@@ -171,7 +171,7 @@ class _Counts:
         return cls(np.stack(units, axis=1), np.stack(metres, axis=1), by_units)
 
     def summary(self, rows: list[int], *, with_elements: bool = True) -> dict[str, Any]:
-        """What some elements come to."""
+        """Return the sums of some elements."""
         units, visible, seen = (int(number) for number in self.units[rows].sum(axis=0))
         length, visible_m, seen_m = (round(float(number), 4) for number in self.metres[rows].sum(axis=0))
         share = seen / visible if self.by_units and visible else (seen_m / visible_m if visible_m else None)
@@ -184,7 +184,7 @@ class _Counts:
 
 
 def _room(share: Share) -> dict[str, Any]:
-    """A room's row, in the plan's unit."""
+    """Return a room's row, in the plan's unit."""
     numbers = (share.total, share.visible, share.seen)
     total, visible, seen = (round(number, 4) for number in numbers)
     coverage = None if share.coverage is None else round(share.coverage, DIGITS)
@@ -215,7 +215,7 @@ def _seen_by_segment(targets: Targets, route: Route) -> dict[int, list[list[floa
 
 
 def _written(head: dict[str, Any], elements: list[dict[str, Any]]) -> bytes:
-    """One line per key, per element and per segment: compact, and still comparable line by line."""
+    """Return one line per key, per element and per segment: compact, and comparable line by line."""
     lines = [f"{_json(key)}: {_json(value)}" for key, value in head.items()]
     lines.append('"elements": [' + ",".join(_element(element) for element in elements) + "\n]")
     return ("{\n" + ",\n".join(lines) + "\n}\n").encode()

@@ -1,4 +1,4 @@
-"""DXF drawings as bytes, the same for the same drawing: without ezdxf's dates, identifiers and set orders."""
+"""Reproducible bytes of DXF drawings: without ezdxf's dates, identifiers and set orders."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def reproducible() -> Iterator[None]:
-    """ezdxf writes dates and random identifiers into a file unless told not to; drawings are made inside."""
+    """Make ezdxf write no dates and no random identifiers; drawings are created inside the block."""
     import ezdxf
 
     before = ezdxf.options.write_fixed_meta_data_for_testing
@@ -25,7 +25,7 @@ def reproducible() -> Iterator[None]:
 
 
 def encoded(drawing: Drawing) -> bytes:
-    """The file; ezdxf lists its classes in the order of a set, which differs from run to run."""
+    """Return the file; ezdxf lists its classes in the order of a set, which differs from run to run."""
     drawing.classes.add_required_classes(drawing.dxfversion)
     drawing.classes.classes = dict(sorted(drawing.classes.classes.items()))
     text = io.StringIO()

@@ -1,4 +1,4 @@
-"""Draws the building and what the scanner sees of it: the lower layers of plan.svg."""
+"""The building and its coverage as drawn in the lower layers of plan.svg."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ LOOKS: dict[str, dict[str, object]] = {
     "railings": {"fill": "#ecdff2", "stroke": "#8b5fa3"},
     "other": {"fill": "#efe2e2", "stroke": "#a58787"},
 }
-"""How each element kind is filled; kinds not named here look like `other`."""
+"""Fill of each element kind; other kinds look like `other`."""
 SEEN: dict[str, Any] = {"stroke": "#1a8f3c", "stroke_width": 0.5}
 UNSEEN: dict[str, Any] = {"stroke": "#d7191c", "stroke_width": 0.8}
 HIDDEN: dict[str, Any] = {"stroke": "#ee9a7b", "stroke_width": 0.3}
 THINNER = {50: 1.0, 100: 0.8, 200: 0.65}
-"""At small scales a wall is hardly wider than the stroke along its face."""
+"""Factors of stroke width: at small scales a wall is hardly wider than the stroke along its face."""
 PASSABLE: dict[str, object] = {"stroke": "#0b63b0", "stroke_width": 0.4}
 BLOCKED: dict[str, object] = {"stroke": "#e07b00", "stroke_width": 0.5}
 
@@ -48,13 +48,13 @@ def building(space: NavigableSpace, sheet: PaperSheet) -> Iterator[str]:
 
 
 def outline(floor: FloorPlan, sheet: PaperSheet) -> str:
-    """The floor alone."""
+    """Return the floor's outline alone."""
     data = (_region(part, sheet) for part in floor.outline)
     return path(data, fill="#e4e4e0", stroke="#888888", stroke_width=0.15, **_EVEN_ODD)
 
 
 def targets(selection: Selection, sheet: PaperSheet) -> Iterator[str]:
-    """Faces out of every candidate's sight, in sight but not seen, and seen."""
+    """Yield the targets' faces: hidden from every candidate, visible but not seen, and seen."""
     visibility = selection.visibility
     seen = seen_units(selection)
     layers = (
@@ -69,7 +69,7 @@ def targets(selection: Selection, sheet: PaperSheet) -> Iterator[str]:
 
 
 def kinds_of(floor: FloorPlan) -> list[str]:
-    """Kinds on this floor, in the order they are drawn: what lies overhead or is thin comes last."""
+    """Return the kinds on this floor in drawing order: overhead and thin elements come last."""
     there = {item.kind for item in floor.elements}
     known = [kind for kind in _ORDER if kind in there]
     return known + sorted(there - set(known))
@@ -80,7 +80,7 @@ _EVEN_ODD: dict[str, object] = {"fill_rule": "evenodd"}
 
 
 def cross(at: FloatArray, *, size: float) -> str:
-    """Path data of an ×."""
+    """Return the path data of an ×."""
     x, y = at.tolist()
     return f"M{number(x - size)} {number(y - size)}l{number(2 * size)} {number(2 * size)}" + (
         f"M{number(x - size)} {number(y + size)}l{number(2 * size)} {number(-2 * size)}"
@@ -92,7 +92,7 @@ def _region(part: Polygon, sheet: PaperSheet) -> str:
 
 
 def _elements(elements: list[Element], sheet: PaperSheet) -> Iterator[str]:
-    """Those of a model are a shape each, which says what it is where a mouse points at it."""
+    """Yield the elements; those of a model are separate shapes with a tooltip."""
     yield from (_named(item, sheet) for item in elements if item.global_id)
     elements = [item for item in elements if not item.global_id]
     solids = (_region(part, sheet) for item in elements for part in item.solids)
@@ -107,7 +107,7 @@ def _named(item: Element, sheet: PaperSheet) -> str:
 
 
 def _openings(openings: tuple[OpeningState, ...], sheet: PaperSheet) -> Iterator[str]:
-    """Passable ones as a line from jamb to jamb, the others with an × on it; passages dashed."""
+    """Yield the openings: passable ones as a line from jamb to jamb, others with an ×; passages dashed."""
     for name, passable, look in (("passable", True, PASSABLE), ("blocked", False, BLOCKED)):
         chosen = [state for state in openings if state.passable == passable]
         marks = [] if passable else [cross(_middle(state, sheet), size=1.1) for state in chosen]
@@ -129,7 +129,7 @@ def _middle(state: OpeningState, sheet: PaperSheet) -> FloatArray:
 
 
 def _strokes(targets: Targets, units: BoolArray, sheet: PaperSheet) -> Iterator[str]:
-    """Path data of the units of a mask; stretches that meet end to end become one polyline."""
+    """Yield the path data of the units of a mask; adjoining stretches become one polyline."""
     runs = runs_of(targets, units)
     a, b = targets.a[runs.segment], targets.b[runs.segment]
     begins = sheet.on_paper(a + runs.t0[:, None] * (b - a))

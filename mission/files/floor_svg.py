@@ -1,4 +1,4 @@
-"""Draws floors as they were read, before anybody plans: what was taken for what, and what was left out."""
+"""Drawings of floors as read, before planning: the recognised elements, and the ignored lines."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stopgo.mission.geometry import FloatArray, Polygon, bounds
 WIDTH = 400.0
 """Millimetres of paper that the largest floor takes …"""
 MARGIN = 12.0
-"""… with this much around it, where its name stands."""
+"""… with this margin around it, for its name."""
 ROOM: dict[str, object] = {"fill": "#ffffff", "stroke": "#b5b5b5", "stroke_width": 0.15}
 FLOOR: dict[str, object] = {"fill": "#f3f0dc", "stroke": "#b09a30", "stroke_width": 0.3}
 OPENINGS: dict[str, dict[str, object]] = {
@@ -28,7 +28,7 @@ _EVEN_ODD: dict[str, object] = {"fill_rule": "evenodd"}
 
 @dataclass(frozen=True)
 class _LabelSpot:
-    """Where a floor lies on the paper: its lower left corner in metres, its top on paper, and the scale."""
+    """Position of a floor on the paper: its lower left corner in metres, its top on paper, and the scale."""
 
     x: float
     y: float
@@ -37,13 +37,13 @@ class _LabelSpot:
     scale: float
 
     def on_paper(self, points: FloatArray) -> FloatArray:
-        """Points (n, 2) in millimetres, y down."""
+        """Return points (n, 2) in millimetres, y down."""
         local = (np.asarray(points) - (self.x, self.y)) * self.scale
         return np.column_stack([local[:, 0] + MARGIN, self.top + self.height - local[:, 1]])
 
 
 def floor_svg(floors: Sequence[FloorPlan]) -> bytes:
-    """The floors below one another at one scale, with a legend of the kinds they hold."""
+    """Return the floors below one another at one scale, with a legend of their kinds."""
     boxes = [bounds(list(_points(floor))) for floor in floors]
     widest = max((max(box[2] - box[0], box[3] - box[1]) for box in boxes), default=1.0) or 1.0
     scale, top, drawn = WIDTH / widest, MARGIN, []
@@ -103,7 +103,7 @@ def _name(room: Room, place: _LabelSpot) -> str:
 
 
 def _legend(kinds: Sequence[str], top: float) -> Iterator[str]:
-    """One swatch per kind, in a row."""
+    """Yield one swatch per kind, in a row."""
     for index, kind in enumerate(kinds):
         x = MARGIN + 40.0 * index
         corners = np.array([[x, top], [x + 6, top], [x + 6, top + 4], [x, top + 4]])

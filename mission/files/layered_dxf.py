@@ -1,6 +1,6 @@
-"""Writes a floor as a layered DXF in metres, so that reading it again gives the same floor.
+"""Writes a floor as a layered DXF in metres, so that reading it returns the same floor.
 
-Layers are those that the reader of layered drawings knows: FLOOR, ROOMS, WALLS and so on. GlobalIds are XDATA
+Layers are those of the reader of layered drawings: FLOOR, ROOMS, WALLS and so on. GlobalIds are XDATA
 of application IFC, group 1000.
 """
 
@@ -30,7 +30,7 @@ TEXT = 0.2
 
 
 def layered_dxf(floor: FloorPlan) -> bytes:
-    """The drawing's bytes; equal floors give equal bytes."""
+    """Return the drawing's bytes; equal floors give equal bytes."""
     import ezdxf
     import ezdxf.units
 
@@ -63,7 +63,7 @@ def _draw(space: Modelspace, floor: FloorPlan) -> None:
 
 
 def _rings(space: Modelspace, part: Polygon, layer: str, global_id: str | None) -> None:
-    """The outer ring as it is, counter-clockwise, and its holes against it."""
+    """Add the outer ring counter-clockwise, and its holes clockwise."""
     for ring in part.rings:
         _marked(space.add_lwpolyline(ring.tolist(), close=True, dxfattribs={"layer": layer}), global_id)
 
@@ -80,7 +80,7 @@ def _name(space: Modelspace, room: Room) -> None:
 
 
 def _inside(room: Room) -> FloatArray:
-    """A point in the room's largest part, far from its edges."""
+    """Return a point in the room's largest part, far from its edges."""
     import shapely
 
     parts = [shapely.Polygon(part.exterior, part.holes) for part in room.polygons]

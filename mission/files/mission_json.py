@@ -1,4 +1,4 @@
-"""Reads and writes mission.json: strict on the way in, the same bytes every time on the way out."""
+"""Reader and writer of mission.json: strict reading, reproducible bytes in writing."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.files.atomic import write_atomic
 
 _WIDEST = 2**53
-"""Integers beyond this do not survive readers that keep numbers as doubles."""
+"""Largest integer that readers with double-precision numbers keep exactly."""
 
 
 def read(path: Path | str) -> Mission:
-    """The mission in a file.
+    """Return the mission in a file.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def read(path: Path | str) -> Mission:
 
 
 def parse(data: bytes, name: str) -> Mission:
-    """The mission in `data`; `name` stands in error messages. Its digest is verified, its geometry not.
+    """Return the mission in `data`; `name` is used in error messages. Verifies the digest, not the geometry.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def parse(data: bytes, name: str) -> Mission:
 
 
 def encode(mission: Mission) -> bytes:
-    """The mission with its digest set, as indented JSON; equal missions give equal bytes.
+    """Return the mission with its digest set, as indented JSON; equal missions give equal bytes.
 
     Raises
     ------
@@ -71,10 +71,10 @@ def write(mission: Mission, path: Path | str) -> None:
 
 
 def next_revision(path: Path | str, mission: Mission) -> int:
-    """The revision with which `mission` replaces what is at `path`.
+    """Return the revision with which `mission` replaces the file at `path`.
 
-    Its own where nothing or another mission is; of a mission with the same id, the same revision
-    when only the revision differs, else one more.
+    Its own if there is no mission or another one. For a mission with the same id: the same revision if only
+    the revision differs, else one more.
     """
     if not Path(path).is_file():  # a device has no end to read to; whoever writes there refuses it
         return mission.revision
@@ -89,7 +89,7 @@ def next_revision(path: Path | str, mission: Mission) -> int:
 
 
 class _Repeated:
-    """Stands in for the value of a key that an object has twice."""
+    """Marks the value of a key that an object has twice."""
 
 
 def _parse_json(data: bytes, name: str) -> dict[str, Any]:
@@ -117,7 +117,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _check_values(document: object, name: str) -> None:
     for path, value in _leaves(document, "$"):
         if isinstance(value, _Repeated):
-            raise InputError(f"{name}: {path} stands there more than once; keep one")
+            raise InputError(f"{name}: {path} occurs more than once; keep one")
         if isinstance(value, float) and not math.isfinite(value):
             raise InputError(f"{name}: {path} is {value}; it must be a finite number")
         if isinstance(value, int) and abs(value) > _WIDEST:
@@ -144,7 +144,7 @@ def _is_text(value: str) -> bool:
 
 
 _ID = re.compile(r"[0-9A-Za-z_-]{1,64}")
-"""What an id may be: it stands in key expressions and file names."""
+"""Form of an id, because key expressions and file names contain it."""
 
 
 def _check_id(mission: Mission, name: str) -> None:
@@ -175,8 +175,8 @@ def _convert(document: dict[str, Any], name: str) -> Mission:
 
 
 def _check_digest(document: dict[str, Any], mission: Mission, name: str) -> None:
-    """Of the document as it stands, so that it outlives parameters that later versions add; or, where
-    another program wrote 4.0 as 4, of the mission read from it."""
+    """Verify the digest of the document as it is, so that it stays valid with parameters of later versions;
+    or, if another program wrote 4.0 as 4, of the mission read from it."""
     rest = {key: value for key, value in document.items() if key != "digest"}
     digest = hashlib.sha256(canonical(rest)).hexdigest()
     if mission.digest not in (digest, digest_of(mission)):
@@ -187,7 +187,7 @@ def _check_digest(document: dict[str, Any], mission: Mission, name: str) -> None
 
 
 def _at(document: object, path: str) -> Any:
-    """The value at a path as msgspec writes it: `$.stops[0].x`."""
+    """Return the value at a path as msgspec writes it: `$.stops[0].x`."""
     value: Any = document
     for key, index in re.findall(r"\.([^.\[\]]+)|\[(\d+)\]", path):
         value = value[key] if key else value[int(index)]
@@ -204,7 +204,7 @@ def _shown(value: object) -> str:
 
 
 def _indented(value: object, indent: str) -> str:
-    """JSON with one key or point a line: a polyline is read as its points."""
+    """Return JSON with one key or point a line: a polyline is read as its points."""
     deeper = indent + "  "
     if isinstance(value, dict) and value:
         lines = [f"{deeper}{_scalar(key)}: {_indented(item, deeper)}" for key, item in value.items()]
@@ -218,5 +218,5 @@ def _indented(value: object, indent: str) -> str:
 
 
 def _scalar(value: object) -> str:
-    """As in the canonical form, so that numbers read the same in both."""
+    """Encode as in the canonical form, so that numbers read the same in both."""
     return msgspec.json.encode(value).decode()

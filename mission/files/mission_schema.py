@@ -17,7 +17,7 @@ _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def mission_schema() -> bytes:
-    """The schema that every mission `mission_json.parse` accepts is valid under, as indented JSON."""
+    """Return the schema of every mission that `mission_json.parse` accepts, as indented JSON."""
     schema: dict[str, Any] = msgspec.json.schema(Mission)
     # They have defaults in Python; in a file they say what the rest means, so the reader insists.
     schema["$defs"]["Mission"]["required"] = ["schema", "version", *schema["$defs"]["Mission"]["required"]]

@@ -1,4 +1,4 @@
-"""A mission as a person reads it, and as a program does: what `show` prints."""
+"""Text and JSON of a mission: the output of `show`."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from stopgo.mission.document.schedule import Schedule
 from stopgo.mission.geometry import frozen, polyline_length
 
 
-def report(mission: Mission, times: Schedule) -> dict[str, Any]:
-    """What `show` prints, for a program."""
+def mission_report(mission: Mission, times: Schedule) -> dict[str, Any]:
+    """Return the output of `show` for a program."""
     stops = [
         {
             **{"number": number, "id": stop.id, "x": stop.x, "y": stop.y},
@@ -37,7 +37,8 @@ def report(mission: Mission, times: Schedule) -> dict[str, Any]:
     }
 
 
-def page(mission: Mission, times: Schedule) -> str:
+def mission_text(mission: Mission, times: Schedule) -> str:
+    """Return the mission as text: its head, the table of stops, and the totals."""
     header = ("no", "stop", "x m", "y m", "heading °", "doorway", "approach m", "units", "new", "arrives")
     rows = [
         _row(number, stop, arrival)
@@ -55,7 +56,7 @@ def _head(mission: Mission) -> str:
         "robot": f"radius {robot.radius:g} m, {robot.speed:g} m/s, {robot.acceleration:g} m/s², "
         f"turns {math.degrees(robot.turn_rate):g} °/s",
         "scanner": f"profile {scanner.profile}, range {scanner.range:g} m, {scanner.fov_deg:g}°",
-        **({"seen": told} if (told := ", ".join(limits_in_words(mission.limits).values())) else {}),
+        **({"seen": limits} if (limits := ", ".join(limits_in_words(mission.limits).values())) else {}),
         "start": f"({start.x:.3f}, {start.y:.3f}) facing {math.degrees(start.heading):.1f}° ({start.reason})",
         "made by": f"stopgo {mission.origin.stopgo}",
     }

@@ -44,7 +44,7 @@ class PdfPage:
     name: str = ""
     """In the reader's table of contents."""
     frame: PaperBox | None = None
-    """What `clip-path` cuts drawings off at."""
+    """Window at which `clip-path` cuts drawings off."""
 
 
 def pdf_of(pages: Sequence[PdfPage], *, title: str, shared: Mapping[str, str] | None = None) -> bytes:

@@ -1,4 +1,4 @@
-"""Fills the columns beside a plan: title block, legend with scale bar and axes, table of stops."""
+"""Columns next to a plan: title block, legend with scale bar and axes, table of stops."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _time(seconds: float) -> str:
 
 
 def _whose(mission: Mission, shared: Sequence[Mission]) -> list[tuple[str, str]]:
-    """The mission, or those that share its stops."""
+    """The mission, or those that its stops are divided among."""
     if shared:
         return [(letter(k), f"{share_in_words(item)}: {item.id[:12]}") for k, item in enumerate(shared)]
     own = [] if mission.share is UNSET else [("Share", share_in_words(mission))]
@@ -96,7 +96,7 @@ def _whose(mission: Mission, shared: Sequence[Mission]) -> list[tuple[str, str]]
 
 
 def share_in_words(mission: Mission) -> str:
-    """Which of the missions that together see a floor it is."""
+    """Return the number of this mission among those that cover a floor together."""
     share = mission.share
     return "" if share is UNSET else f"{share.kind} {share.number} of {share.of}"
 
@@ -127,7 +127,7 @@ def _times(seconds: list[float]) -> str:
 
 
 def _least_time(route: Route, shared: Sequence[Mission]) -> list[tuple[str, str]]:
-    """What choosing stops and tour together saved, and what no plan is below."""
+    """Return the time saved by choosing stops and tour together, and the lower bound."""
     time = route.time
     if time is None or shared:
         return []
@@ -279,7 +279,7 @@ class Row:
     edges: tuple[float, ...]
     bold: bool = False
     to_left: bool = False
-    """Whether the first cell begins at the left."""
+    """True if the first cell begins at the left."""
 
 
 STOP_EDGES = (8.0, 25.0, 42.0, 58.0, 70.0, 81.0, 98.0)
@@ -317,7 +317,7 @@ def stop_rows(mission: Mission, *, before: str = "") -> list[Row]:
 
 
 def figure_rows(figures: Figures) -> list[Row]:
-    """What is seen of the whole, of every kind and every room; what is left out; what is doubtful."""
+    """Yield the coverage of the whole, of every kind and every room; the unreached rooms; the findings."""
     shares = [figures.whole, *figures.kinds, *figures.rooms]
     rows = [
         replace(SHARE_HEAD, cells=("coverage", f"all {figures.unit}", *SHARE_HEAD.cells[2:])),
@@ -385,7 +385,7 @@ def coordinate_ticks(sheet: PaperSheet) -> str:
 
 _TICK: dict[str, object] = {"stroke": "#666666", "stroke_width": 0.15}
 _HALO: dict[str, object] = {"paint_order": "stroke", "stroke": "#ffffff", "stroke_width": 0.8}
-"""What is drawn up to the edge would cross the numbers."""
+"""Width of the margin: drawings up to the edge would cross the numbers."""
 
 
 def _ticks(sheet: PaperSheet, step: float, *, axis: int) -> Iterator[str]:

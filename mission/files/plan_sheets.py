@@ -1,7 +1,7 @@
 """A plan as a set of sheets for the building site: overview, sheets at a readable scale, lists to tick.
 
-Every sheet says which of how many it is, and where on the floor it lies. What is to scale is drawn once and
-shown through the window of each sheet.
+Every sheet shows its number, the number of all, and its position on the floor. Parts to scale are drawn
+once and shown through the window of each sheet.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures, percent
 
 READABLE = 100
-"""1:N at which stops and walls are told apart; a floor that one sheet shows so needs no further ones."""
+"""Scale 1:N at which stops and walls are distinct; a floor on one such sheet needs no further ones."""
 TILE_PAPER = "A3"
 OVERLAP = 20.0
-"""Millimetres that neighbouring sheets share."""
+"""Overlap of neighbouring sheets in millimetres."""
 KEY_HEIGHT = 60.0
 """Of the small plan that shows where a sheet lies."""
 LIST_ROW, LIST_SIZE = 5.5, 2.6
@@ -58,7 +58,7 @@ class Tile:
 
 
 def needs_sheets(made: Route, mission: Mission) -> bool:
-    """Whether one sheet shows the floor only smaller than can be read."""
+    """Return True if one sheet shows the floor too small to read."""
     return whole_sheet(made, mission).scale > READABLE
 
 
@@ -130,7 +130,7 @@ def _letters(row: int) -> str:
 
 
 def _places(made: Route, mission: Mission) -> FloatArray:
-    """Points (n, 2) of everything a sheet must show: targets, stops and the way."""
+    """Return the points (n, 2) that the sheets must show: targets, stops and the route."""
     legs = [
         np.array(leg).reshape(-1, 2)
         for leg in (*(stop.approach for stop in mission.stops), mission.return_ or ())
@@ -263,7 +263,7 @@ def _stop_lines(mission: Mission, floor: FloorPlan, tiles: Sequence[Tile]) -> It
 
 
 def rooms_of(mission: Mission, floor: FloorPlan) -> list[str]:
-    """The name of the room in which each stop stands; empty between rooms."""
+    """Return the name of each stop's room; empty between rooms."""
     xy = np.array([(stop.x, stop.y) for stop in mission.stops], dtype=np.float64).reshape(-1, 2)
     names = [""] * len(xy)
     for room in floor.rooms:

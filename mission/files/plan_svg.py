@@ -1,4 +1,4 @@
-"""Draws plan.svg: a mission on its floor, to scale in millimetres, as a surveyor prints it."""
+"""plan.svg: a mission on its floor, to scale in millimetres, as a surveyor prints it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from stopgo.mission.stages import Route
 from stopgo.mission.stages.figures import Figures
 
 PADDING = 8.0
-"""Millimetres kept free round the floor, for coordinates and what stands on its edge."""
+"""Millimetres kept free round the floor, for coordinates and symbols on its edge."""
 
 
 def plan_svg(
@@ -33,11 +33,11 @@ def plan_svg(
     date: str,
     with_range: bool = False,
 ) -> bytes:
-    """The plan as SVG, with a table of its figures where they are given.
+    """Return the plan as SVG, with a table of its figures if they are given.
 
-    Where its stops are `shared` out among several missions, these are drawn in place of its own.
+    If several `shared` missions divide its stops, they are drawn instead of it.
 
-    `date` stands in the title block as given, so equal inputs give equal bytes.
+    `date` is printed in the title block as given, so equal inputs give equal bytes.
 
     `with_range` adds a faint ring of the scanner's range about each stop.
     """
@@ -55,7 +55,7 @@ def overview(
     with_range: bool = False,
     with_table: bool = True,
 ) -> tuple[str, PaperSheet]:
-    """What stands on the one sheet that shows everything, and the sheet."""
+    """Return the blocks of the one sheet that shows everything, and the sheet."""
     stops = panel.shared_rows(shared) if shared else panel.stop_rows(mission)
     rows = [*stops, *(panel.figure_rows(figures) if figures else [])] if with_table else []
     facts = panel.facts_of(made, mission, shared, date=date)
@@ -75,7 +75,7 @@ def overview(
 def whole_sheet(
     made: Route, mission: Mission, shared: Sequence[Mission] = (), *, rows: int = 0
 ) -> PaperSheet:
-    """The sheet that shows everything, with so many rows of tables beside it."""
+    """Return the sheet that shows everything, with this number of table rows next to it."""
     entries = panel.legend_entries(made, mission, shared)
     facts = [*panel.facts_of(made, mission, shared, date=""), ("Scale", "")]
     blocks = (panel.legend_height(entries), panel.title_height(facts), rows)
@@ -85,7 +85,7 @@ def whole_sheet(
 def drawing_of(
     made: Route, mission: Mission, sheet: PaperSheet, shared: Sequence[Mission] = (), *, with_range: bool
 ) -> tuple[str, ...]:
-    """Everything to scale, from the floor up to the numbers."""
+    """Yield everything to scale, from the floor up to the numbers."""
     missions = shared or (mission,)
     space = made.selection.visibility.candidates.space
     parts = chain(
@@ -101,7 +101,7 @@ def drawing_of(
 
 
 def _busy(missions: Sequence[Mission], floor: FloorPlan, sheet: PaperSheet) -> Busy:
-    """What room names keep away from: stops above all, then the route, then elements."""
+    """Return the points that room names avoid: stops above all, then the route, then elements."""
     turns = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     disc = (STOP + 0.5) * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     centres = [

@@ -1,4 +1,4 @@
-"""plan.toml and options -> checked settings; settings -> a plan.toml that reads back the same."""
+"""plan.toml and options -> checked parameters; parameters -> a plan.toml that reads back the same."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _known() -> list[str]:
 
 
 def settings_toml(settings: Settings) -> str:
-    """The settings as a plan.toml that reads back the same; undecided parameters are comments."""
+    """Return the parameters as a plan.toml that reads back the same; undecided ones are comments."""
     lines: list[str] = []
     for table, parameters in _tables().items():
         lines.append(f"[{table}]")
@@ -70,7 +70,7 @@ def settings_toml(settings: Settings) -> str:
 
 
 def settings_json(settings: Settings) -> dict[str, dict[str, Any]]:
-    """The settings by their table in plan.toml; what is undecided is null."""
+    """Return the parameters by their table in plan.toml; undecided ones are null."""
     return {
         table: {parameter.key: getattr(settings, parameter.name) for parameter in parameters}
         for table, parameters in _tables().items()
@@ -116,7 +116,7 @@ def _values_of(path: Path, notify: Callable[[str], None]) -> dict[str, Any]:
 
 
 def _tables() -> dict[str, list[Parameter]]:
-    """The tables of plan.toml with their parameters."""
+    """Return the tables of plan.toml and the parameters in each."""
     found: dict[str, list[Parameter]] = {}
     for parameter in PARAMETERS.values():
         found.setdefault(parameter.section, []).append(parameter)

@@ -1,4 +1,4 @@
-"""Writes room names into a plan, where they cover as little as can be of stops, route and columns."""
+"""Room names on a plan, at positions that cover as little as possible of stops, route and columns."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ OUTSIDE = 6.0
 LABEL = 2.0
 """Cost of each of 28 points of another label."""
 _TRIES = 28
-"""Places tried along each side of a room's bounding box."""
+"""Positions tried along each side of a room's bounding box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +86,10 @@ class Label:
 
 
 def room_labels(rooms: tuple[Room, ...], sheet: PaperSheet, *, avoid: Busy) -> str:
-    """Name and area of each room, off `avoid` and each other.
+    """Return name and area of each room, away from `avoid` and each other.
 
-    Where there is no room for both the name stands alone, then its first word; a room that has no place even
-    for that has no label here.
+    Without space for both, the name is alone, then only its first word; a room without space even for that
+    has no label here.
     """
     labels: list[Label] = []
     written = np.empty((0, 28, 2))
@@ -121,7 +121,7 @@ def _label(room: Room, sheet: PaperSheet, avoid: Busy, written: FloatArray) -> L
 
 
 def _layouts(room: Room, widest: float) -> Iterator[list[list[tuple[str, float]]]]:
-    """What a label may say, the fullest first: on one line or two, with and without the area."""
+    """Yield possible labels, the longest first: on one line or two, with and without the area."""
     area = (f"{room.area:.1f} m²", AREA)
     names = [wrapped(room.label, width=widest), wrapped(room.label, width=0.0, cut=widest)]
     different = names if names[0] != names[1] else names[:1]
@@ -183,7 +183,7 @@ def _best_place(
 
 
 def _covered(x: FloatArray, y: FloatArray, half: FloatArray, avoid: Busy) -> FloatArray:
-    """Weight of the points that lie under a label at each place of the grid x by y, row by row."""
+    """Return the weight of the points under a label at each position of the grid x by y, row by row."""
     near_x = np.abs(avoid.xy[:, 0] - x[:, None]) < half[0]
     near_y = np.abs(avoid.xy[:, 1] - y[:, None]) < half[1]
     # einsum, not @: so small a product loses more time to BLAS's threads than it takes.
@@ -191,7 +191,7 @@ def _covered(x: FloatArray, y: FloatArray, half: FloatArray, avoid: Busy) -> Flo
 
 
 def _outside(x: FloatArray, y: FloatArray, half: FloatArray, rings: list[FloatArray]) -> FloatArray:
-    """How many of a label's nine points lie outside the rings, at each place of the grid, row by row."""
+    """Return the number of a label's nine points outside the rings, at each grid position, row by row."""
     sides = np.array([-1.0, 0.0, 1.0])[:, None]
     within = inside((x + half[0] * sides).ravel(), (y + half[1] * sides).ravel(), rings)
     counts = (~within).reshape(3, len(y), 3, len(x)).sum(axis=(0, 2))
@@ -199,7 +199,7 @@ def _outside(x: FloatArray, y: FloatArray, half: FloatArray, rings: list[FloatAr
 
 
 def inside(x: FloatArray, y: FloatArray, rings: list[FloatArray]) -> BoolArray:
-    """Whether each point of the grid x by y is inside the rings, by the even-odd rule (rows of y)."""
+    """Return True for points of the grid x by y inside the rings, by the even-odd rule (rows of y)."""
     result = np.zeros((len(y), len(x)), dtype=bool)
     for ring in rings:
         after = np.roll(ring, -1, axis=0)

@@ -1,4 +1,4 @@
-"""Draws the route and its numbered stops: the upper layers of plan.svg."""
+"""The route and its numbered stops: the upper layers of plan.svg."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.mission.stages.network import network_of
 
 WAY: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.35}
-"""The way to each stop."""
+"""Line of the leg to each stop."""
 BACK: dict[str, object] = {"stroke": "#5a2ca0", "stroke_width": 0.3, "stroke_dasharray": "2 1"}
 PAIR: dict[str, object] = {"stroke": "#1f8a70", "stroke_width": 0.25, "stroke_dasharray": "0.6 0.9"}
 """Two stops whose scans register with one another."""
 BRIDGE: dict[str, object] = {"stroke": "#c2410c", "stroke_width": 0.5, "stroke_dasharray": "0.6 0.9"}
-"""Such a pair without which the scans would fall apart."""
+"""Line of a pair without which the scans are not connected."""
 THIN: dict[str, object] = {"stroke": "#c2410c", "stroke_width": 0.2}
 STOP = 2.6
 """Radius in millimetres of a stop's disc."""
@@ -31,7 +31,7 @@ _ARROW_LEAST = 8.0
 
 
 def rings(mission: Mission, sheet: PaperSheet) -> str:
-    """How far the scanner reaches from each stop, faintly."""
+    """Draw the scanner's range at each stop, faintly."""
     reach = sheet.length(mission.scanner.range)
     circles = [circle(x, y, reach) for x, y in _stops_on_paper(mission, sheet).tolist()]
     return group("range", circles, fill="none", stroke="#b9a6dd", stroke_width=0.12, stroke_dasharray="1 1.5")
@@ -45,7 +45,7 @@ def route(
     back_way: dict[str, object] = BACK,
     after: str = "",
 ) -> Iterator[str]:
-    """Legs with direction arrows; the return leg dashed. `after` stands behind the layers' names."""
+    """Draw legs with direction arrows; the return leg dashed. `after` is appended to the layers' names."""
     legs = [_on_paper(stop.approach, sheet) for stop in mission.stops]
     back = _on_paper(mission.return_ or (), sheet)
     join: dict[str, object] = {"fill": "none", "stroke_linejoin": "round"}
@@ -56,7 +56,7 @@ def route(
 
 
 def network(mission: Mission, sheet: PaperSheet) -> Iterator[str]:
-    """Pairs of stops whose scans register: bridges stronger, the weakest pair with what holds it."""
+    """Draw the pairs of stops whose scans register: bridges stronger, the weakest pair with its strength."""
     found = network_of(mission)
     if found is None:
         return

@@ -1,4 +1,4 @@
-"""Draws the routes of several missions that share a floor: each by its letter, colour and kind of line."""
+"""Routes of several missions that share a floor: each with its letter, colour and kind of line."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def line_of(number: int) -> dict[str, object]:
 
 
 def back(number: int) -> dict[str, object]:
-    """The line of its way back: the same, and thinner."""
+    """Return the line of its return leg: the same, and thinner."""
     return line_of(number) | {"stroke_width": 0.22}
 
 
 def shared_routes(missions: Sequence[Mission], sheet: PaperSheet) -> Iterator[str]:
-    """The legs of every mission; a way back is thin."""
+    """Draw the legs of every mission; return legs are thin."""
     for k, mission in enumerate(missions):
         yield from route_drawing.route(
             mission, sheet, way=line_of(k), back_way=back(k), after=f"-{letter(k)}"

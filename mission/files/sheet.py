@@ -1,4 +1,4 @@
-"""Chooses scale and sheet for a plan, and where on it the drawing, the table and the title block go."""
+"""Scale, sheet and layout of a plan: positions of the drawing, the table and the title block."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class PaperBox:
 
 @dataclass(frozen=True)
 class Chunk:
-    """A piece of the table: `count` rows from row `first` on."""
+    """A part of the table: `count` rows from row `first` on."""
 
     box: PaperBox
     first: int
@@ -43,7 +43,7 @@ class Chunk:
 
 @dataclass(frozen=True)
 class PaperSheet:
-    """A sheet of paper, what stands where on it, and its scale."""
+    """A sheet of paper, its layout, and its scale."""
 
     paper: str
     width: float
@@ -70,7 +70,7 @@ class PaperSheet:
 
 @dataclass(frozen=True)
 class SheetContents:
-    """What is to go on a sheet: the site's bounds in metres, and heights of the blocks in mm."""
+    """Contents of a sheet: the site's bounds in metres, and heights of the blocks in mm."""
 
     bounds: tuple[float, float, float, float]
     padding: float

@@ -1,4 +1,4 @@
-"""Words of SVG: elements as strings, in millimetres on paper, y down."""
+"""Elements of SVG as strings, in millimetres on paper, y down."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def text(x: float, y: float, content: str, *, size: float, **style: object) -> s
 
 
 def clean(content: str) -> str:
-    """Text as XML may hold it: escaped, and what XML 1.0 has no place for replaced."""
+    """Return text as XML may hold it: escaped, with characters that XML 1.0 forbids replaced."""
     return escape(_NOT_XML.sub("\ufffd", content))
 
 
@@ -80,7 +80,7 @@ def polygon(points: FloatArray, **style: object) -> str:
 
 
 def path(data: Iterable[str], **style: object) -> str:
-    """One path of many pieces; nothing when there are none."""
+    """Return one path of many parts; nothing when there are none."""
     joined = "".join(data)
     return f'<path d="{joined}"{attributes(style)}/>' if joined else ""
 

@@ -1,4 +1,4 @@
-"""A floor as it was read: outline, rooms, openings, elements, and what was odd about the input."""
+"""A floor as it was read: outline, rooms, openings, elements, and anomalies of the input."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from stopgo.mission.geometry import FloatArray, Polygon
 
 
 class Rank(IntEnum):
-    """How much a finding bears on a plan, the worst first."""
+    """Effect of a finding on a plan, the worst first."""
 
     GRAVE = 0
     """The plan may be wrong or leave something out; `--strict` refuses it."""
     DOUBT = 1
     """Worth a look at the drawing."""
     NOTE = 2
-    """Mended or left out without harm."""
+    """Repaired or left out without harm."""
 
 
 GRAVE = (
@@ -39,20 +39,20 @@ NOTES = (
 
 @dataclass(frozen=True)
 class Finding:
-    """Something odd in the input that travels with the noun made from it."""
+    """An anomaly of the input; it is passed on with the results made from the input."""
 
     code: str
     """A short fixed word per kind of finding, such as `unknown_layer` or `narrow_door`."""
     message: str
-    """One sentence a person reads, naming the thing and the value."""
+    """One sentence for a person, with the object and the value."""
     element: str | None = None
-    """Id of the element, opening or room it is about."""
+    """Id of the element, opening or room that it concerns."""
     at: tuple[float, float] | None = None
-    """Where, in the drawing's metres."""
+    """Position, in the drawing's metres."""
 
     @property
     def rank(self) -> Rank:
-        """How much it bears on a plan, by its code."""
+        """Its effect on a plan, by its code."""
         return Rank.GRAVE if self.code in GRAVE else Rank.NOTE if self.code in NOTES else Rank.DOUBT
 
 
@@ -72,12 +72,12 @@ class Element:
     obstacle: bool = False
     target: bool = False
     to_scan: bool = True
-    """False where it is no target whatever its kind: it is being built, or was scanned before."""
+    """False if it is no target whatever its kind: it is not built yet, or was scanned before."""
 
 
 @dataclass(frozen=True, eq=False)
 class IgnoredLine:
-    """Linework of an unknown layer that is neither an obstacle nor anything else, but was drawn."""
+    """Line of an unknown layer; it is no obstacle and no element, but it was drawn."""
 
     layer: str
     points: FloatArray
@@ -116,7 +116,7 @@ class Opening:
 
 @dataclass(frozen=True, eq=False)
 class Georeference:
-    """Where the site's origin is: WGS84 degrees, metres, and the bearing of +y clockwise from true north."""
+    """The site's origin: WGS84 degrees, metres, and the bearing of +y clockwise from true north."""
 
     lat: float
     lon: float
@@ -141,11 +141,11 @@ class FloorPlan:
     status: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     """Elements on this floor by construction status, on the day in `source`; empty without one."""
     on_robots_map: bool = False
-    """Whether the coordinates are those of the robot's own map."""
+    """True if the coordinates are those of the robot's own map."""
     ceiling_m: float | None = None
-    """Height of the next storey's floor above this one, where the model tells."""
+    """Height of the next storey's floor above this one, if the model contains it."""
     ignored: tuple[IgnoredLine, ...] = ()
-    """Lines that no plan may cross unsaid: nobody knows what they stand for."""
+    """Lines of unknown meaning; a plan that crosses one reports it."""
 
     @property
     def digest(self) -> str:
@@ -158,6 +158,6 @@ class FloorPlan:
         return sum(polygon.area for polygon in self.outline)
 
     def with_targets(self, kinds: tuple[str, ...]) -> FloorPlan:
-        """The same floor, where exactly the elements of `kinds` are to be scanned."""
+        """Return the same floor with exactly the elements of `kinds` as targets."""
         elements = tuple(replace(item, target=item.to_scan and item.kind in kinds) for item in self.elements)
         return replace(self, elements=elements)

@@ -1,4 +1,4 @@
-"""What makes a floor this floor: the file, and what was chosen in it."""
+"""Source of a floor: the file, and the choices made in it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Any
 
 @dataclass(frozen=True, eq=False)
 class FloorSource:
-    """A file, and which floor of it: two storeys or two dates of one model are two floors.
+    """A file, and the floor in it: two storeys or two dates of one model are two floors.
 
-    What is None was not chosen, because the file holds but one floor or says nothing of it.
+    A value of None was not chosen, because the file has only one floor or does not contain it.
     """
 
     file: str
@@ -24,31 +24,31 @@ class FloorSource:
     date: str | None = None
     """The day whose construction status is shown, as YYYY-MM-DD."""
     since: str | None = None
-    """Only what was finished after this day is to be scanned."""
+    """Only elements finished after this day are targets."""
     drawing: int | None = None
-    """Number of the drawing, of several in one model space, from 1."""
+    """Number of the drawing, among several in one model space, from 1."""
     region: tuple[float, float, float, float] | None = None
     """The part of a model space that is read, as x0, y0, x1, y1 in drawing units."""
     units: str | None = None
-    """The drawing's unit of length, where the user and not the file says it."""
+    """The drawing's unit of length, if the user gives it."""
     options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
-    """What else the reader was told other than its defaults: names, and values that JSON can hold."""
+    """Other options of the reader that differ from its defaults: names, and values that JSON can hold."""
 
     @property
     def chosen(self) -> dict[str, Any]:
-        """What was chosen, by name, the reader's options among it; empty for a plain file of one floor."""
+        """All choices by name, with the reader's options; empty for a plain file of one floor."""
         names = ("storey", "date", "since", "drawing", "region", "units")
         own = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         return {**own, **{name: self.options[name] for name in sorted(self.options)}}
 
     @property
     def basis(self) -> str | dict[str, Any]:
-        """What tells this floor from others, for a hash: the bare digest where nothing was chosen."""
+        """Value that identifies the floor, for a hash: the bare digest if nothing was chosen."""
         return {"digest": self.digest, **self.chosen} if self.chosen else self.digest
 
     @property
     def title(self) -> str:
-        """The choice in words, such as `storey EG, date 2024-05-01`; empty where nothing was chosen."""
+        """The choices in words, such as `storey EG, date 2024-05-01`; empty if nothing was chosen."""
         return ", ".join(f"{name} {_in_words(value)}" for name, value in self.chosen.items())
 
 

@@ -1,8 +1,8 @@
-"""From the site's frame to latitude and longitude, and back.
+"""Conversion from the site's frame to latitude and longitude, and back.
 
-An autopilot turns latitude and longitude into metres by its own rule, not by the earth's true shape:
-ArduPilot with one scale for the whole earth, PX4 on a sphere. A place that is sent to one must be written by
-its rule, or the robot stands up to 7 mm beside it for every metre it is away from the origin.
+An autopilot converts latitude and longitude to metres by its own rule, not by the earth's true shape:
+ArduPilot with one scale for the whole earth, PX4 on a sphere. A position that is sent to an autopilot must
+be written by its rule, else the position error is up to 7 mm for every metre from the origin.
 """
 
 from __future__ import annotations
@@ -14,51 +14,51 @@ from dataclasses import dataclass
 from stopgo.mission.frames.transform import Point, SiteOrigin
 
 STEPS_PER_DEGREE = 10_000_000
-"""MAVLink and GNSS write places in steps of 1e-7 degrees."""
+"""MAVLink and GNSS write positions in steps of 1e-7 degrees."""
 
 ARDUPILOT_M_PER_DEGREE = 0.011131884502145034 * STEPS_PER_DEGREE
 PX4_RADIUS_M = 6_371_000.0
 WGS84_A = 6_378_137.0
 WGS84_E2 = 6.69437999014e-3
 REACH_M = 20_000.0
-"""Metres from the origin beyond which a site's plane is no map of the earth any more."""
+"""Metres from the origin beyond which a plane is no usable map of the earth."""
 _CLOSE = 1e-13
 """Degrees (0.01 µm) within which an inverse is exact."""
 
 
 @dataclass(frozen=True)
 class Geodetic:
-    """A place on the earth, degrees."""
+    """A position on the earth, degrees."""
 
     lat: float
     lon: float
 
 
 Rule = Callable[[SiteOrigin, float, float], Geodetic]
-"""The place so many metres east and north of the origin."""
+"""Returns the position so many metres east and north of the origin."""
 
 
 def from_steps(lat: int, lon: int) -> Geodetic:
-    """The place that is told in steps."""
+    """Return the position that is given in steps."""
     return Geodetic(lat=lat / STEPS_PER_DEGREE, lon=lon / STEPS_PER_DEGREE)
 
 
 def to_steps(place: Geodetic) -> tuple[int, int]:
-    """Latitude and longitude in steps."""
+    """Return latitude and longitude in steps."""
     return round(place.lat * STEPS_PER_DEGREE), round(place.lon * STEPS_PER_DEGREE)
 
 
 def to_geodetic(origin: SiteOrigin, point: Point, rule: str = "wgs84") -> Geodetic:
-    """The place of a point of the site's frame (metres), by one of `RULES`."""
+    """Return the position of a point of the site's frame (metres), by one of `RULES`."""
     east, north = _turned(point, math.radians(origin.heading_deg))
     return RULES[rule](origin, east, north)
 
 
 def from_geodetic(origin: SiteOrigin, place: Geodetic, rule: str = "wgs84") -> Point:
-    """The point of the site's frame at a place: the inverse of `to_geodetic`.
+    """Return the point of the site's frame at a position: the inverse of `to_geodetic`.
 
-    Found by steps that each shrink the error by some thousand times; a dozen are never needed within
-    a hundred kilometres of the origin.
+    Iterative; each step shrinks the error by some thousand times. A dozen are never needed within a hundred
+    kilometres of the origin.
     """
     east = north = 0.0
     for _ in range(12):
@@ -73,18 +73,18 @@ def from_geodetic(origin: SiteOrigin, place: Geodetic, rule: str = "wgs84") -> P
 
 
 def out_of_reach(point: Point) -> str:
-    """Why a point of the site has no latitude and longitude; empty if it has."""
+    """Return why a point of the site has no latitude and longitude; empty if it has."""
     away = math.hypot(*point)
     if away <= REACH_M:
         return ""
     return (
-        f"({point[0]:.0f}, {point[1]:.0f}) lies {away / 1000:.0f} km from the drawing's 0,0, and that is what"
-        " --origin places on the earth; move the drawing near its 0,0"
+        f"({point[0]:.0f}, {point[1]:.0f}) is {away / 1000:.0f} km from the drawing's 0,0, the position of"
+        " --origin; move the drawing near its 0,0"
     )
 
 
 def bearing_deg(origin: SiteOrigin, heading: float) -> float:
-    """A heading of the site (radians counter-clockwise from +x) as degrees clockwise from north, 0 to 360."""
+    """Return a site heading (radians counter-clockwise from +x) as degrees clockwise from north, 0 to 360."""
     return (origin.heading_deg + 90.0 - math.degrees(heading)) % 360.0
 
 
@@ -94,13 +94,13 @@ def heading_of(origin: SiteOrigin, bearing: float) -> float:
 
 
 def _turned(point: Point, angle: float) -> Point:
-    """Turned clockwise by `angle`: (x, y) of the site to (east, north) where +y bears `angle`."""
+    """Rotate clockwise by `angle`: (x, y) of the site to (east, north) where +y bears `angle`."""
     cos, sin = math.cos(angle), math.sin(angle)
     return cos * point[0] + sin * point[1], -sin * point[0] + cos * point[1]
 
 
 def _wgs84(origin: SiteOrigin, east: float, north: float) -> Geodetic:
-    """On the plane that touches the ellipsoid's parallel surface at the origin."""
+    """Position on the plane that touches the ellipsoid's parallel surface at the origin."""
     lat, lon = math.radians(origin.lat), math.radians(origin.lon)
     x0, y0, z0 = _ecef(lat, lon, origin.alt)
     x = x0 - math.sin(lon) * east - math.sin(lat) * math.cos(lon) * north
@@ -110,7 +110,7 @@ def _wgs84(origin: SiteOrigin, east: float, north: float) -> Geodetic:
 
 
 def _ecef(lat: float, lon: float, alt: float) -> tuple[float, float, float]:
-    """Earth-centred coordinates of a geodetic place (radians, metres above the ellipsoid)."""
+    """Earth-centred coordinates of a geodetic position (radians, metres above the ellipsoid)."""
     radius = WGS84_A / math.sqrt(1 - WGS84_E2 * math.sin(lat) ** 2)
     across = (radius + alt) * math.cos(lat)
     return (
@@ -157,4 +157,4 @@ def _wrapped(degrees: float) -> float:
 
 
 RULES: dict[str, Rule] = {"wgs84": _wgs84, "ardupilot": _ardupilot, "px4": _px4}
-"""How metres become degrees; maps and GIS want `wgs84`, each autopilot its own."""
+"""Rules from metres to degrees; maps and GIS use `wgs84`, each autopilot its own."""

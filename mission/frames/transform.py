@@ -1,4 +1,4 @@
-"""The frames of a site as mission.json holds them: its turn and shift to a map, and its origin on the Earth.
+"""Frames of a site as mission.json holds them: its transform to a map, and its origin on the Earth.
 
 Metres, radians counter-clockwise from +x; keys that end in `_deg` are degrees.
 """
@@ -11,7 +11,7 @@ Point = tuple[float, float]
 
 
 class Transform(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Site to map: turn by `heading`, then shift by (x, y)."""
+    """Transform from site to map: rotate by `heading`, then shift by (x, y)."""
 
     x: float
     y: float

@@ -1,4 +1,4 @@
-"""A mission as MAVLink mission items: what each autopilot keeps of them, and the way there and back.
+"""A mission as MAVLink mission items: the conversion in both directions, and the fields each autopilot keeps.
 
 Numbers of commands and frames are those of the MAVLink common dialect; nothing here opens a link.
 """

@@ -1,7 +1,7 @@
-"""What a vehicle's camera tells of a scan: CAMERA_IMAGE_CAPTURED, whose file_url says what was written.
+"""Camera reports of scans: CAMERA_IMAGE_CAPTURED, whose file_url describes the written file.
 
-The file_url is `NAME.e57?size=N&points=N&sha256=HEX`; `capture_result` is 1 for a scan that was made. What
-lacks a piece is no confirmation.
+The file_url is `NAME.e57?size=N&points=N&sha256=HEX`; `capture_result` is 1 for a completed scan. A file_url
+without one of these fields is no confirmation.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from stopgo.mission.frames.geodesy import heading_of
 from stopgo.mission.mavlink.items import ItemList
 from stopgo.mission.mavlink.read_back import point_at
 from stopgo.mission.run.events import Pose
-from stopgo.mission.run.scans import ScanFailed, ScanResult, missing_in
+from stopgo.mission.run.scans import ScanFailed, ScanResult, missing_fields
 from stopgo.mission.run.tolerance import deviation, is_outside
 
 NEAR_M = 0.5
-"""What is told from farther away is of another stop."""
+"""A report from farther away belongs to another stop."""
 STEPS_M = 0.02
-"""Two steps of 1e-7 degrees, in which the camera tells where it was."""
+"""Two steps of 1e-7 degrees, the resolution of the camera's position."""
 _NUMBER = re.compile(r"[1-9][0-9]{0,14}")
 
 Picture = tuple[int, int]
-"""The picture's number and the vehicle's time (ms since it was started); the same however often told."""
+"""The picture's number and the vehicle's time (ms since boot); the same in every repeated report."""
 
 
 class CaptureMessage(Protocol):
@@ -49,18 +49,18 @@ class Capture:
 
     name: Picture
     pose: Pose | None
-    """Where the vehicle was; `None` if it does not say."""
+    """Pose of the vehicle; `None` if it is not reported."""
     result: ScanResult | ScanFailed
 
-    def at(self, stop: Stop) -> bool:
-        """Whether it is of this stop; one that does not say where it is from may be."""
+    def may_be_of(self, stop: Stop) -> bool:
+        """True if it may be of this stop; a report without a position may be of any."""
         if self.pose is None:
             return True
         within_m = NEAR_M if isinstance(self.result, ScanFailed) else stop.tolerance_m + STEPS_M
         return not is_outside(deviation(self.pose, stop), within_m)
 
-    def beside(self, at: int, stops: Sequence[Stop]) -> bool:
-        """Whether it was made near this stop, and no nearer to the one before or after."""
+    def is_nearest(self, at: int, stops: Sequence[Stop]) -> bool:
+        """True if it was made near this stop, and no nearer to the one before or after."""
         if self.pose is None:
             return False
         own, around = deviation(self.pose, stops[at]), stops[max(0, at - 1) : at + 2]
@@ -68,38 +68,38 @@ class Capture:
 
 
 def capture_of(message: CaptureMessage, sent: ItemList | None) -> Capture:
-    """What the message tells of a scan, placed in the site whose items were sent."""
+    """Return the message's scan report, in the frame of the site whose items were sent."""
     return Capture(picture_of(message), _pose(message, sent), result_of(message))
 
 
 def picture_of(message: CaptureMessage) -> Picture:
-    """What tells a picture from others; cameras that were started again count anew."""
+    """Return the picture's identity; a camera that restarts counts from the beginning."""
     return int(message.image_index), int(message.time_boot_ms)
 
 
 def result_of(message: CaptureMessage) -> ScanResult | ScanFailed:
-    """What the message says of the scan."""
+    """Return the message's scan outcome."""
     if message.capture_result != 1:
         return ScanFailed(reason="the vehicle reports that the scan failed")
     return read_file_url(message.file_url)
 
 
 def read_file_url(url: str) -> ScanResult | ScanFailed:
-    """The file that `NAME.e57?size=N&points=N&sha256=HEX` tells of."""
+    """Return the file of a `NAME.e57?size=N&points=N&sha256=HEX`."""
     name, _, query = url.partition("?")
-    told = dict(parse_qsl(query))
+    values = dict(parse_qsl(query))
     scan = ScanResult(
         file=name if name.removesuffix(".e57") not in ("", name) else "",
-        size=_count(told.get("size", "")),
-        points=_count(told.get("points", "")),
-        sha256=told.get("sha256", "").lower(),
+        size=_count(values.get("size", "")),
+        points=_count(values.get("points", "")),
+        sha256=values.get("sha256", "").lower(),
     )
-    missing = missing_in(scan)
-    return ScanFailed(reason=f"the vehicle told {url!r}, without {', '.join(missing)}") if missing else scan
+    missing = missing_fields(scan)
+    return ScanFailed(reason=f"the vehicle sent {url!r}, without {', '.join(missing)}") if missing else scan
 
 
 def _count(text: str) -> int:
-    """0 for what is no number, which no result has."""
+    """Return 0 for text that is no number; no scan result has a 0."""
     return int(text) if _NUMBER.fullmatch(text) else 0
 
 

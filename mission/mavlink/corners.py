@@ -1,8 +1,8 @@
-"""Which points of a leg must be driven through: the fewest that keep the robot near it.
+"""Waypoints of a leg: the fewest points that keep the robot near it.
 
-A planned leg goes round a corner in an arc of many short pieces. At each waypoint a vehicle may stop, and it
-holds only so many, so an arc is replaced by few corners that lie a little outside it, joined by lines that
-pass a little inside: the way that leaves the leg by no more than allowed with the fewest corners.
+A planned leg goes round a corner in an arc of many short segments. A vehicle may stop at each waypoint, and
+it stores only a limited number. So a few corners a little outside the arc replace it, and the lines between
+them pass a little inside. The chosen path stays within the allowance with the fewest corners.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from stopgo.mission.document import Point
 from stopgo.mission.run.route_position import foot
 
 THIN = 0.05
-"""Share of the allowance that is spent on leaving out points of nearly straight pieces, for speed."""
+"""Fraction of the allowance that is used to leave out points of nearly straight stretches, for speed."""
 OFFSETS = (0.5, 1.0)
-"""How far outside an arc a corner may be put, in shares of the rest."""
+"""Distances of a corner outside an arc, as fractions of the rest."""
 
 
 @dataclass(frozen=True)
 class _Corner:
-    """Where a corner may be."""
+    """A possible corner."""
 
     at: Point
     along: float
-    """Its place on the leg: the number of a point, or half a number more for the middle of a piece."""
+    """Position on the leg: the number of a point, or half a number more for the middle of a segment."""
     off: float
-    """Metres from that place."""
+    """Metres from that position."""
 
 
 def corners(leg: Sequence[Point], *, within: float) -> tuple[Point, ...]:
-    """The leg's ends, and between them the fewest points whose joining lines stay within `within` of it.
+    """Return the leg's ends, and between them the fewest points whose lines stay within `within` of it.
 
-    No straight line between them runs farther than `within` metres from the leg, nor the leg from them, so
-    no corner is cut by more.
+    No straight line between them is farther than `within` metres from the leg, nor the leg from them, so
+    that no corner is cut by more.
     """
     if len(leg) < 3:
         return tuple(leg)
@@ -45,7 +45,7 @@ def corners(leg: Sequence[Point], *, within: float) -> tuple[Point, ...]:
 
 
 def _thinned(leg: Sequence[Point], within: float) -> list[Point]:
-    """The leg without the points that lie on the line between those that stay."""
+    """Return the leg without the points on the line between those that stay."""
     kept, at = [leg[0]], 0
     while at < len(leg) - 1:
         end = at + 1
@@ -57,7 +57,7 @@ def _thinned(leg: Sequence[Point], within: float) -> list[Point]:
 
 
 def _spots(leg: Sequence[Point], within: float) -> Iterator[_Corner]:
-    """The leg's points, places outside its corners, and places beside the middles of its inner pieces."""
+    """Yield the leg's points, points outside its corners, and points beside the middles of inner segments."""
     yield _Corner(leg[0], 0.0, 0.0)
     for k in range(1, len(leg) - 1):
         before, here, after = leg[k - 1 : k + 2]
@@ -80,7 +80,7 @@ def _beside(place: Point, towards: Point, along: float, within: float) -> Iterat
 
 
 def _fewest(leg: Sequence[Point], spots: Sequence[_Corner], within: float) -> tuple[Point, ...]:
-    """The shortest chain of spots from end to end; of several, the one nearest to the leg."""
+    """Return the shortest chain of spots from end to end; of several, the one nearest to the leg."""
     best = [(0, 0.0), *[(len(spots), 0.0)] * (len(spots) - 1)]
     before = [0] * len(spots)
     for i in range(len(spots)):
@@ -97,9 +97,9 @@ def _fewest(leg: Sequence[Point], spots: Sequence[_Corner], within: float) -> tu
 def _straight_on(
     leg: Sequence[Point], spots: Sequence[_Corner], start: int, within: float
 ) -> Iterator[tuple[int, float]]:
-    """The spots that can be driven to straight from one, and how far that leaves the leg.
+    """Yield the spots that can be reached on a straight line from one, and their distance from the leg.
 
-    Looks no farther than one piece of the leg beyond the last that can be.
+    The search ends one segment of the leg beyond the last such spot.
     """
     here = last = spots[start]
     for j in range(start + 1, len(spots)):
@@ -113,11 +113,11 @@ def _straight_on(
 
 
 def _away(points: Sequence[Point], a: Point, b: Point) -> float:
-    """Metres by which the farthest of some points lies from the segment from `a` to `b`."""
+    """Return the distance in metres of the farthest of some points from the segment from `a` to `b`."""
     return max((math.dist(point, foot(a, b, point)) for point in points), default=0.0)
 
 
 def _direction(a: Point, b: Point) -> Point:
-    """Unit vector from one point to another; zero if they are the same."""
+    """Return the unit vector from one point to another; zero if they are the same."""
     length = math.dist(a, b)
     return ((b[0] - a[0]) / length, (b[1] - a[1]) / length) if length > 0 else (0.0, 0.0)

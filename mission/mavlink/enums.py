@@ -1,4 +1,4 @@
-"""The numbers of MAVLink's enumerations that are used here, from the common dialect and ArduPilot's."""
+"""Numbers of MAVLink's enumerations that are used here, from the common dialect and ArduPilot's."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ModeFlag(IntFlag):
 
 
 class SystemState(IntEnum):
-    """MAV_STATE, as far as it is looked at."""
+    """MAV_STATE, the values used here."""
 
     STANDBY = 3
     ACTIVE = 4
@@ -44,7 +44,7 @@ class SystemState(IntEnum):
 
 
 class MissionResult(IntEnum):
-    """MAV_MISSION_RESULT: how a message of the mission protocol is answered."""
+    """MAV_MISSION_RESULT: the answer to a message of the mission protocol."""
 
     ACCEPTED = 0
     ERROR = 1
@@ -65,7 +65,7 @@ class MissionResult(IntEnum):
 
 
 class CommandResult(IntEnum):
-    """MAV_RESULT: how a command is answered."""
+    """MAV_RESULT: the answer to a command."""
 
     ACCEPTED = 0
     TEMPORARILY_REJECTED = 1
@@ -77,7 +77,7 @@ class CommandResult(IntEnum):
 
 
 class MissionState(IntEnum):
-    """MISSION_STATE, as MISSION_CURRENT tells it."""
+    """MISSION_STATE, as in MISSION_CURRENT."""
 
     UNKNOWN = 0
     NO_MISSION = 1
@@ -98,7 +98,7 @@ class Component(IntEnum):
 
 
 class MessageId(IntEnum):
-    """Numbers of messages that are asked for."""
+    """Numbers of requested messages."""
 
     HEARTBEAT = 0
     SYS_STATUS = 1

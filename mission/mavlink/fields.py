@@ -1,4 +1,4 @@
-"""Numbers as the fields of items hold them: on the wire, where each is a float32, and on a vehicle."""
+"""Numbers as the fields of items hold them: as float32 on the link, and as stored on a vehicle."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ Field = Callable[[float], float]
 
 
 def as_sent(item: Item) -> Item:
-    """The item as it arrives: real numbers rounded to float32."""
+    """Return the item as it arrives: real numbers rounded to float32."""
     one, two, three, four = (float32(param) for param in item.params)
     return replace(item, params=(one, two, three, four), z=float32(item.z))
 
 
 def float32(value: float) -> float:
-    """The nearest number a float32 holds; beyond its range, infinity."""
+    """Return the nearest number a float32 holds; beyond its range, infinity."""
     try:
         return float(struct.unpack("<f", struct.pack("<f", value))[0])
     except OverflowError:
@@ -42,12 +42,12 @@ def dropped(_: float) -> float:
 
 
 def whole(value: float) -> float:
-    """Towards zero, as a C cast does; what is no number stays, for the vehicle refuses it."""
+    """Truncate towards zero, as a C cast does; NaN and infinity stay, because the vehicle refuses them."""
     return float(int(value)) if math.isfinite(value) else value
 
 
 def uint16(value: float) -> float:
-    """2.9 becomes 2 and 100 000 becomes 34 464."""
+    """Truncate to 16 bits: 2.9 becomes 2 and 100 000 becomes 34 464."""
     return float(int(value) & 0xFFFF) if math.isfinite(value) else value
 
 
@@ -64,7 +64,7 @@ def int16(value: int) -> int:
 
 
 def centimetres(metres: float) -> float:
-    """Truncated to whole centimetres, in float32 (metres × 100, then × 0.01)."""
+    """Truncate to whole centimetres, in float32 (metres × 100, then × 0.01)."""
     if not math.isfinite(float32(metres * 100.0)):
         return metres
     return float32(int(float32(metres * 100.0)) * float32(0.01))

@@ -1,4 +1,4 @@
-"""One MAVLink mission item, and the list of them that a vehicle holds."""
+"""One MAVLink mission item, and the item list of a vehicle."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 from stopgo.mission.frames.transform import SiteOrigin
 
 ItemRole = Literal["home", "speed", "corner", "stop", "settle", "trigger", "scan", "return", "other"]
-"""What an item does in a mission of scan stops."""
+"""Role of an item in a mission of scan stops."""
 
 NAN = float("nan")
 
@@ -109,10 +109,10 @@ class MavFrame:
 
 @dataclass(frozen=True)
 class Item:
-    """The fields of MISSION_ITEM_INT that say what to do.
+    """The fields of MISSION_ITEM_INT that describe the command.
 
-    `x` and `y` are latitude and longitude in steps of 1e-7 degrees where the command has a place, else
-    plain numbers; `params` are param1 to param4; NaN in them means "not said".
+    `x` and `y` are latitude and longitude in steps of 1e-7 degrees if the command has a position, else
+    plain numbers; `params` are param1 to param4; NaN in them means "not given".
     """
 
     command: int
@@ -125,13 +125,13 @@ class Item:
 
     @property
     def name(self) -> str:
-        """As people call the command: "NAV_DELAY (93)"."""
+        """Name and number of the command: "NAV_DELAY (93)"."""
         return f"{NAMES.get(self.command, 'command')} ({self.command})"
 
 
 @dataclass(frozen=True)
 class Placed:
-    """An item and what it is for."""
+    """An item and its role."""
 
     item: Item
     role: ItemRole
@@ -141,7 +141,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class ItemList:
-    """What is sent to one autopilot: its items in order, without home.
+    """Items for one autopilot in order, without home.
 
     ArduPilot's item 0 is home, which the uploader puts in front: there item `i` has sequence number
     `i + 1`, elsewhere `i`.
@@ -151,7 +151,7 @@ class ItemList:
     origin: SiteOrigin
     placed: tuple[Placed, ...]
     notes: tuple[str, ...] = ()
-    """What the mission asks for and an autopilot cannot do by itself, a line each."""
+    """Parts of the mission that an autopilot does not execute itself, a line each."""
 
     @property
     def items(self) -> tuple[Item, ...]:

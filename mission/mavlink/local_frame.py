@@ -1,4 +1,4 @@
-"""An autopilot's local metres, north and east of its origin, and the site's frame."""
+"""Transform between an autopilot's local metres, north and east of its origin, and the site's frame."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.run.events import Pose
 
 SAME_M = 0.05
-"""Origins that are no farther apart are the same: each is written in steps of a centimetre."""
+"""Largest distance of two equal origins: each is written in steps of a centimetre."""
 FAR_DEG = 0.01
-"""Beyond this (a kilometre) two origins are not of one site, and no metres are worth counting."""
+"""Beyond this (a kilometre) two origins belong to different sites, and no distance is computed."""
 
 
 @dataclass(frozen=True)
 class VehicleOrigin:
-    """What a vehicle's local metres count from, degrees and metres above the sea."""
+    """Origin of a vehicle's local metres, degrees and metres above the sea."""
 
     lat: float
     lon: float
@@ -31,13 +31,13 @@ class VehicleOrigin:
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """Where an autopilot's origin lies in the site, and which way the site's +y axis bears."""
+    """Position of an autopilot's origin in the site, and bearing of the site's +y axis."""
 
     site: SiteOrigin
     origin: Point = (0.0, 0.0)
 
     def pose(self, north: float, east: float, yaw: float) -> Pose:
-        """A place and a yaw (radians clockwise from north) as a pose of the site."""
+        """Return the pose in the site of a position and a yaw (radians clockwise from north)."""
         bearing = math.radians(self.site.heading_deg)
         cos, sin = math.cos(bearing), math.sin(bearing)
         return Pose(
@@ -47,14 +47,14 @@ class LocalFrame:
         )
 
     def north_east(self, point: Point) -> Point:
-        """A point of the site as metres north and east of the autopilot's origin."""
+        """Return a point of the site as metres north and east of the autopilot's origin."""
         bearing = math.radians(self.site.heading_deg)
         cos, sin = math.cos(bearing), math.sin(bearing)
         dx, dy = point[0] - self.origin[0], point[1] - self.origin[1]
         return (-sin * dx + cos * dy, cos * dx + sin * dy)
 
     def yaw(self, heading: float) -> float:
-        """A heading of the site as radians clockwise from north, within ±π."""
+        """Return a heading of the site as radians clockwise from north, within ±π."""
         return math.remainder(math.radians(bearing_deg(self.site, heading)), math.tau)
 
 
@@ -63,28 +63,28 @@ UNPLACED = LocalFrame(SiteOrigin(lat=0.0, lon=0.0, alt=0.0, heading_deg=0.0))
 
 
 def local_frame(site: SiteOrigin, origin: VehicleOrigin, rule: str) -> LocalFrame:
-    """The autopilot's frame in the site's; the origins must be near one another (`apart`)."""
+    """Return the autopilot's frame in the site's; the origins must be near one another (`apart`)."""
     return LocalFrame(site, from_geodetic(site, origin.place, rule))
 
 
 def apart(site: SiteOrigin, origin: VehicleOrigin) -> str:
-    """Why an autopilot that counts from `origin` cannot drive in `site`; empty if it can."""
-    away = how_far_off(site, origin.place)
+    """Return why an autopilot with this `origin` cannot drive in `site`; empty if it can."""
+    away = origin_distance(site, origin.place)
     return away and (
-        f"the autopilot's origin ({origin.lat:.7f}, {origin.lon:.7f}) lies {away} from the mission's"
+        f"the autopilot's origin ({origin.lat:.7f}, {origin.lon:.7f}) is {away} from the mission's"
         f" ({site.lat:.7f}, {site.lon:.7f}); set the same one (most take one per boot), or plan with that"
     )
 
 
-def how_far_off(site: SiteOrigin, origin: Geodetic) -> str:
-    """How far from the site's origin an autopilot's lies, as in "0.08 m"; empty if they are the same."""
-    if is_elsewhere(site, origin):
+def origin_distance(site: SiteOrigin, origin: Geodetic) -> str:
+    """Return the distance of an autopilot's origin from the site's, as "0.08 m"; empty if equal."""
+    if is_other_site(site, origin):
         return "more than a kilometre"
     metres = math.hypot(*from_geodetic(site, origin))
     return "" if metres <= SAME_M else f"{metres:.2f} m"
 
 
-def is_elsewhere(site: SiteOrigin, origin: Geodetic) -> bool:
-    """Whether an autopilot's origin is of another site altogether."""
+def is_other_site(site: SiteOrigin, origin: Geodetic) -> bool:
+    """Return True if an autopilot's origin belongs to another site."""
     d_lat, d_lon = origin.lat - site.lat, math.remainder(origin.lon - site.lon, 360.0)
     return max(abs(d_lat), abs(d_lon)) > FAR_DEG

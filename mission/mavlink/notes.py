@@ -1,4 +1,4 @@
-"""What a mission asks for that no autopilot does by itself: the station that follows the run must."""
+"""Parts of a mission that no autopilot executes itself: the station that follows the run must."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from stopgo.mission.run.scans import needs_heading
 
 
 def notes_of(mission: Mission, options: TranslationOptions) -> tuple[str, ...]:
-    """A line for each thing that is not carried by the items."""
+    """Return a line for each part that the items do not carry."""
     return (*_failures(mission), *_arrival(mission, options), *_policy(mission))
 
 
@@ -42,5 +42,5 @@ def _policy(mission: Mission) -> Iterator[str]:
 
 
 def _some(ids: list[str]) -> str:
-    """As in "stop S1", or "stops S1 to S9 (9)"."""
+    """Format stop ids, as in "stop S1", or "stops S1 to S9 (9)"."""
     return f"stop {ids[0]}" if len(ids) == 1 else f"stops {ids[0]} to {ids[-1]} ({len(ids)})"

@@ -1,4 +1,4 @@
-"""A list of items on a vehicle: how it goes there, and whether what was read back is what it should be."""
+"""An item list on a vehicle: its upload, and the comparison of the items read back with the sent ones."""
 
 from __future__ import annotations
 
@@ -17,40 +17,40 @@ CLOSE = 1e-6
 
 
 NO_PLACE = (MavFrame.MISSION, MavFrame.GLOBAL)
-"""In which of these frames an item without a place is given back is up to the release, and means nothing.
+"""Frames in which a release returns an item without a position; the choice between them means nothing.
 
 Measured: MISSION by ArduPilot Rover 4.7-dev, GLOBAL by 4.8-dev.
 """
 
 
 def point_at(sent: ItemList, lat: int, lon: int) -> Point:
-    """The point of the site that the vehicle of a list means by a place in steps of 1e-7 degrees."""
+    """Return the point of the site for the vehicle's position in steps of 1e-7 degrees."""
     return from_geodetic(sent.origin, from_steps(lat, lon), autopilot_named(sent.autopilot).rule)
 
 
 def home_item(origin: SiteOrigin) -> Item:
-    """The item that stands for home: the site's origin, above the sea."""
+    """Return the home item: the site's origin, with its altitude above the sea."""
     lat, lon = to_steps(Geodetic(lat=origin.lat, lon=origin.lon))
     return Item(Command.NAV_WAYPOINT, MavFrame.GLOBAL_INT, x=lat, y=lon, z=origin.alt)
 
 
 def upload_of(sent: ItemList) -> tuple[Item, ...]:
-    """The items as they go over the wire, numbered from 0: with home in front where the vehicle wants it."""
+    """Return the items as sent, numbered from 0, with home in front if the vehicle requires it."""
     home = (home_item(sent.origin),) if autopilot_named(sent.autopilot).home_first else ()
     return (*home, *sent.items)
 
 
 def placed_at(sent: ItemList, sequence: int) -> Placed | None:
-    """The item with a sequence number on the vehicle, as MISSION_CURRENT tells it; None for home."""
+    """Return the item with a sequence number on the vehicle, as in MISSION_CURRENT; None for home."""
     index = autopilot_named(sent.autopilot).index(sequence)
     return sent.placed[index] if 0 <= index < len(sent.placed) else None
 
 
 def differences(sent: ItemList, read: Sequence[Item], autopilot: Autopilot | None = None) -> tuple[str, ...]:
-    """How what a vehicle holds differs from what it should hold, a line each; empty when it does not.
+    """Return the differences between a vehicle's items and the expected ones, a line each; empty if none.
 
-    `read` is all that the vehicle gave, its home included; homes are not compared. Each field is compared
-    with what the autopilot (that of the list, unless another is given) keeps of it.
+    `read` holds all items of the vehicle, with its home; homes are not compared. Each field is compared with
+    the value that the autopilot (that of the list, unless another is given) keeps of it.
     """
     vehicle = autopilot or autopilot_named(sent.autopilot)
     own = list(read[1:] if vehicle.home_first else read)
@@ -72,7 +72,7 @@ def _item_differences(vehicle: Autopilot, sequence: int, placed: Placed, read: I
         if not _equal(value, predicted[field]):
             yield (
                 f"item {sequence} ({what}): {field} sent {sent[field]:.10g}, "
-                f"should be kept as {predicted[field]:.10g}, is {value:.10g}"
+                f"expected back {predicted[field]:.10g}, is {value:.10g}"
             )
 
 

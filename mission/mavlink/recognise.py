@@ -1,7 +1,7 @@
-"""Items -> what they mean for scanning, for lists that come from a vehicle or from someone else's file.
+"""Roles of items, for lists that come from a vehicle or from a third-party file.
 
-A list is read waypoint by waypoint: what follows one, up to the next, is done there. Waypoints at which
-something is waited for or triggered are stops, those between are corners of the way.
+A list is read waypoint by waypoint: the items after a waypoint, up to the next, are executed there. Waypoints
+with a wait or a trigger are stops, those between are corners of the route.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from stopgo.mission.mavlink.items import Command, Item, ItemRole, MavFrame, Plac
 from stopgo.mission.mavlink.stop_numbers import stop_numbered
 
 PLACES = frozenset({Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME})
-"""Commands that say where to drive, param1 being seconds to stay."""
+"""Commands with a position to drive to; param1 is the seconds to stay."""
 WAITS = frozenset({Command.NAV_DELAY, Command.NAV_SCRIPT_TIME})
 TRIGGERS = frozenset(
     {Command.DO_SEND_SCRIPT_MESSAGE, Command.IMAGE_START_CAPTURE, Command.DO_DIGICAM_CONTROL}
@@ -30,7 +30,7 @@ GLOBAL_FRAMES = frozenset({
 
 @dataclass(frozen=True)
 class _Group:
-    """A waypoint and what is done there; the first group of a list may have no waypoint."""
+    """A waypoint and the actions there; the first group of a list may have no waypoint."""
 
     index: int
     items: tuple[Item, ...]
@@ -45,26 +45,26 @@ class _Group:
 
     @property
     def trigger(self) -> int | None:
-        """Place of the trigger within the group."""
+        """Index of the trigger within the group."""
         return next((i for i, item in enumerate(self.items) if item.command in TRIGGERS), None)
 
 
 def recognise(
     items: Sequence[Item], *, mission: Mission | None = None, first: int = 1, plain_stops: bool = False
 ) -> tuple[Placed, ...]:
-    """What each item is for.
+    """Return each item with its role.
 
-    Where no item waits or triggers, waypoints with a hold are the stops; where none has a hold either,
-    all are if `plain_stops`.
+    If no item waits or triggers, waypoints with a hold are the stops; if none has a hold either, all are
+    if `plain_stops`.
 
     Parameters
     ----------
     items
         In order, without home.
     mission
-        Whose stops the triggers' numbers mean; without it a stop's id is its number, or its place from 1.
+        Owner of the triggers' numbers; without it a stop's id is its number, or its index from 1.
     first
-        Number by which errors call the first item.
+        Number of the first item in error messages.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def recognise(
         _check_group(group, first)
     stops = _stops_among(groups, plain_stops)
     if not stops:
-        raise InputError("no item waits, triggers or holds: nothing says which waypoints are scan stops")
+        raise InputError("no item waits, triggers or holds: the scan stops among the waypoints are unknown")
     ids = dict(zip(stops, _ids([groups[at] for at in stops], mission), strict=True))
     placed: list[Placed] = []
     for at, group in enumerate(groups):
@@ -89,18 +89,18 @@ def recognise(
 
 
 def stops_of(items: Sequence[Item], mission: Mission) -> tuple[str | None, ...]:
-    """For each item (without home) the id of the mission's stop that it belongs to or leads to."""
+    """Return for each item (without home) the id of the mission's stop that it belongs to or leads to."""
     return tuple(one.stop for one in recognise(items, mission=mission))
 
 
 def stop_of_trigger(item: Item, mission: Mission) -> str | None:
-    """Id of the stop whose number a trigger, or a wait for a script, carries."""
+    """Return the id of the stop whose number a trigger, or a wait for a script, carries."""
     number = number_carried(item)
     return None if number is None else stop_numbered(mission, number)
 
 
 def number_carried(item: Item) -> int | None:
-    """The stop's number that an item carries; None if it carries none."""
+    """Return the stop's number that an item carries; None if it carries none."""
     carried = {
         Command.DO_SEND_SCRIPT_MESSAGE: item.params[1],
         Command.IMAGE_START_CAPTURE: item.params[3],
@@ -120,7 +120,7 @@ def _check_item(item: Item, number: int) -> None:
     if item.frame not in GLOBAL_FRAMES:
         raise InputError(f"item {number}: {item.name} is in frame {item.frame}; give latitude and longitude")
     if (item.x, item.y) == (0, 0):
-        raise InputError(f"item {number}: {item.name} is at 0, 0, which means no place; give a place")
+        raise InputError(f"item {number}: {item.name} is at 0, 0, which is no position; give a position")
 
 
 def _groups(items: Sequence[Item]) -> list[_Group]:
@@ -132,7 +132,7 @@ def _groups(items: Sequence[Item]) -> list[_Group]:
 
 def _check_group(group: _Group, first: int) -> None:
     if group.place is None and group.acts:
-        raise InputError(f"item {first}: waits or triggers come before the first waypoint: at no place")
+        raise InputError(f"item {first}: waits or triggers come before the first waypoint; add a waypoint")
     triggers = [group.index + i for i, item in enumerate(group.items) if item.command in TRIGGERS]
     if len(triggers) > 1:
         raise InputError(
@@ -142,7 +142,7 @@ def _check_group(group: _Group, first: int) -> None:
 
 
 def _stops_among(groups: Sequence[_Group], plain_stops: bool) -> list[int]:
-    """Places among the groups of those that are stops."""
+    """Return the indices of the groups that are stops."""
     acting = [at for at, group in enumerate(groups) if group.acts]
     places = [(at, group.place) for at, group in enumerate(groups) if group.place is not None]
     holding = [at for at, place in places if place.params[0] > 0]
@@ -150,7 +150,7 @@ def _stops_among(groups: Sequence[_Group], plain_stops: bool) -> list[int]:
 
 
 def _ids(groups: Sequence[_Group], mission: Mission | None) -> list[str]:
-    """An id for each stop: by its number where all have one of their own, else by its place."""
+    """Return an id for each stop: its number if all have different ones, else its index."""
     numbers = [_group_number(group) for group in groups]
     known = [number for number in numbers if number is not None]
     if len(set(known)) != len(groups):
@@ -179,7 +179,7 @@ def _placed(group: _Group, *, here: bool, stop: str | None) -> Iterator[Placed]:
 
 
 def _settles(group: _Group, at: int) -> bool:
-    """Whether a wait comes before the scan: before the trigger, or, without one, before another wait."""
+    """Return True for a wait before the scan: before the trigger, or, without one, before another wait."""
     if group.trigger is not None:
         return at < group.trigger
     return any(item.command in WAITS for item in group.items[at + 1 :])

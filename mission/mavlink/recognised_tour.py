@@ -1,4 +1,4 @@
-"""Recognised items -> a way past scan stops in the site's frame, in metres and seconds."""
+"""Recognised items -> a route past scan stops in the site's frame, in metres and seconds."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from stopgo.mission.mavlink.items import Command, Item, Placed
 from stopgo.mission.mavlink.recognise import number_carried
 
 FAR_M = 100_000.0
-"""Metres from a site's origin beyond which a place belongs to another site."""
+"""Metres from a site's origin beyond which a position belongs to another site."""
 
 
 @dataclass(frozen=True)
 class RecognisedStop:
-    """A scan stop as items tell it."""
+    """A scan stop as the items describe it."""
 
     at: Point
     """Metres in the site's frame."""
     heading: float | None
-    """Radians counter-clockwise from +x; None: not said, or dropped."""
+    """Radians counter-clockwise from +x; None if not given, or dropped."""
     settle_s: float
     scan_s: float | None
-    """None: not said, or until a script says that the scan is done."""
+    """None if not given, or if a script ends the scan."""
     number: int | None
-    """The number that its trigger carries; None if it carries none, or the same as another's."""
+    """Number that its trigger carries; None if it carries none, or the same as another's."""
     through: tuple[Point, ...]
-    """Corners on the way there from the stop before."""
+    """Corners of the leg from the previous stop."""
     index: int
-    """Place of its waypoint in the list."""
+    """Index of its waypoint in the list."""
 
 
 @dataclass(frozen=True)
 class RecognisedTour:
-    """A way past scan stops as items tell it."""
+    """A route past scan stops as the items describe it."""
 
     visits: tuple[RecognisedStop, ...]
     back: tuple[Point, ...]
@@ -52,14 +52,14 @@ class RecognisedTour:
 def recognised_tour(
     placed: Sequence[Placed], origin: SiteOrigin, autopilot: str = "ardupilot", *, first: int = 1
 ) -> RecognisedTour:
-    """The stops and the way in the site's frame, of items that `recognise` or `translate` placed.
+    """Return the stops and the route in the site's frame, of items from `recognise` or `translate`.
 
-    `first` is the number by which errors call the first item.
+    `first` is the number of the first item in error messages.
 
     Raises
     ------
     InputError
-        If a place is too far from the origin to be of this site.
+        If a position is too far from the origin to be of this site.
     """
     vehicle = autopilot_named(autopilot)
     numbers = _distinct_numbers(placed)
@@ -81,15 +81,15 @@ def recognised_tour(
 
 
 def _heading(item: Item, origin: SiteOrigin, vehicle: Autopilot) -> float | None:
-    """Radians; None of a vehicle that drops it and gives back 0."""
+    """Return radians; None of a vehicle that drops it and reads back 0."""
     yaw = item.params[3]
     return heading_of(origin, yaw) if vehicle.keeps_arrival and math.isfinite(yaw) else None
 
 
 def _times(placed: Sequence[Placed], index: int) -> tuple[float, float | None]:
-    """Seconds of settling and of scanning.
+    """Return the seconds of settling and of scanning.
 
-    A hold is settling where no other wait is, and the scan where nothing else is done at all.
+    A hold is settling if there is no other wait, and the scan if there is no other action.
     """
     hold = placed[index].item.params[0]
     done = [one for one in _after(placed, index) if one.role != "speed"]
@@ -103,7 +103,7 @@ def _times(placed: Sequence[Placed], index: int) -> tuple[float, float | None]:
 
 
 def _after(placed: Sequence[Placed], index: int) -> Iterator[Placed]:
-    """What is done at the waypoint at `index`."""
+    """Yield the items executed at the waypoint at `index`."""
     for one in placed[index + 1 :]:
         if one.role in ("stop", "corner", "return"):
             return
@@ -111,7 +111,7 @@ def _after(placed: Sequence[Placed], index: int) -> Iterator[Placed]:
 
 
 def _distinct_numbers(placed: Sequence[Placed]) -> dict[int, int]:
-    """The number of each stop, by its place among the stops; none if two have the same."""
+    """Return the number of each stop, by its index among the stops; empty if two have the same."""
     numbers: dict[int, int] = {}
     stop = -1
     for one in placed:

@@ -1,4 +1,4 @@
-"""Why a mission is not sent: it makes no sense as items, or it needs what the vehicle would drop."""
+"""Reasons not to send a mission: it is implausible as items, or it needs values that the vehicle drops."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ LATITUDE_LIMIT = 89.0
 
 
 def origin_of(mission: Mission) -> SiteOrigin:
-    """Where on earth the mission's site is."""
+    """Return the site's origin on the earth."""
     if mission.georeference is None:
         raise InputError(
-            f"{mission.name}: no georeference, and autopilots know only degrees; "
+            f"{mission.name}: no georeference; autopilots use only degrees; "
             "plan again with --origin LAT,LON,ALT,HEADING"
         )
     return mission.georeference
 
 
 def check(mission: Mission, numbers: tuple[int, ...], options: TranslationOptions) -> None:
-    """Refuses what cannot be written as items so that the vehicle does what the mission says."""
-    _check_manner(options)
+    """Refuse a mission that the vehicle would not execute as written."""
+    _check_options(options)
     _check_origin(mission, options.origin)
     for problem in problems_of(mission):
         raise InputError(f"{mission.name}: {problem}; correct the mission or plan it again")
@@ -46,7 +46,7 @@ def check(mission: Mission, numbers: tuple[int, ...], options: TranslationOption
 
 
 def check_fields(mission: Mission, placed: Sequence[Placed]) -> None:
-    """Refuses numbers that a float32 on the wire does not hold; NaN is meant where it stands."""
+    """Refuse numbers that a float32 on the link does not hold; NaN is allowed where it is intended."""
     for one in placed:
         for number, (value, sent) in enumerate(
             zip(one.item.params, as_sent(one.item).params, strict=True), start=1
@@ -60,20 +60,20 @@ def check_fields(mission: Mission, placed: Sequence[Placed]) -> None:
 
 
 def check_count(mission: Mission, placed: Sequence[Placed], vehicle: Autopilot, most: int) -> None:
-    """Refuses more items than the vehicle holds, home included where it holds that too."""
+    """Refuse more items than the vehicle holds, with home if it holds that too."""
     count = vehicle.sequence(len(placed))
     if count <= most:
         return
     least = count - sum(one.role == "settle" for one in placed)
     enough = "which is enough" if least <= most else "which is not enough"
-    by_hold = f"--settle hold makes it {least}, {enough}; or " if least < count else ""
+    with_hold = f"--settle hold makes it {least}, {enough}; or " if least < count else ""
     raise NegativeResult(
         f"{mission.name}: {len(mission.stops)} stops make {count} items, {vehicle.name} holds {most}; "
-        f"{by_hold}plan fewer stops at once"
+        f"{with_hold}plan fewer stops at once"
     )
 
 
-def _check_manner(options: TranslationOptions) -> None:
+def _check_options(options: TranslationOptions) -> None:
     needs = {"script": Command.DO_SEND_SCRIPT_MESSAGE, "camera": Command.IMAGE_START_CAPTURE}
     taken, name = options.vehicle.commands, options.vehicle.name
     if options.trigger != "none" and needs.get(options.trigger) not in taken:
@@ -98,7 +98,7 @@ def _check_origin(mission: Mission, origin: SiteOrigin) -> None:
 
 
 def _check_heading(mission: Mission, vehicle: Autopilot) -> None:
-    """A scanner that does not look all round needs the heading it was planned with."""
+    """Refuse a scanner with a limited view on a vehicle that ignores the planned heading."""
     if needs_heading(mission.scanner) and not vehicle.turns:
         stop, fov = mission.stops[0], mission.scanner.fov_deg
         heading = math.degrees(stop.heading)

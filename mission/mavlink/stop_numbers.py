@@ -7,11 +7,11 @@ import re
 from stopgo.mission.document import Mission
 
 LARGEST = 65_535
-"""What every field that carries a stop's number holds exactly: uint16, and far below float32's 2^24."""
+"""Largest number that every field for a stop's number holds exactly: uint16, far below float32's 2^24."""
 
 
 def numbers_of(mission: Mission) -> tuple[int, ...]:
-    """A number for each stop: that of its id, "S07" is 7; else, for all of them, its place from 1.
+    """Return a number for each stop: that of its id, "S07" is 7; else, for all stops, the index from 1.
 
     The ids' own numbers are taken only if every id has one and no two have the same.
     """
@@ -23,7 +23,7 @@ def numbers_of(mission: Mission) -> tuple[int, ...]:
 
 
 def stop_numbered(mission: Mission, number: float) -> str | None:
-    """Id of the stop that `numbers_of` gives this number; None if there is none."""
+    """Return the id of the stop that `numbers_of` gives this number; None if there is none."""
     ids = dict(zip(numbers_of(mission), (stop.id for stop in mission.stops), strict=True))
     return ids.get(int(number)) if number == round(number) else None
 

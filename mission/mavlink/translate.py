@@ -1,7 +1,7 @@
-"""Mission -> the items of one autopilot, in the order in which no scan begins before the robot stands.
+"""Mission -> the items of one autopilot, in an order in which no scan begins before the robot is stationary.
 
 At each stop: drive there, settle, trigger, wait for the scan. A command that is no NAV command runs together
-with the NAV command after it, so the trigger stands between two waits: it fires when the first is over.
+with the NAV command after it. So the trigger is between two waits: it fires when the first is over.
 """
 
 from __future__ import annotations
@@ -38,32 +38,25 @@ def translate(
     max_lateral_m: float = 0.02,
     max_items: int | None = None,
 ) -> ItemList:
-    """The mission as items for an autopilot.
+    """Return the mission as items for an autopilot.
 
     Parameters
     ----------
-    trigger
-        What starts a scan: a message to a script on the vehicle (ArduPilot), a camera command, or nothing
-        (then whoever follows the run starts it). `auto` is the script on ArduPilot, else the camera.
-    scan_wait
-        Wait for the planned duration, or until a script says that the scan is done (ArduPilot).
-    settle
-        Wait in an item of its own, or, to save items, as the waypoint's hold (whole seconds).
-    max_lateral_m
-        How far the straight lines between waypoints may run from the mission's legs, metres.
+    trigger, scan_wait, settle, max_lateral_m
+        As in `TranslationOptions`.
     max_items
-        What this vehicle holds, home included, where it differs from its kind.
+        Capacity of this vehicle, home included, if it differs from its kind.
 
     Raises
     ------
     InputError
-        If the mission has no georeference, makes no sense, or the autopilot is not known.
-    AnswerIsNo
-        If the mission depends on what the autopilot would drop: a heading, a wait, items above its number.
+        If the mission has no georeference, is implausible, or the autopilot is unknown.
+    NegativeResult
+        If the mission needs what the autopilot drops: a heading, a wait, items above its number.
     """
     vehicle = autopilot_named(autopilot)
     options = TranslationOptions(
-        origin=origin_of(mission), vehicle=vehicle, trigger=_meant(vehicle, trigger),
+        origin=origin_of(mission), vehicle=vehicle, trigger=_resolved_trigger(vehicle, trigger),
         scan_wait=scan_wait, settle=settle, max_lateral_m=max_lateral_m,
     )  # fmt: skip
     numbers = numbers_of(mission)
@@ -74,26 +67,26 @@ def translate(
     return ItemList(vehicle.name, options.origin, placed, notes=notes_of(mission, options))
 
 
-def _meant(vehicle: Autopilot, trigger: Trigger) -> Trigger:
-    """The trigger that `auto` stands for."""
+def _resolved_trigger(vehicle: Autopilot, trigger: Trigger) -> Trigger:
+    """Return the trigger that `auto` means."""
     if trigger != "auto":
         return trigger
     return "script" if Command.DO_SEND_SCRIPT_MESSAGE in vehicle.commands else "camera"
 
 
 def _placed(mission: Mission, numbers: Sequence[int], options: TranslationOptions) -> Iterator[Placed]:
-    """Where the robot starts is no item: it stands there."""
+    """Yield all items; the robot is already at its start, so that this needs no item."""
     yield Placed(speed_change(mission.robot.speed), "speed")
     for stop, number in zip(mission.stops, numbers, strict=True):
         for point in corners(stop.approach, within=options.max_lateral_m)[1:-1]:
             yield Placed(corner_waypoint(point, stop.tolerance_m, options), "corner", stop.id)
-        yield from _visited(stop, number, options)
+        yield from _stop_items(stop, number, options)
     tolerance_m = mission.stops[-1].tolerance_m
     for point in corners(mission.return_ or (), within=options.max_lateral_m)[1:]:
         yield Placed(corner_waypoint(point, tolerance_m, options), "return")
 
 
-def _visited(stop: Stop, number: int, options: TranslationOptions) -> Iterator[Placed]:
+def _stop_items(stop: Stop, number: int, options: TranslationOptions) -> Iterator[Placed]:
     yield Placed(stop_waypoint(stop, options), "stop", stop.id)
     if stop.settle_s > 0 and options.settle == "delay":
         yield Placed(delay(stop.settle_s), "settle", stop.id)
@@ -106,7 +99,7 @@ def _visited(stop: Stop, number: int, options: TranslationOptions) -> Iterator[P
 
 
 def _without_repeats(placed: Iterable[Placed]) -> Iterator[Placed]:
-    """Leaves out a corner that lies, in steps of 1e-7 degrees, where the waypoint before it is."""
+    """Leave out a corner that equals the waypoint before it, in steps of 1e-7 degrees."""
     before: Item | None = None
     for one in placed:
         passing = one.role in ("corner", "return")

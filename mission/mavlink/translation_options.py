@@ -1,4 +1,4 @@
-"""How a mission is written as items, once every choice is made."""
+"""Options of a mission's translation to items, with every choice made."""
 
 from __future__ import annotations
 
@@ -20,6 +20,11 @@ class TranslationOptions:
     origin: SiteOrigin
     vehicle: Autopilot
     trigger: Trigger
+    """Start of a scan: a message to a script on the vehicle (ArduPilot), a camera command, or none (then the
+    station that follows the run starts it). `auto` is the script on ArduPilot, else the camera."""
     scan_wait: ScanWait
+    """Wait for the planned duration, or until a script reports the end of the scan (ArduPilot)."""
     settle: Settle
+    """Wait in an item of its own, or, to save items, as the waypoint's hold (whole seconds)."""
     max_lateral_m: float
+    """Greatest distance in metres of the straight lines between waypoints from the mission's legs."""

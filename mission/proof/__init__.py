@@ -1,1 +1,1 @@
-"""The noun of a simulated scan of a plan, and its text."""
+"""Verification of a plan by simulated scans, and its text."""

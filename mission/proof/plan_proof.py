@@ -1,4 +1,4 @@
-"""Proof of a mission by simulation: what was taken for granted, what the scans got, and whether they join."""
+"""Verification of a mission by simulation: assumptions, acquired targets, and connected scans."""
 
 from __future__ import annotations
 
@@ -13,61 +13,61 @@ from stopgo.mission.stages import Targets
 from stopgo.mission.stages.figures import percent
 
 ALLOWED_SHARE = 0.01
-"""By how much less than the plan promises may be acquired: what grazes a wall falls between two rays."""
+"""Tolerated loss against the plan's coverage: targets grazed by rays fall between two rays."""
 ALLOWED_UNITS = 3
-"""Of what a stop claims, as many units, or a fiftieth, may be out of sight: lines that touch corners."""
+"""Tolerated units of a stop without a line of sight, or a fiftieth: rays that touch corners."""
 ALLOWED_OF_STOP = 0.02
 ALLOWED_UNITS_OF_PART = 5
-"""Of a room or a kind, as many units may be missed, however small it is."""
+"""Tolerated missed units of a room or a kind, however small it is."""
 REGISTERED_M = 0.01
-"""A pair is registered if it ends as near to the truth as this, from every start."""
+"""Greatest error of a registered pair, from every start pose."""
 REGISTERED_DEG = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
 class Simulation:
-    """What is taken for granted where a mission is simulated; the scanner stands level."""
+    """Assumptions of the simulation of a mission; the scanner is level."""
 
     range_m: float
     joining_m: float = 20.0
-    """Up to where points count for registration; scanners reach farther than plans ask of them."""
+    """Range of points used for registration; scanners reach farther than plans require."""
     slant: bool = False
-    """Whether the range counts along the rays; else along the floor, as in the plan."""
+    """True if the range counts along the rays; else along the floor, as in the plan."""
     fov_deg: float = 360.0
     near_m: float = 0.0
-    """What is nearer, along the floor, is not measured."""
+    """Minimum scanner range, along the floor."""
     step_deg: float = 0.1
-    """Between neighbouring rays, both ways."""
+    """Angle between neighbouring rays, in both directions."""
     noise_m: float = 0.002
     """Standard deviation of a distance."""
     height_m: float = 1.3
-    """Of the scanner above the floor."""
+    """Height of the scanner above the floor."""
     ceiling_m: float = 2.7
-    """Up to where walls and columns stand."""
+    """Height of walls and columns."""
     ceiling_known: bool = False
-    """Whether the model tells that height."""
+    """True if the model contains that height."""
     cone_deg: float = 60.0
-    """Opening of the cone below the scanner that it does not see."""
+    """Opening angle of the blind cone below the scanner."""
     pose_error_m: float = 0.05
-    """How far off the robot's pose is from which a pair of scans is registered."""
+    """Error of the robot's pose from which a pair of scans is registered."""
     pose_error_deg: float = 2.0
     poses: bool = True
-    """Whether registration starts from the robot's poses at all."""
+    """True if registration starts from the robot's poses."""
     seed: int = 1
 
 
 @dataclass(frozen=True)
 class PromisedShare:
-    """What is promised of some targets, in metres or units, and what the simulated scans got of it."""
+    """Promised coverage of some targets, in metres or units, and its simulated part."""
 
     name: str
     promised: float
     kept: float
-    """Of what is promised, on how much points lie."""
+    """Promised amount that has simulated points."""
     beyond: float
-    """What points lie on though nobody promised it."""
+    """Amount with points that was not promised."""
     coverage: float | None = None
-    """As promised: of what can be seen; None where that is not known."""
+    """As promised: the fraction of all visible; None where that is not known."""
     required: float | None = None
 
     @property
@@ -84,49 +84,49 @@ class PromisedShare:
 
 @dataclass(frozen=True)
 class StopScan:
-    """What one stop got."""
+    """Simulated result of one stop."""
 
     stop: str
     claimed: int
-    """Units it sees, as the mission has it."""
+    """Units it sees according to the mission."""
     sighted: int
-    """Units whose midpoint it has in sight as was asked, looked at one by one."""
+    """Units whose midpoint is visible within the limits, tested one by one."""
     units: int
-    """Units on which its points lie, as well as was asked."""
+    """Units that have its points within the limits."""
     points: int
 
     @property
     def short(self) -> bool:
-        """Whether it has less in sight than it claims."""
+        """True if fewer units are visible than it claims."""
         return self.sighted < self.claimed - max(ALLOWED_UNITS, ALLOWED_OF_STOP * self.claimed)
 
 
 @dataclass(frozen=True)
 class CloudQuality:
-    """Of the targets' area, m²: what has points, how dense, at which angle, and from how many stops."""
+    """Quality of the points on the targets' area in m²: density, incidence, and number of stops."""
 
     total_m2: float
     seen_m2: float
     by_spacing_mm: dict[int, float]
-    """Share of what has points where those of one scan lie at most so far apart, the wider way."""
+    """Fraction of the seen area where one scan's points are at most so far apart, the wider direction."""
     by_incidence_deg: dict[int, float]
-    """Share that some stop meets at most so far off the perpendicular."""
+    """Fraction that some stop hits at most so far off the perpendicular."""
     by_stops: dict[int, float]
-    """Share that at least so many stops met."""
+    """Fraction that at least so many stops hit."""
 
 
 @dataclass(frozen=True)
 class ScanPair:
-    """Two scans that show some of the same surfaces, registered."""
+    """Registration of two scans that show some of the same surfaces."""
 
     a: str
     b: str
     shared: float
-    """Share of the upright surfaces of that scan which shows fewer of the other's."""
+    """Overlap ratio: fraction of the upright surfaces of the scan that shows fewer of the other's."""
     free_deg: float | None
-    """Direction in which nothing holds the pair, degrees from +x (0 to 180), if there is one."""
+    """Unconstrained direction of the pair, degrees from +x (0 to 180), if there is one."""
     error_m: float
-    """At the worse of the starts."""
+    """At the worst of the start poses."""
     error_deg: float
 
     @property
@@ -137,20 +137,20 @@ class ScanPair:
 
 @dataclass(frozen=True)
 class ScanNetwork:
-    """Which scans join by registration alone."""
+    """Network of the scans that registration alone connects."""
 
     pairs: tuple[ScanPair, ...]
     pieces: tuple[tuple[str, ...], ...]
-    """Stops that hang together, the most first."""
+    """Connected components of the stops, the largest first."""
     closing_m: float | None
-    """Greatest gap round a circle of registered pairs; None where there is no circle."""
+    """Greatest closing error round a loop of registered pairs; None without a loop."""
     closing_deg: float | None
     adrift_m: float
-    """How far the worst stop is off the truth, seen from the first stop of its piece."""
+    """Position error of the worst stop, relative to the first stop of its component."""
 
     @property
     def closed(self) -> bool:
-        """Whether all scans hang together."""
+        """True if all scans are connected."""
         return len(self.pieces) == 1
 
     @property
@@ -169,19 +169,19 @@ class ScanCloud:
 
 @dataclass(frozen=True, eq=False)
 class PlanProof:
-    """What a simulation shows of a mission."""
+    """Result of a mission's simulation."""
 
     mission: Mission
     simulation: Simulation
     targets: Targets
     seen: BoolArray
-    """Whether points lie on each unit (n,)."""
+    """True for units with points (n,)."""
     promised: BoolArray | None
-    """Whether each unit is promised (n,); None where only their number is."""
+    """True for promised units (n,); None if only their number is known."""
     unit: str
     """`m` or `units`."""
     grain: float
-    """What one unit counts at most, in that unit."""
+    """Largest amount of one unit, in that unit."""
     whole: PromisedShare
     rooms: tuple[PromisedShare, ...]
     kinds: tuple[PromisedShare, ...]
@@ -189,12 +189,12 @@ class PlanProof:
     quality: CloudQuality
     network: ScanNetwork
     missed: dict[str, float]
-    """What of the promise was missed, by reason."""
+    """Missed part of the promise, by reason."""
     clouds: tuple[ScanCloud, ...] = ()
 
     @cached_property
     def unmet(self) -> tuple[str, ...]:
-        """What the plan promises and the simulation does not show, in words."""
+        """Promises of the plan that the simulation does not meet, in words."""
         return (*_short_whole(self), *_short_parts(self), *_short_stops(self), *_short_pairs(self))
 
     @property
@@ -225,11 +225,11 @@ def _short_parts(proof: PlanProof) -> list[str]:
 
 
 def _short_pairs(proof: PlanProof) -> list[str]:
-    """Pairs of the mission's network that do not register."""
+    """Return the pairs of the mission's network that do not register."""
     promised = () if isinstance(proof.mission.network, UnsetType) else proof.mission.network
     good = {frozenset((pair.a, pair.b)) for pair in proof.network.pairs if pair.registered}
     return [
-        f"{item.a} and {item.b}: are to register, and do not"
+        f"{item.a} and {item.b}: planned to register, but do not"
         for item in promised
         if frozenset((item.a, item.b)) not in good
     ]
@@ -237,7 +237,7 @@ def _short_pairs(proof: PlanProof) -> list[str]:
 
 def _short_stops(proof: PlanProof) -> list[str]:
     return [
-        f"{item.stop}: claims to see {item.claimed} units, {item.sighted} are in sight"
+        f"{item.stop}: claims to see {item.claimed} units, {item.sighted} are visible"
         for item in proof.stops
         if item.short
     ]

@@ -1,4 +1,4 @@
-"""A proof as a person reads it, and as a program does: what `prove` prints and writes."""
+"""Text and JSON of a verification by simulation: the output of `prove`."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from stopgo.mission.proof.plan_proof import (
     ALLOWED_SHARE,
     REGISTERED_DEG,
     REGISTERED_M,
+    CloudQuality,
     PlanProof,
     PromisedShare,
+    ScanNetwork,
     ScanPair,
     Simulation,
 )
@@ -25,8 +27,8 @@ VERSION = 1
 
 
 def proof_json(proof: PlanProof) -> dict[str, Any]:
-    """Everything but the points; lengths in metres unless a name says otherwise."""
-    mission, network, quality = proof.mission, proof.network, proof.quality
+    """Return everything except the points; lengths in metres unless a name says otherwise."""
+    mission = proof.mission
     return {
         "schema": SCHEMA,
         "version": VERSION,
@@ -40,32 +42,31 @@ def proof_json(proof: PlanProof) -> dict[str, Any]:
         "rooms": [_share(item) for item in proof.rooms],
         "kinds": [_share(item) for item in proof.kinds],
         "missed": proof.missed,
-        "stops": [
-            {
-                "stop": item.stop,
-                "claimed": item.claimed,
-                "sighted": item.sighted,
-                "units": item.units,
-                "points": item.points,
-            }
-            for item in proof.stops
-        ],
-        "surface": {
-            "total_m2": round(quality.total_m2, 3),
-            "seen_m2": round(quality.seen_m2, 3),
-            "spacing_mm": {str(key): round(value, 4) for key, value in quality.by_spacing_mm.items()},
-            "incidence_deg": {str(key): round(value, 4) for key, value in quality.by_incidence_deg.items()},
-            "stops": {str(key): round(value, 4) for key, value in quality.by_stops.items()},
-        },
-        "network": {
-            "closed": network.closed,
-            "pieces": [list(piece) for piece in network.pieces],
-            "registered": network.registered,
-            "closing_m": network.closing_m,
-            "closing_deg": network.closing_deg,
-            "adrift_m": network.adrift_m,
-            "pairs": [_pair(item) for item in network.pairs],
-        },
+        "stops": [msgspec.to_builtins(item) for item in proof.stops],
+        "surface": _surface_json(proof.quality),
+        "network": _network_json(proof.network),
+    }
+
+
+def _surface_json(quality: CloudQuality) -> dict[str, Any]:
+    return {
+        "total_m2": round(quality.total_m2, 3),
+        "seen_m2": round(quality.seen_m2, 3),
+        "spacing_mm": {str(key): round(value, 4) for key, value in quality.by_spacing_mm.items()},
+        "incidence_deg": {str(key): round(value, 4) for key, value in quality.by_incidence_deg.items()},
+        "stops": {str(key): round(value, 4) for key, value in quality.by_stops.items()},
+    }
+
+
+def _network_json(network: ScanNetwork) -> dict[str, Any]:
+    return {
+        "closed": network.closed,
+        "pieces": [list(piece) for piece in network.pieces],
+        "registered": network.registered,
+        "closing_m": network.closing_m,
+        "closing_deg": network.closing_deg,
+        "adrift_m": network.adrift_m,
+        "pairs": [_pair(item) for item in network.pairs],
     }
 
 
@@ -88,28 +89,28 @@ def _pair(item: ScanPair) -> dict[str, Any]:
 
 
 def proof_text(proof: PlanProof) -> str:
-    """A few lines: the answer first, then what it stands on."""
+    """Return a few lines: the verdict first, then its reasons."""
     lines = [verdict(proof), *(f"  {line}" for line in proof.unmet)]
-    for name, several in _told(proof):
+    for name, several in _sections(proof):
         lines += [f"{name if not k else '':12}{line}" for k, line in enumerate(several)]
     return "\n".join(map(printable, lines))
 
 
 def verdict(proof: PlanProof) -> str:
-    """The answer in one sentence."""
+    """Return the verdict in one sentence."""
     if not proof.met:
         return "The plan's promise is not met:"
     return f"The plan's promise is met: {coverage_words(proof.whole, proof.unit)}."
 
 
 def coverage_words(whole: PromisedShare, unit: str) -> str:
-    """What was promised and what was acquired."""
+    """Return the promised and the acquired coverage."""
     if whole.coverage is None:
         return f"{whole.promised:.0f} {unit} promised, {whole.kept:.0f} acquired"
     return f"{percent(whole.coverage)} promised, {percent(whole.simulated)} acquired"
 
 
-def _told(proof: PlanProof) -> Iterator[tuple[str, list[str]]]:
+def _sections(proof: PlanProof) -> Iterator[tuple[str, list[str]]]:
     yield "acquired", [coverage_words(proof.whole, proof.unit), *missed_words(proof)]
     yield "surface", surface_words(proof)
     loose = [pair_words(pair) for pair in proof.network.pairs if not pair.registered]
@@ -118,14 +119,14 @@ def _told(proof: PlanProof) -> Iterator[tuple[str, list[str]]]:
 
 
 def missed_words(proof: PlanProof) -> list[str]:
-    """What of the promise was missed, and why; what nobody promised."""
-    told = [f"{amount:.1f} {proof.unit} missed: {reason}" for reason, amount in proof.missed.items()]
+    """Return the missed part of the promise by reason, and the part that was not promised."""
+    missed = [f"{amount:.1f} {proof.unit} missed: {reason}" for reason, amount in proof.missed.items()]
     beyond = f"{proof.whole.beyond:.1f} {proof.unit} acquired that were not promised"
-    return [*told, beyond] if proof.whole.beyond >= 0.05 else told
+    return [*missed, beyond] if proof.whole.beyond >= 0.05 else missed
 
 
 def surface_words(proof: PlanProof) -> list[str]:
-    """How well the surface is covered with points."""
+    """Return the lines on density and incidence of the points on the surfaces."""
     quality = proof.quality
     spacing = (f"{percent(share)} at {limit} mm" for limit, share in quality.by_spacing_mm.items())
     angles = (f"{percent(share)} at {limit}°" for limit, share in quality.by_incidence_deg.items())
@@ -139,49 +140,50 @@ def surface_words(proof: PlanProof) -> list[str]:
 
 
 def network_words(proof: PlanProof) -> list[str]:
-    """Whether the scans join, and where they do not."""
+    """Return the lines on the connected scans, and on those that are not."""
     network = proof.network
-    joins = "all scans join" if network.closed else f"the scans fall into {len(network.pieces)} pieces"
+    components = f"the scans are in {len(network.pieces)} components"
+    connected = "all scans are connected" if network.closed else components
     if isinstance(share := proof.mission.share, MissionShare):
-        joins = f"of this mission, one of {share.of}, {joins}"
-    told = [f"{joins}: {network.registered} of {len(network.pairs)} pairs that share surfaces register"]
+        connected = f"of this mission, one of {share.of}, {connected}"
+    lines = [f"{connected}: {network.registered} of {len(network.pairs)} pairs with common surfaces register"]
     if network.closing_m is not None:
-        told.append(
-            f"circles close to {1000 * network.closing_m:.1f} mm and {network.closing_deg or 0.0:.3f}°"
+        lines.append(
+            f"loops close to {1000 * network.closing_m:.1f} mm and {network.closing_deg or 0.0:.3f}°"
         )
     if network.registered:
-        told.append(f"the worst stop ends {1000 * network.adrift_m:.1f} mm off the truth")
+        lines.append(f"the worst stop has a position error of {1000 * network.adrift_m:.1f} mm")
     if not network.closed:
-        told += [f"joined: {', '.join(piece)}" for piece in network.pieces if len(piece) > 1]
+        lines += [f"connected: {', '.join(piece)}" for piece in network.pieces if len(piece) > 1]
         alone = [piece[0] for piece in network.pieces if len(piece) == 1]
-        told += [f"joined to none: {', '.join(alone)}"] if alone else []
-    return told
+        lines += [f"not connected: {', '.join(alone)}"] if alone else []
+    return lines
 
 
 def pair_words(pair: ScanPair) -> str:
-    """One pair, and what is wrong with it."""
-    name = f"{pair.a} and {pair.b}: {percent(pair.shared)} shared"
+    """Return the line of one pair, with its error."""
+    name = f"{pair.a} and {pair.b}: overlap {percent(pair.shared)}"
     off = f"{1000 * pair.error_m:.1f} mm and {pair.error_deg:.3f}° off"
     if pair.free_deg is not None:
-        return f"{name}, free along {pair.free_deg:.0f}°, {off}"
+        return f"{name}, unconstrained along {pair.free_deg:.0f}°, {off}"
     return f"{name}, {off}"
 
 
 def assumed_words(simulation: Simulation) -> list[str]:
-    """What was taken for granted."""
-    way = "the ray" if simulation.slant else "the floor"
-    known = "as the model tells" if simulation.ceiling_known else "nominal"
+    """Return the assumptions of the simulation."""
+    along = "the ray" if simulation.slant else "the floor"
+    known = "from the model" if simulation.ceiling_known else "nominal"
     start = (
         f"pairs start {100 * simulation.pose_error_m:g} cm and {simulation.pose_error_deg:g}° off"
         if simulation.poses
         else "pairs start without poses"
     )
     return [
-        f"rays every {simulation.step_deg:g}° to {simulation.range_m:g} m along {way}, "
+        f"rays every {simulation.step_deg:g}° to {simulation.range_m:g} m along {along}, "
         f"noise {1000 * simulation.noise_m:g} mm",
-        f"for registration points up to {simulation.joining_m:g} m",
-        f"scanner level at {simulation.height_m:g} m, blind below in a cone of {simulation.cone_deg:g}°",
-        f"walls up to {simulation.ceiling_m:g} m ({known}), openings as high; floor and ceiling level",
+        f"points up to {simulation.joining_m:g} m for registration",
+        f"scanner level at {simulation.height_m:g} m, blind cone of {simulation.cone_deg:g}°",
+        f"walls up to {simulation.ceiling_m:g} m ({known}), openings equally high; floor and ceiling level",
         f"{start}; registered: from both sides under {1000 * REGISTERED_M:g} mm and {REGISTERED_DEG:g}°",
         f"a promise is met within {100 * ALLOWED_SHARE:g} percentage point",
     ]

@@ -1,5 +1,5 @@
-"""What a run of a mission is: its states, the orders that change it, who may give them, and the way.
+"""A run of a mission: its states, the commands that change it, who may give them, and its route.
 
-Nothing here touches a robot, a clock, a link or a disk: every function takes a run and gives the next one
-with the events that tell of it.
+Nothing here touches a robot, a clock, a link or a disk. Every function takes a run and returns the next one
+with the events of the change.
 """

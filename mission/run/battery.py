@@ -1,4 +1,4 @@
-"""Whether a robot's battery carries a mission to its end, as far as the robot can tell."""
+"""Battery check: does a robot's charge last to the end of a mission, as far as the robot reports it?"""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from stopgo.mission.document import Mission
 from stopgo.mission.document.schedule import schedule
 
 
-def what_is_missing(mission: Mission, *, battery: float, endurance_s: float | None, first: int = 0) -> str:
-    """Why the battery does not last from stop `first` to the mission's end; empty if it does.
+def battery_shortfall(mission: Mission, *, battery: float, endurance_s: float | None, first: int = 0) -> str:
+    """Return why the battery does not last from stop `first` to the end of the mission; empty if it does.
 
-    Nothing is known of a robot whose `endurance_s` (seconds on a full battery) is `None`.
+    No answer is possible for a robot whose `endurance_s` (seconds on a full battery) is `None`.
     """
     if endurance_s is None:
         return ""

@@ -1,4 +1,4 @@
-"""What each order does to a run, or why it is refused: decided here, without touching anything."""
+"""Decisions on commands: the next run, or the reason for a refusal. Pure: nothing is touched here."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import partial
 
 from stopgo.mission.document import Mission
 from stopgo.mission.run import route_position
-from stopgo.mission.run.battery import what_is_missing
+from stopgo.mission.run.battery import battery_shortfall
 from stopgo.mission.run.events import Pose, TakenOver
 from stopgo.mission.run.lease import Lease, claimed
 from stopgo.mission.run.orders import DRIVING, FREE_VERBS, LONGEST_VALID_S, Order, Refused
@@ -17,7 +17,7 @@ from stopgo.mission.run.states import (
     Change,
     DetailedState,
     Run,
-    Telling,
+    UnstampedEvent,
     changed,
     ended,
     paused,
@@ -36,32 +36,32 @@ class Situation:
     run: Run
     mission: Mission | None
     has_run: bool
-    """Whether this mission has been run before."""
+    """True if this mission has been run before."""
     pose: Pose
     now_ns: int
     """On the run's clock."""
     command_ns: int
-    """On the clock of commands."""
+    """On the clock that commands are dated by."""
     new_run_id: str
     lease: Lease | None
     battery: float
     endurance_s: float | None
     not_ready: str = ""
-    """Why the robot's base cannot drive at present."""
+    """Reason why the robot's base cannot drive at present."""
     boot_id: str = ""
-    """Which start of the robot's program this is; `command_ns` may go back from one to the next."""
+    """Id of the robot program's present start; `command_ns` may go back from one start to the next."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What an order leads to, and who commands the robot from then on."""
+    """Change that a command leads to, and who commands the robot from then on."""
 
     change: Change
     lease: Lease | None
 
 
 def decide(order: Order, situation: Situation) -> Decision | Refused:
-    """What a order leads to; late, foreign, misdirected and impossible ones are refused."""
+    """Return the change that a command leads to; late, foreign and impossible commands are refused."""
     late = _too_late(order, situation)
     if late:
         return late
@@ -81,25 +81,21 @@ def _claim(order: Order, situation: Situation) -> Lease | Refused:
     )  # fmt: skip
 
 
-def handed_over(before: Lease | None, after: Lease | None) -> tuple[Telling, ...]:
-    """What is told when the robot changes hands."""
+def handed_over(before: Lease | None, after: Lease | None) -> tuple[UnstampedEvent, ...]:
+    """Return the event of a change of commander; none if the commander is the same."""
     if before is None or after is None or before.commander == after.commander:
         return ()
     return (partial(TakenOver, commander=after.commander, before=before.commander),)
 
 
 def _too_late(order: Order, situation: Situation) -> Refused | None:
-    """A stop is never too late: it counts whenever it comes, and needs nothing that the robot has told."""
+    """Refuse a command that is too old; `pause` and `abort` never are, and need no earlier query."""
     if order.verb in FREE_VERBS:
         return None
     if not 0 < order.valid_for_s <= LONGEST_VALID_S:
-        return Refused(
-            "expired", f"valid for {order.valid_for_s:g} s; at most {LONGEST_VALID_S:g} s are taken"
-        )
+        return Refused("expired", f"valid for {order.valid_for_s:g} s; the limit is {LONGEST_VALID_S:g} s")
     if order.boot_id not in (None, situation.boot_id):
-        return Refused(
-            "expired", f"the robot has been started anew since {order.verb} was ordered; order it again"
-        )
+        return Refused("expired", f"the robot restarted after {order.verb} was sent; send it again")
     age = (situation.command_ns - order.issued_ns) / 1e9
     if not 0 <= age < order.valid_for_s:
         return Refused(
@@ -125,9 +121,9 @@ def _verb(order: Order, situation: Situation) -> Change | Refused:
     needed = STATES[order.verb]
     if situation.mission is None:
         return Refused("no_mission", "the robot holds no mission; push one first")
-    place = situation.run.place
-    if place not in needed:
-        return Refused("wrong_state", f"{order.verb} needs {' or '.join(needed)}; the robot is {place}")
+    state = situation.run.detailed_state
+    if state not in needed:
+        return Refused("wrong_state", f"{order.verb} needs {' or '.join(needed)}; the robot is {state}")
     if situation.not_ready and order.verb in DRIVING:
         return Refused("not_ready", situation.not_ready)
     return VERBS[order.verb](order, situation.mission, situation)
@@ -136,12 +132,12 @@ def _verb(order: Order, situation: Situation) -> Change | Refused:
 def _start(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
     if situation.has_run and not order.again:
         return Refused(
-            "finished_before", f"mission {mission.name} has been run before; start --again runs it anew"
+            "finished_before", f"mission {mission.name} has been run before; start --again repeats it"
         )
     leg = _starting_leg(order, mission, situation.pose)
     if isinstance(leg, Refused):
         return leg
-    missing = what_is_missing(
+    missing = battery_shortfall(
         mission, battery=situation.battery, endurance_s=situation.endurance_s, first=leg
     )
     if missing:
@@ -178,7 +174,7 @@ def _resume(order: Order, mission: Mission, situation: Situation) -> Change | Re
 
 
 def off_route(run: Run, mission: Mission, pose: Pose) -> Refused | None:
-    """Refused if the robot stands farther from its leg than the stop's tolerance."""
+    """Return a refusal if the robot is farther from its leg than the stop's tolerance."""
     legs = route_position.legs_of(mission)
     leg = min(run.leg, len(legs) - 1)
     tolerance = mission.stops[min(leg, len(mission.stops) - 1)].tolerance_m
@@ -193,9 +189,7 @@ def _skip(order: Order, mission: Mission, situation: Situation) -> Change | Refu
     run = situation.run
     stop = stop_of(run, mission)
     if stop is None or (order.stop is not None and order.stop != stop.id):
-        return Refused(
-            "not_at_stop", f"the robot works on {stop.id if stop else 'no stop'}, not {order.stop}"
-        )
+        return Refused("not_at_stop", f"current stop is {stop.id if stop else 'none'}, not {order.stop}")
     # A skip is an answer to a hold, so the robot goes on; one that pauses stays paused.
     going = changed(run, state="RUNNING", reason="") if run.state == "HELD" else run
     return skipped(going, mission, f"skip by {order.commander}")
@@ -204,9 +198,7 @@ def _skip(order: Order, mission: Mission, situation: Situation) -> Change | Refu
 def _retry(order: Order, mission: Mission, situation: Situation) -> Change | Refused:
     stop = stop_of(situation.run, mission)
     if order.stop is not None and (stop is None or order.stop != stop.id):
-        return Refused(
-            "not_at_stop", f"the robot works on {stop.id if stop else 'no stop'}, not {order.stop}"
-        )
+        return Refused("not_at_stop", f"current stop is {stop.id if stop else 'none'}, not {order.stop}")
     return _resume(order, mission, situation)
 
 
@@ -238,7 +230,7 @@ STATES: dict[str, tuple[DetailedState, ...]] = {
     "abort": ("RUNNING", "PAUSED", "HELD", "HOMING", "PAUSED homing", "HELD homing"),
     "home": ("RUNNING", "PAUSED", "HELD", "PAUSED homing", "HELD homing"),
 }
-"""The states in which each verb means something; nothing turns a robot round that is on its way home."""
+"""States in which each verb is allowed; no verb reverses a robot that is on its way home."""
 
 
 def _xy(start: object) -> str:

@@ -1,4 +1,4 @@
-"""What a robot tells while it runs a mission: events from its journal, and telemetry.
+"""A robot's reports while it runs a mission: events from its journal, and telemetry.
 
 Times are nanoseconds on the robot's clock (`robot_ns`, since 1970) and seconds since the run began
 (`mission_time_s`). Poses are in the mission's frame.
@@ -29,7 +29,7 @@ StopState = Literal[
 Nanoseconds = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
 """Since 1970, up to the year 2116: a recording holds times in 64 bits."""
 RunSeconds = Annotated[float, msgspec.Meta(ge=-9e9, le=9e9)]
-"""Which in nanoseconds fit there, too."""
+"""Seconds that fit into 64 bits as nanoseconds, too."""
 
 
 class Pose(msgspec.Struct, frozen=True, kw_only=True):
@@ -77,11 +77,11 @@ class Scanned(Event, frozen=True, kw_only=True):
 
 
 class Unconfirmed(Event, frozen=True, kw_only=True):
-    """The robot is through with a stop, and nobody says that a scan was made (autopilots without a word)."""
+    """The robot is done with a stop, and no scan is confirmed: the autopilot does not report scans."""
 
     stop: str
     pose: Pose | None
-    """Where it stood; `None` if nobody saw it."""
+    """Pose of the robot at the stop; `None` if no pose was received."""
     reason: str
 
 
@@ -108,27 +108,27 @@ class Resumed(Event, frozen=True, kw_only=True):
 
 
 class TakenOver(Event, frozen=True, kw_only=True):
-    """The robot has changed hands; `run_id` is empty when there is no run."""
+    """The robot has another commander; `run_id` is empty when there is no run."""
 
     commander: str
     before: str
 
 
 class LinkLost(Event, frozen=True, kw_only=True):
-    """No station has been heard for a time, and the mission's policy says what follows."""
+    """No data from any station for `silent_s`; `policy` is the mission's reaction."""
 
     silent_s: float
     policy: str
 
 
 class Homing(Event, frozen=True, kw_only=True):
-    """The robot is on its way back, by legs it has driven or by the return."""
+    """The robot is returning, by legs it has driven or by the return leg."""
 
     reason: str
 
 
 class RevisionWaits(Event, frozen=True, kw_only=True):
-    """A new revision of the mission has been taken, and will be followed from the next stop on."""
+    """A new revision of the mission is accepted; the robot follows it from the next stop on."""
 
     waiting: int
 
@@ -140,7 +140,7 @@ class RevisionTaken(Event, frozen=True, kw_only=True):
 
 
 class RevisionDropped(Event, frozen=True, kw_only=True):
-    """The run is over before the revision that waited was followed; it must be pushed again."""
+    """The run ended before the waiting revision was followed; it must be pushed again."""
 
     waiting: int
 
@@ -154,7 +154,7 @@ class Aborted(Event, frozen=True, kw_only=True):
 
 
 class UnknownKind(Event, frozen=True, kw_only=True):
-    """An event of a kind that a newer stopgo tells of, and this one does not know."""
+    """An event of a kind that only a newer stopgo knows."""
 
     kind: str
 
@@ -184,7 +184,7 @@ KINDS: tuple[str, ...] = tuple(kind.__name__ for kind in get_args(AnyEvent))
 
 
 def event_of(body: bytes) -> AnyEvent:
-    """The event in a line of JSON; what a newer stopgo adds to it is passed over.
+    """Decode the event in a line of JSON; keys that only a newer stopgo knows are ignored.
 
     Raises
     ------
@@ -195,11 +195,11 @@ def event_of(body: bytes) -> AnyEvent:
         try:
             return _EVENTS.decode(body)
         except msgspec.ValidationError:
-            told = _ENVELOPE.decode(body)
-            if told.get("event") in KINDS:
+            fields = _ENVELOPE.decode(body)
+            if fields.get("event") in KINDS:
                 raise
-            kind = told.get("event")
-            return msgspec.convert({**told, "event": "UnknownKind", "kind": kind}, UnknownKind)
+            kind = fields.get("event")
+            return msgspec.convert({**fields, "event": "UnknownKind", "kind": kind}, UnknownKind)
 
 
 _EVENTS = msgspec.json.Decoder(AnyEvent)
@@ -218,7 +218,7 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     seq: int
     robot_ns: Nanoseconds
     state: str
-    """One of `State`, or what a newer robot calls it."""
+    """One of `State`, or another word of a newer robot."""
     run_id: str | None
     mission_id: str | None
     revision: int | None
@@ -236,12 +236,12 @@ class StateReport(msgspec.Struct, frozen=True, kw_only=True):
     done_count: int = 0
     skipped_count: int = 0
     outside: tuple[str, ...] = ()
-    """Of those that are done, the newest that were scanned farther from their places than is tolerated."""
+    """Newest of the done stops that were scanned outside tolerance."""
     outside_count: int = 0
 
 
 class PoseReport(msgspec.Struct, frozen=True, kw_only=True):
-    """Where the robot is, 10 to 50 times a second."""
+    """Pose of the robot, 10 to 50 times a second."""
 
     robot: str
     boot_id: str
@@ -254,22 +254,22 @@ class PoseReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Health(msgspec.Struct, frozen=True, kw_only=True):
-    """How a robot's base is, as far as it tells; each thing is `None` where it does not."""
+    """Health of a robot's base; each value is `None` if the base does not report it."""
 
     robot_ns: Nanoseconds
     run_id: str | None
     battery: float
     """0 to 1."""
     localisation: float | None = None
-    """How well it knows where it is, 0 to 1."""
+    """Quality of the localisation, 0 to 1."""
     emergency_stop: bool | None = None
-    """Whether an emergency stop is pressed."""
+    """True if an emergency stop is pressed."""
     safety_field: bool | None = None
-    """Whether something stands in the field that its safety scanners watch."""
+    """True if something is in the field that the safety scanners watch."""
 
 
 class PosesMissing(msgspec.Struct, frozen=True, kw_only=True):
-    """Where the robot was between two times of a run is not known, and why not."""
+    """A gap in the poses of a run, and its reason."""
 
     run_id: str
     robot_ns: Nanoseconds
@@ -281,10 +281,10 @@ class PosesMissing(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def words(self) -> str:
-        """As a person reads it."""
+        """The gap in words."""
         seconds = (self.until_ns - self.robot_ns) / 1e9
         return f"no poses for {seconds:.1f} s: {self.reason}" if seconds > 0 else f"no poses: {self.reason}"
 
 
 Report = StateReport | PoseReport | AnyEvent
-"""What a robot tells of itself and its run."""
+"""Report of a robot on itself and its run."""

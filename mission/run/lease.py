@@ -1,7 +1,7 @@
-"""Who may command a robot: one identity at a time, while it watches its run and for a minute after.
+"""The lease: one identity at a time may command a robot, while it watches its run and for a minute after.
 
-The lease belongs to an identity, not to a process, and outlives a reboot. Its fencing number grows with
-every change of hands, so that an order given under an older one is recognised however late it comes.
+The lease belongs to an identity, not to a process, and outlives a reboot. Its fencing token grows with
+every change of commander, so that a command given under an older one is recognised however late it comes.
 """
 
 from __future__ import annotations
@@ -13,31 +13,31 @@ import msgspec
 from stopgo.mission.run.orders import Refused
 
 LEASE_S: Final = 60.0
-"""How long a commander keeps the robot after the last order."""
+"""Time that a commander keeps the robot after the last command."""
 
 
 class Lease(msgspec.Struct, frozen=True, kw_only=True):
-    """Who commands a robot."""
+    """Right of one identity to command a robot."""
 
     commander: str
     fence: int
-    """Grows with every change of hands."""
+    """Fencing token; grows with every change of commander."""
     until_ns: int
 
 
 def claimed(
     lease: Lease | None, commander: str, *, fence: int | None, take_over: bool, now_ns: int
 ) -> Lease | Refused:
-    """The lease in the hands of `commander`, renewed; refused while another holds it.
+    """Return the lease of `commander`, renewed; refused while another holds it.
 
-    `fence` is the number that the commander last knew; an older one than the robot's is refused unless
-    the order takes over.
+    `fence` is the fencing token that the commander last knew. One older than the robot's is refused unless
+    the command takes over.
     """
     if lease is None:
         return Lease(commander=commander, fence=1, until_ns=now_ns + lasting_ns())
     if fence is not None and fence < lease.fence and not take_over:
         return Refused(
-            "fenced", f"the order is of lease {fence}; the robot is at {lease.fence} ({lease.commander})"
+            "fenced", f"fencing token is {fence}; the robot's is {lease.fence} ({lease.commander})"
         )
     if commander == lease.commander:
         return msgspec.structs.replace(lease, until_ns=now_ns + lasting_ns())
@@ -50,10 +50,10 @@ def claimed(
     return Lease(commander=commander, fence=lease.fence + 1, until_ns=now_ns + lasting_ns())
 
 
-def kept(lease: Lease | None, commander: str, *, now_ns: int) -> Lease | None:
-    """The lease renewed for the commander who watches the run; `None` if there is nothing to be renewed.
+def renewed(lease: Lease | None, commander: str, *, now_ns: int) -> Lease | None:
+    """Renew the lease for the commander who watches the run; `None` if there is nothing to renew.
 
-    That is not worth writing down before half of it has passed.
+    Renewal is not worth a write before half of the lease has passed.
     """
     if lease is None or lease.commander != commander or remaining_s(lease, now_ns) > LEASE_S / 2:
         return None
@@ -61,7 +61,7 @@ def kept(lease: Lease | None, commander: str, *, now_ns: int) -> Lease | None:
 
 
 def remaining_s(lease: Lease, now_ns: int) -> float:
-    """Seconds that the lease still holds; never more than its full length, however the clock jumped."""
+    """Seconds that the lease still lasts; never more than its full length, however the clock jumped."""
     return max(0.0, min(LEASE_S, (lease.until_ns - now_ns) / 1e9))
 
 

@@ -1,4 +1,4 @@
-"""What a station may order a robot to do with its run, and what the robot answers."""
+"""Commands of a station to a robot's run, and the robot's answers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import msgspec
 from stopgo.mission.run.events import State
 
 LONGEST_VALID_S: Final = 60.0
-"""No order may claim to be valid for longer."""
+"""Longest validity that a command may claim."""
 
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 """A number that JSON readers and SQLite hold exactly."""
@@ -18,9 +18,9 @@ ShortText = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 
 Verb = Literal["start", "pause", "resume", "skip", "retry", "abort", "home"]
 FREE_VERBS: tuple[Verb, ...] = ("pause", "abort")
-"""Orders that any station may give at any time."""
+"""Commands that any station may give at any time."""
 DRIVING: tuple[Verb, ...] = ("start", "resume", "retry", "home")
-"""Orders that a robot which cannot drive refuses at once."""
+"""Commands that a robot which cannot drive refuses at once."""
 
 Reason = Literal[
     "malformed", "expired", "id_reused", "wrong_state", "wrong_run", "wrong_mission", "no_mission",
@@ -29,11 +29,11 @@ Reason = Literal[
     "storage", "untrusted", "replayed", "way_differs",
     "unsupported", "not_armed", "wrong_origin", "mission_differs", "no_position", "denied", "not_ready",
 ]  # fmt: skip
-"""Why a robot refuses an order, or a mission."""
+"""Reason why a robot refuses a command, or a mission."""
 
 
 class Order(msgspec.Struct, frozen=True, kw_only=True, tag="Command", tag_field="is"):
-    """An order; sent again with the same `cmd_id` it is carried out once."""
+    """A command; sent again with the same `cmd_id` it is executed once."""
 
     cmd_id: ShortText
     verb: Verb
@@ -41,12 +41,12 @@ class Order(msgspec.Struct, frozen=True, kw_only=True, tag="Command", tag_field=
     issued_ns: int
     valid_for_s: float
     boot_id: ShortText | None = None
-    """The start of the robot's program that `issued_ns` was told by; another refuses the order."""
+    """Robot program's start that `issued_ns` is dated by; after another start the command is refused."""
     fence: Count | None = None
-    """The lease number that the commander knew."""
+    """Fencing token that the commander knew."""
     take_over: bool = False
     expect_state: tuple[State, ...] | None = None
-    """Refused in any other state, so that a late order does no harm."""
+    """Refused in any other state, so that a late command does no harm."""
     run_id: ShortText | None = None
     mission_id: ShortText | None = None
     revision: Count | None = None
@@ -57,22 +57,22 @@ class Order(msgspec.Struct, frozen=True, kw_only=True, tag="Command", tag_field=
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True, tag=True, tag_field="is"):
-    """What became of an order, stored before it is sent."""
+    """Outcome of a command, stored before it is sent."""
 
     cmd_id: str
     verb: str
     outcome: Literal["ok", "refused"]
     reason: str | None
-    """One of `Reason`, or what a newer robot calls it."""
+    """One of `Reason`, or another word of a newer robot."""
     message: str
     run_id: str | None
     state: str
-    """One of `State`, or what a newer robot calls it."""
+    """One of `State`, or another word of a newer robot."""
 
 
 @dataclass(frozen=True)
 class Refused:
-    """Why an order, or a mission, is not taken."""
+    """Refusal of a command, or of a mission."""
 
     reason: Reason
     message: str

@@ -1,4 +1,4 @@
-"""The way a mission has laid down, and where on it a robot stands: no path is ever made up.
+"""The route of a mission, and the robot's position on it; no path is ever planned here.
 
 Leg k leads to stop k; one more leg, if the mission has a return, leads back.
 """
@@ -24,42 +24,42 @@ class NearestPoint:
 
 
 def legs_of(mission: Mission) -> tuple[tuple[Point, ...], ...]:
-    """All legs in the order of driving, the return last."""
+    """Return all legs in the order of driving, the return last."""
     legs = tuple(stop.approach for stop in mission.stops)
     return legs if mission.return_ is None else (*legs, mission.return_)
 
 
 def nearest(leg: Sequence[Point], pose: Pose) -> NearestPoint:
-    """Where on `leg` the robot stands; of equally near points the one farthest along."""
+    """Return the point of `leg` nearest to the robot; of equally near points the one farthest along."""
     here = (pose.x, pose.y)
-    places = [NearestPoint(leg[0], 0, math.dist(leg[0], here))]
+    candidates = [NearestPoint(leg[0], 0, math.dist(leg[0], here))]
     for segment, (a, b) in enumerate(pairwise(leg)):
         point = foot(a, b, here)
-        places.append(NearestPoint(point, segment, math.dist(point, here)))
-    return min(reversed(places), key=lambda place: place.distance)
+        candidates.append(NearestPoint(point, segment, math.dist(point, here)))
+    return min(reversed(candidates), key=lambda point: point.distance)
 
 
 def forward(leg: Sequence[Point], pose: Pose) -> tuple[Point, ...]:
-    """What is left of `leg` ahead of the robot."""
+    """Return the points of `leg` that are still ahead of the robot."""
     return tuple(leg[nearest(leg, pose).segment + 1 :]) or (leg[-1],)
 
 
 def backward(leg: Sequence[Point], pose: Pose) -> tuple[Point, ...]:
-    """The way back along `leg` to its beginning."""
+    """Return the points of `leg` back to its beginning."""
     return tuple(reversed(leg[: nearest(leg, pose).segment + 1]))
 
 
 def nearest_leg(mission: Mission, pose: Pose) -> tuple[int, NearestPoint]:
-    """The leg to a stop that passes nearest to the robot, the first of equals."""
-    places = [nearest(stop.approach, pose) for stop in mission.stops]
-    leg = min(range(len(places)), key=lambda index: places[index].distance)
-    return leg, places[leg]
+    """Return the leg to a stop that passes nearest to the robot, the first of equals."""
+    candidates = [nearest(stop.approach, pose) for stop in mission.stops]
+    leg = min(range(len(candidates)), key=lambda index: candidates[index].distance)
+    return leg, candidates[leg]
 
 
 def foot(a: Point, b: Point, p: Point) -> Point:
-    """The point of the segment from `a` to `b` that is nearest to `p`."""
+    """Return the point of the segment from `a` to `b` that is nearest to `p`."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     square = dx * dx + dy * dy
-    share = 0.0 if square == 0 else ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / square
-    share = max(0.0, min(1.0, share))
-    return (a[0] + share * dx, a[1] + share * dy)
+    fraction = 0.0 if square == 0 else ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / square
+    fraction = max(0.0, min(1.0, fraction))
+    return (a[0] + fraction * dx, a[1] + fraction * dy)

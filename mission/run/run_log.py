@@ -1,8 +1,8 @@
-"""A run as it was logged: where the robot was and what it told, whatever kind of file it was read from.
+"""A run as it was logged: the robot's poses and events, whatever kind of file they were read from.
 
-Times are nanoseconds on the robot's clock (since 1970 where the clock knows the date), poses are metres and
-radians counter-clockwise from +x, both in the mission's frame: who read the log has brought it there, and
-`RunLog.alignment` says how.
+Times are nanoseconds on the robot's clock (since 1970 where the clock knows the date). Poses are metres and
+radians counter-clockwise from +x. Both are in the mission's frame: the reader of the log has transformed
+them, and `RunLog.alignment` records the transform.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ class Track:
     """Poses of a robot, sorted by time; where times are equal, in the order of the log."""
 
     ns: IntArray
-    """When (n,), nanoseconds on the robot's clock."""
+    """Times (n,), nanoseconds on the robot's clock."""
     xy: FloatArray
-    """Where (n, 2), metres in the mission's frame."""
+    """Positions (n, 2), metres in the mission's frame."""
     heading: FloatArray
-    """Which way (n,), radians counter-clockwise from +x."""
+    """Headings (n,), radians counter-clockwise from +x."""
 
     @classmethod
     def of(cls, ns: ArrayLike, xy: ArrayLike, heading: ArrayLike) -> Track:
@@ -39,14 +39,14 @@ class Track:
             counts them in `LogSource.lost`.
         """
         times = np.asarray(ns, dtype=np.int64).reshape(-1)
-        places = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-        turns = np.asarray(heading, dtype=np.float64).reshape(-1)
-        if not len(times) == len(places) == len(turns):
-            raise ValueError(f"{len(times)} times, {len(places)} places and {len(turns)} headings")
-        if not (np.isfinite(places).all() and np.isfinite(turns).all()):
+        positions = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+        headings = np.asarray(heading, dtype=np.float64).reshape(-1)
+        if not len(times) == len(positions) == len(headings):
+            raise ValueError(f"{len(times)} times, {len(positions)} positions and {len(headings)} headings")
+        if not (np.isfinite(positions).all() and np.isfinite(headings).all()):
             raise ValueError("a pose is not finite")
         order = np.argsort(times, kind="stable")
-        return cls(frozen(times[order], np.int64), frozen(places[order]), frozen(turns[order]))
+        return cls(frozen(times[order], np.int64), frozen(positions[order]), frozen(headings[order]))
 
     def __len__(self) -> int:
         return len(self.ns)
@@ -77,7 +77,7 @@ def _no_poses() -> Track:
 
 @dataclass(frozen=True)
 class LogSource:
-    """What a log was read from, and how much of it could not be read."""
+    """Source of a log, and how much of it could not be read."""
 
     name: str
     """The file's name, without its folders."""
@@ -90,12 +90,12 @@ class LogSource:
     lost: int = 0
     """Those that were cut off, damaged or not finite."""
     notes: tuple[str, ...] = ()
-    """What a reader of the log should know, a sentence each."""
+    """Notes for a reader of the log, a sentence each."""
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """How a log's frame was brought to the mission's: turned by `heading`, then shifted by (x, y)."""
+    """Transform of a log's frame to the mission's: rotated by `heading`, then shifted by (x, y)."""
 
     how: str
     """In words, such as `given by --map`, `first pose at the start`, `fitted to 9 scanned stops`."""
@@ -105,15 +105,15 @@ class Alignment:
     time_offset_ns: int = 0
     """Added to the log's times."""
     residual_rms_m: float | None = None
-    """What is left between the pairs of a fit; None where nothing was fitted."""
+    """Residual between the pairs of a fit; None where nothing was fitted."""
     residual_max_m: float | None = None
     pairs: int = 0
-    """Pairs of places that were fitted."""
+    """Pairs of positions that were fitted."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunLog:
-    """One run of one robot; what a foreign log does not tell is None."""
+    """One run of one robot; values that a third-party log does not contain are None."""
 
     robot: str
     run_id: str | None
@@ -129,19 +129,19 @@ class RunLog:
 
     @property
     def began_ns(self) -> int | None:
-        """When the run was started; where no event tells, the first moment that anything was logged."""
+        """Start of the run; where no event reports it, the first time that anything was logged."""
         started = [event.robot_ns for event in self.events if isinstance(event, Started)]
         return started[0] if started else self._edge(0)
 
     @property
     def ended_ns(self) -> int | None:
-        """When the run was over; where no event tells, the last moment that anything was logged."""
+        """End of the run; where no event reports it, the last time that anything was logged."""
         ends = [event.robot_ns for event in self.events if isinstance(event, Finished | Aborted)]
         return ends[-1] if ends else self._edge(-1)
 
     @property
     def ended(self) -> bool:
-        """Whether the log tells how the run ended."""
+        """True if the log contains the end of the run."""
         return any(isinstance(event, Finished | Aborted) for event in self.events)
 
     @property

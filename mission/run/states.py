@@ -1,7 +1,7 @@
-"""A run of a mission: where the robot is in its work, and how each outcome moves it on.
+"""States of a run: the robot's progress through a mission, and the transition that each outcome causes.
 
-Nothing here touches a robot, a clock or a disk: every function takes a run and gives the next one with
-the events that tell of it. The controller stores both before anything else happens.
+Nothing here touches a robot, a clock or a disk. Every function takes a run and returns the next one with
+the events of the change. The controller stores both before anything else happens.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from stopgo.mission.run.events import (
     State,
     StopState,
 )
-from stopgo.mission.run.scans import ScanFailed, ScanResult, missing_in
+from stopgo.mission.run.scans import ScanFailed, ScanResult, missing_fields
 from stopgo.mission.run.tolerance import deviation, is_outside
 
 After = Literal["FINISHED", "ABORTED", "PAUSED"]
@@ -41,7 +41,7 @@ DetailedState = State | Literal["PAUSED homing", "HELD homing"]
 
 
 class Run(msgspec.Struct, frozen=True, kw_only=True):
-    """The robot's place in its work, as stored before every transition."""
+    """The robot's progress through a mission, as stored before every transition."""
 
     state: State = "IDLE"
     mission_id: str | None = None
@@ -51,7 +51,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     leg: int = 0
     """The leg the robot is on; `len(stops)` is the return."""
     at: int = 0
-    """The stop that is worked on; `len(stops)` when all are behind."""
+    """Index of the current stop; `len(stops)` when all are done."""
     stop_state: StopState = "WAITING"
     attempt: int = 0
     approaches: int = 0
@@ -63,47 +63,47 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     done: tuple[str, ...] = ()
     skipped: tuple[str, ...] = ()
     outside: tuple[str, ...] = ()
-    """Those that are done and were scanned farther from their places than is tolerated."""
+    """Those of `done` that were scanned outside the stop's tolerance."""
     reason: str = ""
-    """Why it is paused, held or homing."""
+    """Reason why it is paused, held or homing."""
     homing: bool = False
-    """Whether what is driven, paused or held is the way home."""
+    """True if the robot was on its way home when it was paused or held, or is on it now."""
     homing_reason: str = ""
-    """Why it goes home, whatever has paused or held it meanwhile."""
+    """Reason why it goes home, even if something else has paused or held it since."""
     then: After = "FINISHED"
-    """What the run is once the robot is home."""
+    """State of the run once the robot is home."""
     next_revision: int | None = None
-    """The revision that is followed once the stop that is worked on is behind."""
+    """Revision that the robot follows once the current stop is done."""
 
     @property
     def over(self) -> bool:
         return self.state in ("IDLE", "READY", "FINISHED", "ABORTED")
 
     @property
-    def place(self) -> DetailedState:
-        """The state as orders see it: what is paused or held may be the way home."""
+    def detailed_state(self) -> DetailedState:
+        """The state as commands see it: a paused or held run may be on its way home."""
         if self.homing and self.state == "PAUSED":
             return "PAUSED homing"
         return "HELD homing" if self.homing and self.state == "HELD" else self.state
 
 
-Telling = Callable[..., AnyEvent]
+UnstampedEvent = Callable[..., AnyEvent]
 """An event that lacks its envelope (number, robot, times)."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """The next run and what is told of the step to it."""
+    """The next run, and the events of the change to it."""
 
     run: Run
-    events: tuple[Telling, ...] = ()
+    events: tuple[UnstampedEvent, ...] = ()
 
 
-def told_of(change: Change, *, robot: str, boot_id: str, now_ns: int) -> Iterator[AnyEvent]:
-    """The events of a change, as of the run that it leads to; the journal numbers them."""
+def events_of(change: Change, *, robot: str, boot_id: str, now_ns: int) -> Iterator[AnyEvent]:
+    """Yield the events of a change, as of the run that it leads to; the journal numbers them."""
     run = change.run
-    for telling in change.events:
-        yield telling(
+    for event in change.events:
+        yield event(
             number=0, robot=robot, boot_id=boot_id, run_id=run.run_id or "",
             mission_id=run.mission_id or "", revision=run.revision or 0, robot_ns=now_ns,
             mission_time_s=(now_ns - run.started_ns) / 1e9,
@@ -113,19 +113,19 @@ def told_of(change: Change, *, robot: str, boot_id: str, now_ns: int) -> Iterato
 changed = msgspec.structs.replace
 
 REAPPROACHES = 3
-"""Corrections driven to a stop before its place counts as not reached."""
+"""Corrections driven to a stop before it counts as not reached."""
 
 
 def installed(run: Run, mission: Mission) -> Run:
-    """A mission lies ready; there was no run, or it is over."""
+    """Return the run of a newly stored mission; there was no run, or it is over."""
     return Run(state="READY", mission_id=mission.id, revision=mission.revision)
 
 
 def rebooted(run: Run, became: ScanResult | ScanFailed | None = None) -> Change:
-    """After a reboot nothing moves until somebody resumes.
+    """Return the run after a reboot: nothing moves until somebody resumes.
 
-    `became` is what the scanner says of the scan that was under way; one that has ended is verified, any
-    other is taken again, under a number of its own.
+    `became` is the scanner's outcome of the scan that was running. A finished scan is verified; any other is
+    taken again, under a number of its own.
     """
     if run.over:
         return Change(run)
@@ -136,7 +136,7 @@ def rebooted(run: Run, became: ScanResult | ScanFailed | None = None) -> Change:
 
 
 def started(run: Run, *, run_id: str, now_ns: int, by: str, left_out: tuple[str, ...] = ()) -> Change:
-    """A new run of the mission that lies ready or was run before, without the first stops if so said."""
+    """Return a new run of the stored mission; `left_out` are first stops to begin beyond."""
     fresh = Run(
         state="RUNNING", mission_id=run.mission_id, revision=run.revision, run_id=run_id, started_ns=now_ns,
         leg=len(left_out), at=len(left_out), skipped=left_out,
@@ -146,7 +146,7 @@ def started(run: Run, *, run_id: str, now_ns: int, by: str, left_out: tuple[str,
 
 
 def paused(run: Run, reason: str, *, stands: bool = True) -> Change:
-    """The run waits. A robot that stands ends the scan it is in, so that no stop is scanned twice."""
+    """Pause the run. A stationary robot ends the scan it is in, so that no stop is scanned twice."""
     kept = ("SCANNING", "VERIFYING") if stands else ("VERIFYING",)
     waiting = changed(
         run, state="PAUSED", stop_state=run.stop_state if run.stop_state in kept else "WAITING",
@@ -156,7 +156,7 @@ def paused(run: Run, reason: str, *, stands: bool = True) -> Change:
 
 
 def resumed(run: Run, by: str) -> Change:
-    """The run goes on; one that was held has all its tries again."""
+    """Resume the run; after a hold all tries are available again."""
     going = changed(
         run, state="HOMING" if run.homing else "RUNNING", reason=run.homing_reason,
         stop_state=run.stop_state if run.stop_state in ("SCANNING", "VERIFYING") else "WAITING",
@@ -167,12 +167,12 @@ def resumed(run: Run, by: str) -> Change:
 
 
 def leaving(run: Run) -> Change:
-    """The robot is about to drive."""
+    """Mark that the robot is about to drive."""
     return Change(changed(run, stop_state="NAVIGATING"))
 
 
 def reached(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Change:
-    """The end of the leg, or the stop after a correction, has been reached."""
+    """Mark that the robot reached the end of the leg, or the stop after a correction."""
     if run.leg < run.at:
         return Change(changed(run, leg=run.leg + 1))
     stop = mission.stops[run.at]
@@ -192,11 +192,11 @@ def reached(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Chang
 
 
 def settled(run: Run, mission: Mission, pose: Pose, deviation_m: float) -> Change:
-    """The robot stands still; if not where it should, it goes there again."""
+    """Mark that the robot is stationary; outside the tolerance, it drives to the stop again."""
     if is_outside(deviation_m, mission.stops[run.at].tolerance_m):
         return reached(run, mission, pose, deviation_m)
-    telling = partial(Settled, stop=mission.stops[run.at].id, pose=pose)
-    return Change(changed(run, stop_state="SCANNING", scans=run.scans + 1), (telling,))
+    event = partial(Settled, stop=mission.stops[run.at].id, pose=pose)
+    return Change(changed(run, stop_state="SCANNING", scans=run.scans + 1), (event,))
 
 
 def scan_ended(run: Run, mission: Mission, result: ScanResult | ScanFailed) -> Change:
@@ -206,29 +206,29 @@ def scan_ended(run: Run, mission: Mission, result: ScanResult | ScanFailed) -> C
 
 
 def verified(run: Run, mission: Mission, pose: Pose) -> Change:
-    """Whether the scanner's result is one; then the stop is done.
+    """Complete the stop if the scanner's result is complete.
 
-    The robot stands at the pose by now, and stood there while it scanned unless the result says otherwise.
+    The robot is at the pose now, and was there while it scanned unless the result says otherwise.
     """
     stop, scan = mission.stops[run.at], run.scan
     if scan is None:
         return Change(changed(run, stop_state="WAITING"))
     pose = scan.pose or pose
-    missing = missing_in(scan)
+    missing = missing_fields(scan)
     if missing:
-        told = f"{scan.file} ({scan.size} bytes, {scan.points} points)"
-        reason = f"scan not confirmed: {told} without {', '.join(missing)}"
+        result = f"{scan.file} ({scan.size} bytes, {scan.points} points)"
+        reason = f"scan not confirmed: {result} without {', '.join(missing)}"
         return failed(changed(run, scan=None), mission, reason)
-    telling = partial(
+    event = partial(
         Scanned, stop=stop.id, pose=pose,
         file=scan.file, size=scan.size, sha256=scan.sha256, points=scan.points,
     )  # fmt: skip
     done = next_stop(with_done(run, stop, pose), mission)
-    return Change(done.run, (telling, *done.events))
+    return Change(done.run, (event, *done.events))
 
 
 def with_done(run: Run, stop: Stop, pose: Pose | None) -> Run:
-    """The stop is done; from elsewhere, if the robot stood there."""
+    """Mark the stop as done; outside its tolerance, if the robot was there."""
     outside = pose is not None and is_outside(deviation(pose, stop), stop.tolerance_m)
     return changed(
         run, done=(*run.done, stop.id), outside=(*run.outside, stop.id) if outside else run.outside
@@ -236,13 +236,13 @@ def with_done(run: Run, stop: Stop, pose: Pose | None) -> Run:
 
 
 def next_stop(run: Run, mission: Mission) -> Change:
-    """On to the next stop; a new revision that waits says itself what is next."""
+    """Go on to the next stop; a new revision that waits determines itself what is next."""
     between = changed(run, at=run.at + 1, stop_state="WAITING", attempt=0, approaches=0, scan=None)
     return Change(between) if between.next_revision is not None else next_leg(between, mission)
 
 
 def next_leg(run: Run, mission: Mission) -> Change:
-    """To the stop that is next, the way back, or the end."""
+    """Go on to the next stop, the return leg, or the end of the run."""
     if run.at < len(mission.stops):
         return Change(run)
     if mission.return_ is None:
@@ -255,17 +255,17 @@ def sent_home(run: Run, mission: Mission, *, then: After, reason: str) -> Change
 
 
 def link_lost(run: Run, mission: Mission, silent_s: float) -> Change:
-    """No station has been heard for too long: as the mission's policy says, but no scan is cut short."""
+    """Apply the mission's policy after a link loss; no scan is cut short."""
     policy = mission.policy.link_loss
     reason = f"no station heard for {silent_s:.0f} s"
-    telling = partial(LinkLost, silent_s=silent_s, policy=policy)
+    event = partial(LinkLost, silent_s=silent_s, policy=policy)
     goes_home = policy == "home"
     change = sent_home(run, mission, then="PAUSED", reason=reason) if goes_home else held(run, reason)
-    return Change(change.run, (telling, *change.events))
+    return Change(change.run, (event, *change.events))
 
 
 def heading_home(run: Run, mission: Mission, *, then: After, reason: str) -> Run:
-    """On the way home; a robot that is paused stays so, and goes home when it is resumed."""
+    """Set the run on its way home; a paused robot stays paused, and goes home when it is resumed."""
     state: State = "PAUSED" if run.state == "PAUSED" else "HOMING"
     last_leg = len(mission.stops) - (mission.return_ is None)
     return changed(
@@ -274,8 +274,8 @@ def heading_home(run: Run, mission: Mission, *, then: After, reason: str) -> Run
     )  # fmt: skip
 
 
-def came_home_by(run: Run, mission: Mission) -> Change:
-    """One leg of the way home is behind."""
+def home_leg_driven(run: Run, mission: Mission) -> Change:
+    """Mark one leg of the way home as driven."""
     if run.leg == len(mission.stops) or run.leg == 0:
         return ended(changed(run, reason=run.homing_reason), run.then)
     return Change(changed(run, leg=run.leg - 1))
@@ -291,7 +291,7 @@ def ended(run: Run, then: After) -> Change:
 
 
 def held(run: Run, reason: str) -> Change:
-    """Somebody must decide: retry, skip, home or abort."""
+    """Hold the run: somebody must decide to retry, skip, home or abort."""
     waiting = changed(
         run, state="HELD", stop_state="RETRIABLE", reason=reason, homing=run.homing or run.state == "HOMING"
     )
@@ -299,18 +299,18 @@ def held(run: Run, reason: str) -> Change:
 
 
 def failed(run: Run, mission: Mission, reason: str) -> Change:
-    """An attempt at a stop has failed: again while tries are left, then as the stop's `on_failure` says."""
+    """Record a failed attempt at a stop: retry while tries are left, then apply the stop's `on_failure`."""
     stop = mission.stops[run.at]
     if run.attempt < stop.retries:
         again = changed(run, stop_state="WAITING", attempt=run.attempt + 1, approaches=0, scan=None)
         return Change(again)
-    telling = partial(Failed, stop=stop.id, reason=reason)
+    event = partial(Failed, stop=stop.id, reason=reason)
     change = ON_FAILURE[stop.on_failure](changed(run, scan=None), mission, f"{stop.id}: {reason}")
-    return Change(change.run, (telling, *change.events))
+    return Change(change.run, (event, *change.events))
 
 
 def skipped(run: Run, mission: Mission, reason: str) -> Change:
-    """The stop is left out; its approach is still followed, for it is part of the way."""
+    """Leave the stop out; its approach is still driven, because it is part of the route."""
     stop = mission.stops[run.at]
     behind = next_stop(changed(run, skipped=(*run.skipped, stop.id)), mission)
     return Change(behind.run, (partial(Skipped, stop=stop.id, reason=reason), *behind.events))
@@ -335,11 +335,11 @@ ON_FAILURE: dict[str, Callable[[Run, Mission, str], Change]] = {
     "abort": _abort,
     "home": _home,
 }
-"""What is done when a stop's tries are used up; `retry` has nothing left but to ask."""
+"""Reaction when a stop's tries are used up; `retry` can then only ask."""
 
 
 def stop_of(run: Run, mission: Mission | None) -> Stop | None:
-    """The stop that is worked on."""
+    """The current stop; None if there is none."""
     if mission is None or run.state in ("IDLE", "READY") or run.at >= len(mission.stops):
         return None
     return mission.stops[run.at]

@@ -1,4 +1,4 @@
-"""The nouns between a floor and a mission, one per stage; each keeps the noun it was made from.
+"""Results of the stages between a floor and a mission; each keeps the result it was made from.
 
 Distances are metres, areas m², angles radians counter-clockwise from +x. Arrays are read-only.
 """
@@ -17,7 +17,7 @@ from stopgo.mission.settings import Settings
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """What is to be scanned: boundary segments, each cut into units of at most d_dis (paper, 3.1)."""
+    """Boundary to scan: segments, each cut into units of at most d_dis (paper, 3.1)."""
 
     a: FloatArray
     """Start of each segment (m, 2)."""
@@ -71,13 +71,13 @@ class Targets:
 
 @dataclass(frozen=True, eq=False)
 class OpeningState:
-    """What an opening is to the robot."""
+    """Passability of an opening for the robot."""
 
     opening: Opening
     rooms: tuple[int | None, int | None]
     """Indices into `FloorPlan.rooms` of the rooms on its two sides."""
     clear_width: float
-    """Widest clear piece of the line between obstacles."""
+    """Widest clear stretch of the line between obstacles."""
     passable: bool
     why: str
     """Empty when passable, else the reason in words."""
@@ -85,33 +85,33 @@ class OpeningState:
 
 @dataclass(frozen=True, eq=False)
 class RoomSpace:
-    """Where in a room stops may be (for pictures and areas: points are decided exactly)."""
+    """Area of a room where stops may be (for pictures and areas: points are decided exactly)."""
 
     room: int | None
     """Index into `FloorPlan.rooms`; None for the floor outside every room."""
     name: str
     area: tuple[Polygon, ...]
-    """The room itself, as planned (rooms inside it subtracted)."""
+    """The room itself, as planned, without the rooms inside it."""
     stop_area: tuple[Polygon, ...]
     """Points at least d_sec from every element and `edge` from floor edges."""
 
 
 @dataclass(frozen=True, eq=False)
 class NavigableSpace:
-    """Where the robot's centre may be, and what it is to look at."""
+    """Area for the robot's centre, and the targets of the scans."""
 
     floor: FloorPlan
     settings: Settings
     rooms: tuple[RoomSpace, ...]
     openings: tuple[OpeningState, ...]
     obstacles: tuple[Polygon, ...]
-    """Everything a robot must keep away from, unioned."""
+    """Everything from which a robot must keep its distance, unioned."""
     occluders: tuple[Polygon, ...]
-    """Everything a laser does not pass, unioned."""
+    """Everything that blocks a laser, unioned."""
     barriers: FloatArray
     """Openings that are not driven through, as segments (k, 2, 2)."""
     drive_area: tuple[Polygon, ...]
-    """Where the robot's centre may drive."""
+    """Area in which the robot's centre may drive."""
     gaps: FloatArray
     """Straight crossings (k, 2, 2) of openings exactly as wide as the robot, between drive areas."""
     targets: Targets
@@ -123,7 +123,7 @@ class NavigableSpace:
 
 
 def weights_of(targets: Targets, settings: Settings) -> IntArray:
-    """What each unit counts in a coverage (n,): its length in micrometres, or 1 by the paper's rule."""
+    """Return each unit's weight in a coverage (n,): its length in micrometres, or 1 by the paper's rule."""
     if settings.coverage_rule == "paper":
         return frozen(np.ones(targets.total), np.int64)
     return frozen(np.maximum(1, np.rint(targets.unit_length * 1e6)), np.int64)
@@ -141,7 +141,7 @@ DROP_REASONS = (
     "triangle too small",
     "sliver triangle",
 )
-"""Why a candidate was dropped; `Candidates.reason` holds indices into this."""
+"""Reasons why a candidate was dropped; `Candidates.reason` holds indices into this."""
 KEPT, OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, UNREACHABLE, OTHER_PART, AVOIDED, TOO_SMALL, SLIVER = range(
     len(DROP_REASONS)
 )
@@ -149,7 +149,7 @@ KEPT, OUTSIDE, IN_HOLE, TOO_CLOSE, AT_EDGE, UNREACHABLE, OTHER_PART, AVOIDED, TO
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Possible scan positions, those that were dropped included, each with the reason."""
+    """Possible scan positions, with the dropped ones, each with the reason."""
 
     space: NavigableSpace
     xy: FloatArray
@@ -159,20 +159,20 @@ class Candidates:
     reason: IntArray
     """Index into DROP_REASONS (n,)."""
     part: IntArray
-    """Part of the floor each reachable candidate belongs to, else -1 (n,)."""
+    """Part of the floor of each reachable candidate, else -1 (n,)."""
     strategy: str
     chosen_part: int = 0
-    """The part this plan is of."""
+    """The part that this plan is of."""
     part_area: tuple[float, ...] = ()
     """Free area of each part, m²."""
     doorway: BoolArray = field(default_factory=lambda: frozen([], np.bool_))
-    """Whether each candidate stands in a doorway (n,); empty where none does."""
+    """True for candidates in a doorway (n,); empty if there is none."""
     must: BoolArray = field(default_factory=lambda: frozen([], np.bool_))
-    """Whether a stop must be at each candidate (n,); empty where none must."""
+    """True for required stops (n,); empty if there is none."""
     extra: BoolArray = field(default_factory=lambda: frozen([], np.bool_))
-    """Whether each candidate is there to save or join stops, and not for what is visible (n,)."""
+    """True for candidates that only save or connect stops, and do not count for what is visible (n,)."""
     heading: FloatArray = field(default_factory=lambda: frozen([]))
-    """The scanner's heading at each candidate (n,); empty where it looks all round."""
+    """The scanner's heading at each candidate (n,); empty if the scanner sees all round."""
 
     @cached_property
     def kept(self) -> IntArray:
@@ -181,13 +181,13 @@ class Candidates:
 
     @cached_property
     def generated(self) -> int:
-        """Places that a stop was thought of at: different positions inside rooms, whatever became of them."""
+        """Number of different generated positions inside rooms, reachable or not."""
         never = [OUTSIDE, IN_HOLE, TOO_SMALL, SLIVER]
         return len(np.unique(self.xy[~np.isin(self.reason, never)], axis=0))
 
     @cached_property
     def reachable(self) -> int:
-        """Places where a stop may be; a scanner that does not look all round has several headings at each."""
+        """Positions where a stop may be; a scanner with a limited view has several headings there."""
         return len(np.unique(self.xy[self.kept], axis=0))
 
     @cached_property
@@ -197,7 +197,7 @@ class Candidates:
 
     @cached_property
     def must_rows(self) -> IntArray:
-        """Rows (indices into `kept`) of the candidates where a stop must be."""
+        """Rows (indices into `kept`) of the required stops."""
         return self._rows_where(self.must)
 
     @cached_property
@@ -211,10 +211,10 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """What each kept candidate sees, as runs of units on segments.
+    """Units that each reachable candidate sees, as runs of units on segments.
 
-    Run k of candidate row c, `pointer[c] <= k < pointer[c + 1]`, says that units `first[k]` to
-    `last[k]` (inclusive, counted over all targets) lie visible on `segment[k]`.
+    Run k of candidate row c, `pointer[c] <= k < pointer[c + 1]`, means that units `first[k]` to `last[k]`
+    (inclusive, counted over all targets) are visible on `segment[k]`.
     """
 
     candidates: Candidates
@@ -224,7 +224,7 @@ class Visibility:
     last: IntArray
     method: str
     in_sight: Visibility | None = None
-    """What lies in sight, seen well enough or not; None where that is the same."""
+    """Line of sight alone, without the limits; None if that is the same."""
 
     @property
     def targets(self) -> Targets:
@@ -236,7 +236,7 @@ class Visibility:
         return len(self.pointer) - 1
 
     def seen_by(self, row: int) -> IntArray:
-        """Units that the candidate of this row sees, ascending."""
+        """Return the units that the candidate of this row sees, ascending."""
         start, stop = int(self.pointer[row]), int(self.pointer[row + 1])
         if start == stop:
             return frozen([], np.int64)
@@ -250,9 +250,9 @@ class Visibility:
 
     @cached_property
     def runs_apart(self) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-        """Row, segment, first and last unit of runs (k,) that say the same, no unit twice in a row.
+        """Row, segment, first and last unit of equivalent runs (k,), with no unit twice in a row.
 
-        They stand in the order of their rows and, in each, of their units.
+        They are sorted by row and, within a row, by unit.
         """
         row = np.repeat(np.arange(self.rows), np.diff(self.pointer))
         order = np.lexsort((self.first, row))
@@ -270,7 +270,7 @@ class Visibility:
 
     @cached_property
     def units_seen(self) -> IntArray:
-        """How many units each candidate sees (rows,)."""
+        """Number of units that each candidate sees (rows,)."""
         row, _, first, last = self.runs_apart
         counts = np.zeros(self.rows, dtype=np.int64)
         np.add.at(counts, row, last - first + 1)
@@ -278,28 +278,28 @@ class Visibility:
 
     @cached_property
     def visible(self) -> BoolArray:
-        """Whether any candidate, those that do not count aside, sees each unit (n,)."""
+        """True for units that any candidate sees, except those that do not count (n,)."""
         return self._seen_by_any(self._pattern)
 
     @cached_property
     def asked(self) -> IntArray:
-        """From how many stops each unit must be seen until it counts (n,).
+        """Number of stops that must see each unit until it counts (n,).
 
-        As many as the settings ask for; where fewer candidates see it, from that many, so that no floor is
-        given up because more is asked for.
+        It is the required number of views. If fewer candidates see a unit, it is their number, so that
+        a stricter requirement never makes a floor impossible.
         """
         most = self.candidates.space.settings.least_views
         views = np.ones(self.targets.total) if most == 1 else self.views_from(self._pattern)
         return frozen(np.clip(views, 1, most), np.int64)
 
     def seen_from(self, rows: IntArray) -> BoolArray:
-        """Whether as many of the candidates in `rows` see each unit as it asks for (n,)."""
+        """Return True for units that enough of the candidates in `rows` see (n,)."""
         if self.candidates.space.settings.least_views == 1:
             return self._seen_by_any(rows)
         return frozen(self.views_from(rows) >= self.asked, np.bool_)
 
     def views_from(self, rows: IntArray) -> IntArray:
-        """How many of the candidates in `rows` see each unit (n,)."""
+        """Return the number of candidates in `rows` that see each unit (n,)."""
         views = np.zeros(self.targets.total, dtype=np.int64)
         for row in rows:
             views[self.seen_by(int(row))] += 1
@@ -307,7 +307,7 @@ class Visibility:
 
     @property
     def _pattern(self) -> IntArray:
-        """The rows that were not added beside chosen ones."""
+        """Rows of the candidates that were not added near chosen ones."""
         return np.setdiff1d(np.arange(self.rows), self.candidates.extra_rows)
 
     def _seen_by_any(self, rows: IntArray) -> BoolArray:
@@ -330,19 +330,19 @@ class Selection:
     """Coverage after each choice (k,)."""
     required: float
     bound: int
-    """No selection that reaches the required coverage has fewer stops."""
+    """Lower bound: no selection with the required coverage has fewer stops."""
     method: str
     everywhere: bool = False
-    """Whether the bound is over every place where a stop may be, and not only over the candidates."""
+    """True if the bound holds for every possible position, and not only for the candidates."""
 
     @property
     def among(self) -> str:
-        """What the bound is over, in words."""
+        """Range of the bound, in words."""
         return "all places" if self.everywhere else "these candidates"
 
     @property
     def coverage(self) -> float:
-        """Share of what is visible that the chosen stops see, by the settings' rule."""
+        """Fraction of all visible that the chosen stops see, by the rule of the parameters."""
         return float(self.coverage_steps[-1]) if len(self.coverage_steps) else 0.0
 
     @cached_property
@@ -354,44 +354,44 @@ class Selection:
 
 @dataclass(frozen=True)
 class LeastTime:
-    """What a route takes whose stops and order were chosen together, for the least time."""
+    """Duration of a route whose stops and order were chosen together, for the least time."""
 
     seconds: float
     """By the mission's schedule."""
     two_step_s: float
-    """What fewest stops and then a shortest route over them would take …"""
+    """Duration with the fewest stops and then a shortest route over them …"""
     two_step_stops: int
-    """… with so many stops."""
+    """… and the number of those stops."""
     bound: float
-    """No plan over these candidates takes less."""
+    """Lower bound: no plan over these candidates takes less."""
 
     @property
     def saved_s(self) -> float:
-        """What it takes less."""
+        """Seconds saved against the two steps."""
         return self.two_step_s - self.seconds
 
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """The order of the stops and the way between them."""
+    """The order of the stops, and the legs between them."""
 
     selection: Selection
     order: IntArray
     """Indices into `selection.chosen`, in the order of driving (k,)."""
     start: tuple[float, float, float]
-    """Where the route begins: x, y, heading."""
+    """Start of the route: x, y, heading."""
     start_reason: str
     approaches: tuple[FloatArray, ...]
-    """For each stop in order, the polyline (n, 2) driven to it from the stop before (or the start)."""
+    """For each stop in order, the polyline (n, 2) driven to it from the previous stop (or the start)."""
     return_leg: FloatArray | None
     """The polyline back to the start of a closed tour, or on to a given end."""
     tour: str
     """`closed` or `open`."""
     bound: float
-    """No route over these stops is shorter."""
+    """Lower bound: no route over these stops is shorter."""
     method: str
     time: LeastTime | None = None
-    """None where stops were to be fewest."""
+    """None if the plan minimises the number of stops."""
 
     @cached_property
     def length(self) -> float:
@@ -406,7 +406,7 @@ class Route:
 
 @dataclass(frozen=True, eq=False)
 class Unreached:
-    """A room that the plan does not enter, and why."""
+    """A room that the plan does not enter, and the reason."""
 
     room: str
     why: str

@@ -1,4 +1,4 @@
-"""What every target unit counts and belongs to: from what is seen, the shares of all, rooms and kinds."""
+"""Weights and groups of all target units: coverage of the whole, of rooms and of kinds, from seen units."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from stopgo.mission.stages import Visibility, weights_of
 from stopgo.mission.stages.figures import Share, Shares, worst_first
 
 OUTSIDE = "in no room"
-"""The name of what faces no room."""
+"""Name of the units that face no room."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """Units of which a share is asked together."""
+    """Units with a common required coverage."""
 
     name: str
     required: float | None = None
-    """Least share of what is visible; None where nothing is asked."""
+    """Least fraction of all visible; None if nothing is required."""
     why: str = ""
-    """Why the robot does not come there."""
+    """Reason why the robot does not reach it."""
 
 
 @dataclass(frozen=True)
 class Seen:
-    """An element that is to be seen."""
+    """An element with targets."""
 
     id: str
     kind: str
@@ -41,11 +41,11 @@ class CoverageTotals:
     """The units of a plan, n of them, in the order of its targets."""
 
     rule: Literal["length", "paper"]
-    """Whether shares count metres or units."""
+    """`length`: fractions of metres. `paper`: fractions of units."""
     weight: IntArray
-    """What each unit counts (n,), micrometres or 1."""
+    """Weight of each unit (n,), micrometres or 1."""
     visible: BoolArray
-    """Whether any candidate sees it (n,)."""
+    """True for units that any candidate sees (n,)."""
     room: IntArray
     """Index into `rooms` (n,); -1 where it faces none."""
     element: IntArray
@@ -53,18 +53,18 @@ class CoverageTotals:
     rooms: tuple[Group, ...]
     elements: tuple[Seen, ...]
     required: float
-    """Least share of the whole."""
+    """Least fraction of the whole."""
     kind_required: float | None
-    """Least share of each kind."""
+    """Least fraction of each kind."""
     asked: IntArray = field(default_factory=lambda: frozen([1], np.int64))
-    """From how many stops each unit must be seen until it counts (n,), or every unit (1,)."""
+    """Number of stops that must see each unit until it counts (n,), or every unit (1,)."""
 
     def enough(self, views: IntArray) -> BoolArray:
-        """Whether each unit counts as seen (n,), where so many stops see it."""
+        """Return True for units that count as seen, for these numbers of views (n,)."""
         return frozen(views >= self.asked, np.bool_)
 
     def shares(self, seen: BoolArray) -> Shares:
-        """What a mask of units (n,) comes to; rooms and kinds with targets, the one least seen first."""
+        """Return the coverage of a mask of units (n,); rooms and kinds with targets, least seen first."""
         *rooms, outside = self.rooms_seen(seen)
         listed = (*worst_first(rooms), outside)
         return Shares(
@@ -74,19 +74,19 @@ class CoverageTotals:
         )
 
     def rooms_seen(self, seen: BoolArray) -> tuple[Share, ...]:
-        """The share of every room, in order, and at last of what faces none."""
+        """Return the coverage of every room, in order, and last of the units that face none."""
         rooms = [self.share(group, self.room == k, seen) for k, group in enumerate(self.rooms)]
         return (*rooms, self.share(Group(OUTSIDE), self.room < 0, seen))
 
     def kinds_seen(self, seen: BoolArray) -> tuple[Share, ...]:
-        """The share of every kind of element, by name."""
+        """Return the coverage of every kind of element, by name."""
         return tuple(
             self.share(Group(kind, self.kind_required), self._kind == k, seen)
             for k, kind in enumerate(self._kinds)
         )
 
     def by_element(self, seen: BoolArray) -> tuple[Share, ...]:
-        """The share of every element with targets, in the floor's order."""
+        """Return the coverage of every element with targets, in the floor's order."""
         size = len(self.elements)
         masks = (None, self.visible, self.visible & seen)
         sums = [np.bincount(self.element, self._counted(mask), minlength=size) * self.scale for mask in masks]
@@ -97,13 +97,13 @@ class CoverageTotals:
         )
 
     def share(self, group: Group, member: BoolArray, seen: BoolArray) -> Share:
-        """The share of a mask of units (n,)."""
+        """Return the coverage of a mask of units (n,)."""
         visible = member & self.visible
         total, could, did = (self.amount(mask) for mask in (member, visible, visible & seen))
         return Share(group.name, total, could, did, required=group.required, why=group.why)
 
     def amount(self, units: BoolArray) -> float:
-        """What a mask of units (n,) counts, in metres or units."""
+        """Return the amount of a mask of units (n,), in metres or units."""
         return float(int(self.weight[units].sum()) * self.scale)
 
     @property
@@ -126,16 +126,16 @@ class CoverageTotals:
 
 
 def ledger_of(visibility: Visibility, why: Mapping[str, str] | None = None) -> CoverageTotals:
-    """The ledger of a plan; `why` tells by room why the robot does not come there."""
+    """Return the totals of a plan; `why` has the reason by room where the robot does not go."""
     space, targets = visibility.candidates.space, visibility.targets
-    settings, told, asked = space.settings, why or {}, space.settings.least_of_room
+    settings, reasons, asked = space.settings, why or {}, space.settings.least_of_room
     return CoverageTotals(
         rule=settings.coverage_rule,
         weight=weights_of(targets, settings),
         visible=visibility.visible,
         room=space.unit_room,
         element=frozen(targets.element[targets.unit_segment], np.int64),
-        rooms=tuple(Group(room.name, asked, told.get(room.name, "")) for room in space.rooms),
+        rooms=tuple(Group(room.name, asked, reasons.get(room.name, "")) for room in space.rooms),
         elements=tuple(Seen(item.id, item.kind) for item in space.floor.elements),
         required=settings.coverage,
         kind_required=settings.least_of_kind,

@@ -1,4 +1,4 @@
-"""Which stretches of the targets' boundary the chosen stops see, as runs of units along segments."""
+"""Covered stretches of the targets' boundary, as runs of units along segments."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class SeenStretches:
 
 
 def seen_units(selection: Selection) -> BoolArray:
-    """Whether enough of the chosen stops see each unit (n,)."""
+    """Return True for units that enough of the chosen stops see (n,)."""
     return selection.visibility.seen_from(selection.chosen)
 
 
 def runs_of(targets: Targets, units: BoolArray) -> SeenStretches:
-    """The units of a mask (n,) joined into runs as long as each segment allows, in segment order."""
+    """Return the units of a mask (n,) joined into runs as long as each segment allows, in segment order."""
     segment, total = targets.unit_segment, targets.total
     joined = units[1:] & units[:-1] & (segment[1:] == segment[:-1])
     first = np.flatnonzero(units & ~np.concatenate([[False], joined])[:total])

@@ -1,4 +1,4 @@
-"""A route's stops, shared out among robots or tours."""
+"""Division of a route's stops among robots or tours."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ class DividedRoute:
     """Routes that together visit every stop of a route once."""
 
     kind: Literal["robot", "tour"]
-    """Of robots that drive at the same time, or of tours that one robot drives one after another."""
+    """`robot`: robots drive at the same time. `tour`: one robot drives the tours one after another."""
     routes: tuple[Route, ...]
     limit_s: float | None
-    """Seconds that every tour stays within; None for robots."""
+    """Seconds that no tour exceeds; None for robots."""
     bound: float
-    """For robots, seconds that the longest tour takes at least; for tours, how many there are at least."""
+    """Lower bound: for robots, of the longest tour's seconds; for tours, of their number."""
     method: str

@@ -1,4 +1,4 @@
-"""What a plan amounts to: one set of numbers for the terminal, JSON, the printed plan and the recording."""
+"""Figures of a plan: one set of numbers for the terminal, JSON, the printed plan and the recording."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stopgo.mission.stages import Unreached
 
 @dataclass(frozen=True)
 class Share:
-    """What of some targets can be seen at all, and what of that the chosen stops see.
+    """Coverage of some targets: their visible part, and what the chosen stops see of it.
 
     Counted in metres of boundary, or in units by the paper's rule.
     """
@@ -22,33 +22,33 @@ class Share:
     """A room, a kind of element, or `all`."""
     total: float
     visible: float
-    """Seen from any reachable candidate."""
+    """Visible from any reachable candidate."""
     seen: float
-    """Of what is visible, seen by the stops."""
+    """Seen by the stops, of all visible."""
     required: float | None = None
-    """Least share asked for, if any."""
+    """Least fraction required, if any."""
     why: str = ""
-    """Why a room is not entered."""
+    """Reason why a room is not entered."""
 
     @property
     def coverage(self) -> float | None:
-        """Share of what is visible that is seen; None where nothing is visible."""
+        """Fraction of all visible that is seen; None if nothing is visible."""
         return self.seen / self.visible if self.visible else None
 
     @property
     def visible_share(self) -> float:
-        """Share of all that is visible."""
+        """Fraction of the total that is visible."""
         return self.visible / self.total if self.total else 0.0
 
     @property
     def met(self) -> bool:
-        """Whether as much is seen as is asked for; rounding alone never decides."""
+        """True if the required fraction is seen; rounding alone never decides."""
         return self.required is None or self.seen >= (self.required - 1e-9) * self.visible
 
 
 @dataclass(frozen=True)
 class Shares:
-    """What of the targets is seen, by room and kind."""
+    """Coverage of all targets, by room and kind."""
 
     whole: Share
     rooms: tuple[Share, ...]
@@ -58,27 +58,27 @@ class Shares:
 
     @property
     def short(self) -> tuple[Share, ...]:
-        """Those of which less is seen than is asked for."""
+        """Those with less coverage than required."""
         return tuple(share for share in (self.whole, *self.rooms, *self.kinds) if not share.met)
 
 
 @dataclass(frozen=True)
 class LimitCost:
-    """What one limit on how targets are seen costs, by a plan made quickly without it."""
+    """Cost of one limit on how targets are seen, from a quick plan without it."""
 
     limit: str
-    """The parameter that sets it."""
+    """The parameter of the limit."""
     words: str
     stops: int
-    """Of the plan, with all limits."""
+    """Number of stops of the plan, with all limits."""
     without: int
-    """About how many it takes without this one."""
+    """Approximate number of stops without this limit."""
     bound: int
-    """Without this one there are never fewer."""
+    """Lower bound of the stops without this limit."""
 
     @property
-    def told(self) -> str:
-        """What it costs, in words."""
+    def text(self) -> str:
+        """The cost in words."""
         more = self.stops - self.without
         cost = "costs no stop" if more <= 0 else f"costs about {more} stop{'s' * (more > 1)}"
         return f"{cost} (about {self.without} without, at least {self.bound})"
@@ -86,16 +86,16 @@ class LimitCost:
 
 @dataclass(frozen=True)
 class Quality:
-    """How well targets are to be seen, and what that comes to."""
+    """Limits on how targets are seen, and their effect."""
 
     costs: tuple[LimitCost, ...]
     in_sight: float
-    """Of the targets, in the plan's unit, what some candidate has in sight at all."""
+    """Amount of the targets, in the plan's unit, in the line of sight of some candidate."""
     possible: float
-    """Of that, what enough candidates see well enough."""
+    """Part of it that enough candidates see within the limits."""
 
-    def told(self, unit: str) -> str:
-        """What can be seen as asked, in words."""
+    def text(self, unit: str) -> str:
+        """Return the possible part in words."""
         share = percent(self.possible / self.in_sight if self.in_sight else None)
         return f"{share} of the {self.in_sight:.0f} {unit} in sight can be seen as asked"
 
@@ -105,21 +105,21 @@ class Figures:
     """A plan in numbers."""
 
     rule: Literal["length", "paper"]
-    """Whether shares count metres or units."""
+    """`length`: fractions of metres. `paper`: fractions of units."""
     whole: Share
     rooms: tuple[Share, ...]
     """Every room with targets, the one least seen first."""
     kinds: tuple[Share, ...]
     """Every kind of target, the one least seen first."""
     rooms_m2: float
-    """Floor of all rooms, floor outside every room included."""
+    """Floor area of all rooms, with the floor outside every room."""
     reached_m2: float
-    """Floor of the rooms, or parts of rooms, that the robot gets to."""
+    """Floor area of the rooms, or parts of rooms, that the robot can reach."""
     unreached: tuple[Unreached, ...]
     findings: tuple[Finding, ...]
-    """Everything odd, what bears on the plan most first."""
+    """All findings, those with the greatest effect on the plan first."""
     quality: Quality | None = None
-    """None where any view counts, from any stop."""
+    """None if any view counts, from any stop."""
 
     @property
     def unit(self) -> str:
@@ -127,12 +127,12 @@ class Figures:
 
     @property
     def grave(self) -> tuple[Finding, ...]:
-        """Findings for which the plan may be wrong or leave something out."""
+        """Findings that may make the plan wrong or incomplete."""
         return tuple(item for item in self.findings if item.rank == Rank.GRAVE)
 
     @property
     def crosses_ignored(self) -> bool:
-        """Whether a leg crosses lines of which nobody knows what they stand for."""
+        """True if a leg crosses lines of unknown meaning."""
         return any(item.code == LEG_OVER_IGNORED for item in self.findings)
 
 
@@ -140,17 +140,17 @@ LEG_OVER_IGNORED = "leg_over_ignored"
 
 
 def worst_first(shares: Sequence[Share]) -> tuple[Share, ...]:
-    """By coverage, then by name; where nothing is visible at the end."""
+    """Sort by coverage, then by name; without visible targets last."""
     return tuple(sorted(shares, key=how_bad))
 
 
 def how_bad(share: Share) -> tuple[bool, float, str]:
-    """What `worst_first` sorts by."""
+    """Return the sort key of `worst_first`."""
     return share.coverage is None, share.coverage or 0.0, share.name
 
 
 def percent(share: float | None, *, digits: int = 1) -> str:
-    """A share as people read it, cut and not rounded up, so that 89.96 % is not told as 90.0 %."""
+    """Format a fraction, cut and not rounded up, so that 89.96 % is not printed as 90.0 %."""
     if share is None:
         return "-"
     steps = 10**digits

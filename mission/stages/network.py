@@ -1,4 +1,4 @@
-"""How a mission's scans hang together: which pairs register with one another, and what joins all of them."""
+"""Network of a mission's scans: pairs that register with one another, and the components they connect."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class Network:
 
     @cached_property
     def pieces(self) -> tuple[tuple[str, ...], ...]:
-        """Stops that hang together, the largest piece first; one piece where all do."""
+        """Connected components of the stops, the largest first; one if all are connected."""
         return _pieces(self.stops, self.overlaps)
 
     @cached_property
     def bridges(self) -> tuple[Overlap, ...]:
-        """Pairs without which the scans would fall into more pieces."""
+        """Pairs without which there would be more components."""
         near: dict[str, list[Overlap]] = {}
         for overlap in self.overlaps:
             for end in (overlap.a, overlap.b):
@@ -38,23 +38,23 @@ class Network:
 
     @cached_property
     def weakest(self) -> Overlap | None:
-        """The weakest pair that cannot be gone round by firmer ones; None where no two scans register."""
+        """Weakest pair that stronger pairs cannot replace; None if no two scans register."""
         taken: list[Overlap] = []
         end_of = {stop: stop for stop in self.stops}
         for overlap in sorted(self.overlaps, key=lambda item: -item.hold_m):
-            a, b = _last(end_of, overlap.a), _last(end_of, overlap.b)
+            a, b = _root(end_of, overlap.a), _root(end_of, overlap.b)
             if a != b:
                 end_of[a] = b
                 taken.append(overlap)
         return taken[-1] if taken else None
 
     def renamed(self, names: Mapping[str, str]) -> Network:
-        """The same with other names for all stops."""
+        """Return the same network with other names for all stops."""
         pairs = (replace(item, a=names[item.a], b=names[item.b]) for item in self.overlaps)
         return Network(tuple(names[stop] for stop in self.stops), tuple(pairs))
 
     def among(self, stops: Collection[str]) -> Network:
-        """What is left of it where only these stops were scanned."""
+        """Return the network of these stops only."""
         return Network(
             tuple(stop for stop in self.stops if stop in stops),
             tuple(item for item in self.overlaps if item.a in stops and item.b in stops),
@@ -62,28 +62,28 @@ class Network:
 
 
 def network_of(mission: Mission) -> Network | None:
-    """The mission's network; None where it was planned without one."""
+    """Return the mission's network; None if it was planned without one."""
     if isinstance(mission.network, msgspec.UnsetType):
         return None
     return Network(tuple(stop.id for stop in mission.stops), mission.network)
 
 
 def apart_in_words(mission: Mission, acquired: Collection[str]) -> str:
-    """One line where the scans that were made fall into more pieces than planned; else nothing."""
+    """Return one line if the scans are in more components than planned; else an empty string."""
     planned = network_of(mission)
     if planned is None or not acquired:
         return ""
-    left = planned.among(acquired)
+    remaining = planned.among(acquired)
     missing = [stop for stop in planned.stops if stop not in acquired]
-    if len(left.pieces) <= max(1, len(planned.pieces)):
+    if len(remaining.pieces) <= max(1, len(planned.pieces)):
         return ""
-    told = f" without {', '.join(missing)}" if missing else ""
-    pieces = "; ".join(" ".join(piece) for piece in left.pieces[1:])
-    return f"the scans fall into {len(left.pieces)} pieces{told}: apart from the others {pieces}"
+    without = f" without {', '.join(missing)}" if missing else ""
+    others = "; ".join(" ".join(piece) for piece in remaining.pieces[1:])
+    return f"the scans are in {len(remaining.pieces)} components{without}; separate: {others}"
 
 
 def network_table(network: Network | None) -> dict[str, Any]:
-    """The network for JSON, under its key; nothing where there is none."""
+    """Return the network for JSON, under its key; empty if there is none."""
     if network is None:
         return {}
     table = {
@@ -96,35 +96,35 @@ def network_table(network: Network | None) -> dict[str, Any]:
 
 
 def network_lines(network: Network | None) -> list[str]:
-    """The network for a terminal: pieces, the weakest pair, and pairs that nothing stands in for."""
+    """Return the lines for a terminal: components, the weakest pair, and bridges."""
     if network is None:
         return []
     number, pairs = len(network.pieces), len(network.overlaps)
     lines = [
-        f"  network     {'one piece' if number == 1 else f'{number} PIECES'}: "
+        f"  network     {'connected' if number == 1 else f'{number} COMPONENTS'}: "
         f"{pairs} pair{'s' * (pairs != 1)} of {len(network.stops)} scans register with one another"
     ]
     if network.weakest is not None:
         lines.append(f"    weakest   {pair_in_words(network.weakest)}")
     if network.bridges:
-        told = ", ".join(f"{item.a}-{item.b}" for item in network.bridges[:MOST_TOLD])
-        more = f" and {len(network.bridges) - MOST_TOLD} more" if len(network.bridges) > MOST_TOLD else ""
-        lines.append(f"    bridges   {told}{more}: without one of these the scans fall apart")
+        listed = ", ".join(f"{item.a}-{item.b}" for item in network.bridges[:MOST_LISTED])
+        more = f" and {len(network.bridges) - MOST_LISTED} more" if len(network.bridges) > MOST_LISTED else ""
+        lines.append(f"    bridges   {listed}{more}: without one of these the scans are not connected")
     return lines
 
 
-MOST_TOLD = 12
+MOST_LISTED = 12
 
 
 def pair_in_words(pair: Overlap) -> str:
-    """One pair and its figures."""
+    """Return one pair with its figures."""
     return (
         f"{pair.a}-{pair.b}: {pair.common_m:.1f} m seen by both, {percent(pair.share)} of a scan, "
         f"held as by {pair.hold_m:.2f} m of wall"
     )
 
 
-def _last(end_of: dict[str, str], stop: str) -> str:
+def _root(end_of: dict[str, str], stop: str) -> str:
     while end_of[stop] != stop:
         stop = end_of[stop]
     return stop
@@ -133,15 +133,15 @@ def _last(end_of: dict[str, str], stop: str) -> str:
 def _pieces(stops: Iterable[str], overlaps: Iterable[Overlap]) -> tuple[tuple[str, ...], ...]:
     end_of = {stop: stop for stop in stops}
     for item in overlaps:
-        end_of[_last(end_of, item.a)] = _last(end_of, item.b)
+        end_of[_root(end_of, item.a)] = _root(end_of, item.b)
     by_end: dict[str, list[str]] = {}
     for stop in end_of:
-        by_end.setdefault(_last(end_of, stop), []).append(stop)
+        by_end.setdefault(_root(end_of, stop), []).append(stop)
     return tuple(tuple(piece) for piece in sorted(by_end.values(), key=lambda piece: -len(piece)))
 
 
 def _bridges(stops: Iterable[str], near: dict[str, list[Overlap]]) -> set[Overlap]:
-    """Pairs that close no ring, found by depth-first search (Tarjan, 1974)."""
+    """Find pairs that close no loop, by depth-first search (Tarjan, 1974)."""
     order: dict[str, int] = {}
     low: dict[str, int] = {}
     found: set[Overlap] = set()

@@ -1,4 +1,4 @@
-"""What each stop of a mission sees: enough to say, once a run is over, what its scans really saw."""
+"""Visibility from each stop of a mission: enough to compute the acquired coverage once a run is over."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from stopgo.mission.stages.coverage_totals import CoverageTotals, ledger_of
 from stopgo.mission.stages.figures import Figures, Shares
 
 SAME_PLACE_M = 1e-6
-"""A stop of another revision within this distance of a planned one sees the same."""
+"""Within this distance of a planned stop, a stop of another revision sees the same."""
 
 
 @dataclass(frozen=True)
 class SeenFrom:
-    """A stop, as it was planned."""
+    """Position of a stop, as planned."""
 
     id: str
     x: float
@@ -29,16 +29,16 @@ class SeenFrom:
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What the stops of one revision of a mission see of its targets.
+    """Visibility of a mission's targets from the stops of one revision.
 
-    Run k of stop number s, `pointer[s] <= k < pointer[s + 1]`, says that units `first[k]` to `last[k]`
-    (inclusive, counted over all targets) are seen from there.
+    Run k of stop number s, `pointer[s] <= k < pointer[s + 1]`, means that units `first[k]` to `last[k]`
+    (inclusive, counted over all targets) are seen from this stop.
     """
 
     mission_id: str
     revision: int
     digest: str
-    """That of the mission."""
+    """Digest of the mission."""
     targets: Targets
     ledger: CoverageTotals
     stops: tuple[SeenFrom, ...]
@@ -48,12 +48,12 @@ class Sight:
 
     @cached_property
     def planned(self) -> Shares:
-        """What all stops see."""
+        """Coverage by all stops."""
         return self.ledger.shares(self.all_seen)
 
     @cached_property
     def all_seen(self) -> BoolArray:
-        """Whether each unit is seen from as many stops as it asks for (n,)."""
+        """True for units that enough stops see (n,)."""
         return self.seen_units(self.ids)
 
     @cached_property
@@ -61,7 +61,7 @@ class Sight:
         return tuple(stop.id for stop in self.stops)
 
     def knows(self, stop: Stop) -> bool:
-        """Whether it tells of this stop, at the place where the mission has it."""
+        """Return True if it has data for this stop, at the position in the mission."""
         number = self._number.get(stop.id)
         if number is None:
             return False
@@ -69,11 +69,11 @@ class Sight:
         return bool(np.hypot(known.x - stop.x, known.y - stop.y) <= SAME_PLACE_M)
 
     def seen_units(self, stops: Collection[str]) -> BoolArray:
-        """Whether enough of these stops see each unit (n,); stops of other plans see nothing."""
+        """Return True for units that enough of these stops see (n,); stops of other plans see nothing."""
         return self.ledger.enough(self.views_from(stops))
 
     def views_from(self, stops: Collection[str]) -> IntArray:
-        """How many of these stops see each unit (n,)."""
+        """Return the number of these stops that see each unit (n,)."""
         views = np.zeros(len(self.ledger.weight), dtype=np.int64)
         for stop in stops:
             number = self._number.get(stop)
@@ -82,7 +82,7 @@ class Sight:
         return frozen(views, np.int64)
 
     def _seen_by(self, number: int) -> BoolArray:
-        """Whether a stop sees each unit (n,)."""
+        """Return True for units that a stop sees (n,)."""
         runs = slice(int(self.pointer[number]), int(self.pointer[number + 1]))
         change = np.zeros(len(self.ledger.weight) + 1, dtype=np.int64)
         np.add.at(change, self.first[runs], 1)
@@ -90,11 +90,11 @@ class Sight:
         return np.asarray(np.cumsum(change[:-1]) > 0)
 
     def shares(self, stops: Collection[str]) -> Shares:
-        """What these stops see."""
+        """Return the coverage by these stops."""
         return self.ledger.shares(self.seen_units(stops))
 
     def brings(self, stop: str, views: IntArray) -> float:
-        """The share of what is visible that counts as seen with this stop, after views from others (n,)."""
+        """Return the gain of this stop, as a fraction of all visible, after views from others (n,)."""
         visible = self.ledger.amount(self.ledger.visible)
         after = self.ledger.enough(views + self.views_from([stop]))
         more = after & ~self.ledger.enough(views) & self.ledger.visible
@@ -106,7 +106,7 @@ class Sight:
 
 
 def sight_of(route: Route, mission: Mission, figures: Figures) -> Sight:
-    """What the stops of a plan see, in the order of driving."""
+    """Return the visibility of a plan's stops, in the order of driving."""
     visibility = route.selection.visibility
     rows = route.selection.chosen[route.order].tolist()
     runs = [slice(int(visibility.pointer[row]), int(visibility.pointer[row + 1])) for row in rows]

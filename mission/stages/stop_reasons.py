@@ -1,4 +1,4 @@
-"""Why each stop of a plan stands where it does: what it sees, what it alone sees, what else was offered."""
+"""Reason for each stop of a plan: what it sees, what only it sees, and which candidates were alternatives."""
 
 from __future__ import annotations
 
@@ -13,69 +13,69 @@ from stopgo.mission.stages.coverage_totals import OUTSIDE, CoverageTotals, ledge
 from stopgo.mission.stages.figures import Share, percent
 
 NEARLY = 0.8
-"""A candidate is a runner-up if it would have seen at least this share of what the chosen one newly saw."""
+"""A runner-up must have seen at least this fraction of what the chosen candidate newly saw …"""
 SAME = 0.5
-"""… and at least this share of it were the same units: candidates of other rooms stand in for nothing."""
+"""… and at least this fraction of it in the same units: candidates of other rooms are no alternatives."""
 MOST_RUNNERS = 3
-LEAST_TOLD = 0.05
-"""What would be told as 0.0 is not told."""
+LEAST_PRINTED = 0.05
+"""Smaller amounts would be printed as 0.0 and are left out."""
 MOST_ROOMS = 4
-"""Rooms and candidates that are told of one stop."""
+"""Number of rooms and candidates listed for one stop."""
 
 
 @dataclass(frozen=True)
 class RunnerUp:
-    """A candidate that was not chosen, at the step at which the stop was."""
+    """A candidate that was not chosen, at the step of choosing the stop."""
 
     candidate: int
     """Row of `Visibility`."""
     x: float
     y: float
     new: float
-    """What it would have seen that still lacked views, metres or units."""
+    """Amount that it would have seen and that still lacked views, metres or units."""
 
 
 @dataclass(frozen=True)
 class StopReason:
-    """One stop; amounts are metres of boundary, or units by the paper's rule, of what is visible."""
+    """Reason for one stop; amounts are metres of visible boundary, or units by the paper's rule."""
 
     stop: str
     step: int
-    """Its place in the order of choice, from 1."""
+    """Number of its step in the order of choice, from 1."""
     candidate: int
     """Row of `Visibility`."""
     units: int
-    """Units that it sees, as the mission tells them."""
+    """Units that it sees, as in the mission."""
     sees: float
     new: float
-    """What of it still lacked views when it was chosen: seen by no stop before it, where one is enough."""
+    """Part of `sees` that lacked views when it was chosen: seen by no earlier stop if one is enough."""
     alone_units: int
     alone: float
-    """Seen from too few other stops of the plan, none where one is enough: what is lost without it."""
+    """Part that no other stop of the plan could replace: the loss without this stop."""
     visible: float
-    """All that is visible, from any candidate."""
+    """All visible from any candidate."""
     coverage: float
-    """Of the whole, once it was chosen."""
+    """Coverage of the whole, after it was chosen."""
     rooms: tuple[Share, ...]
-    """The rooms that lose without it, as they are seen then; the one that loses most first."""
+    """The rooms that lose without it, as seen then; the greatest loss first."""
     lost: tuple[float, ...]
-    """What each of these rooms loses."""
+    """Loss of each of these rooms."""
     runners: tuple[RunnerUp, ...]
-    """The most gainful first."""
+    """The greatest gain first."""
     unit: str = "m"
 
     @property
     def lost_share(self) -> float:
-        """What is lost without it of all that is visible."""
+        """Loss without it, as a fraction of all visible."""
         return self.alone / self.visible if self.visible else 0.0
 
     @property
     def short(self) -> tuple[Share, ...]:
-        """Rooms of which less than asked would be seen without it."""
+        """Rooms with less coverage than required without it."""
         return tuple(room for room in self.rooms if not room.met)
 
     def sentences(self) -> tuple[str, ...]:
-        """What it is for, in words."""
+        """Return the reason in sentences."""
         return (self._seen(), self._offered(), self._lost())
 
     def _seen(self) -> str:
@@ -86,22 +86,22 @@ class StopReason:
     def _offered(self) -> str:
         if not self.runners:
             return f"No other candidate there would have seen {NEARLY:.0%} as much that was new."
-        told = ", ".join(
+        listed = ", ".join(
             f"candidate {item.candidate} at ({item.x:.2f}, {item.y:.2f}) {item.new:.1f} {self.unit}"
             for item in self.runners
         )
-        return f"Runners-up at that step: {told}."
+        return f"Runners-up at that step: {listed}."
 
     def _lost(self) -> str:
         if not self.alone_units:
             return "Without it nothing would be lost: other stops see all that it sees."
-        told = [
+        losses = [
             f"{room.name} {lost:.1f} {self.unit}" + ("" if room.met else " (then below what is asked)")
             for room, lost in zip(self.rooms, self.lost, strict=True)
-            if lost >= LEAST_TOLD
+            if lost >= LEAST_PRINTED
         ]
-        where = ", ".join(told[:MOST_ROOMS]) or "less than that in any room"
-        more = f" and {len(told) - MOST_ROOMS} more rooms" if len(told) > MOST_ROOMS else ""
+        where = ", ".join(losses[:MOST_ROOMS]) or "less than that in any room"
+        more = f" and {len(losses) - MOST_ROOMS} more rooms" if len(losses) > MOST_ROOMS else ""
         return (
             f"It alone sees {self.alone_units} units, {self.alone:.1f} {self.unit} or"
             f" {percent(self.lost_share)} of what is visible; lost without it: {where}{more}."
@@ -109,7 +109,7 @@ class StopReason:
 
 
 def stop_reasons(route: Route, stops: Sequence[str]) -> tuple[StopReason, ...]:
-    """The reasons of a plan's stops, whose names are `stops`, in the order of driving."""
+    """Return the reasons of a plan's stops, with the names `stops`, in the order of driving."""
     selection = route.selection
     if not len(selection.chosen):
         return ()
@@ -150,7 +150,7 @@ def stop_reasons(route: Route, stops: Sequence[str]) -> tuple[StopReason, ...]:
 
 
 def driven_coverage(route: Route) -> FloatArray:
-    """Share of what is visible that is seen once each stop has been scanned, in the order of driving (k,)."""
+    """Return the fraction of all visible seen after each stop, in the order of driving (k,)."""
     visibility = route.selection.visibility
     weight = weights_of(visibility.targets, visibility.candidates.space.settings)
     counts = np.where(visibility.visible, weight, 0)
@@ -167,7 +167,7 @@ def _amount(ledger: CoverageTotals, units: IntArray) -> float:
 
 
 class _Offers:
-    """What every candidate would newly see, kept up as candidates are chosen."""
+    """Gain of every candidate, updated as candidates are chosen."""
 
     def __init__(self, visibility: Visibility, ledger: CoverageTotals) -> None:
         self._visibility, self._ledger = visibility, ledger
@@ -179,11 +179,11 @@ class _Offers:
         self._by_segment = np.argsort(segment, kind="stable")
         self._segment = segment[self._by_segment]
         self._lacking: IntArray = np.where(ledger.visible, visibility.asked, 0)
-        """How many more stops must see each unit until it counts."""
+        """Number of further views that each unit needs until it counts."""
         self._chosen: BoolArray = np.zeros(visibility.rows, dtype=np.bool_)
 
     def choose(self, row: int) -> tuple[float, tuple[RunnerUp, ...]]:
-        """What the candidate sees that lacks views, and who would have seen nearly as much; it is chosen."""
+        """Choose a candidate; return its gain, and the runners-up."""
         new = int(self.gain[row])
         sight = self._visibility.seen_by(row)
         fresh = sight[self._lacking[sight] > 0]
@@ -202,13 +202,13 @@ class _Offers:
         alike = (gain >= NEARLY * gain[row]) & (shared >= SAME * gain[row])
         rows = np.flatnonzero(alike & ~self._chosen)
         best = rows[np.argsort(-gain[rows], kind="stable")][:MOST_RUNNERS]
-        places = candidates.xy[candidates.kept[best]].tolist()
+        positions = candidates.xy[candidates.kept[best]].tolist()
         amounts = (gain[best] * self._ledger.scale).tolist()
-        told = zip(best.tolist(), places, amounts, strict=True)
-        return tuple(RunnerUp(row, x, y, new) for row, (x, y), new in told)
+        columns = zip(best.tolist(), positions, amounts, strict=True)
+        return tuple(RunnerUp(row, x, y, new) for row, (x, y), new in columns)
 
     def _shared(self, fresh: IntArray) -> IntArray:
-        """What each candidate sees of some units, ascending."""
+        """Return the amount of some units (ascending) that each candidate sees."""
         segments = np.unique(self._visibility.targets.unit_segment[fresh])
         low, high = (np.searchsorted(self._segment, segments, side=side) for side in ("left", "right"))
         runs = self._by_segment[_ranges(low, high)]
@@ -220,14 +220,14 @@ class _Offers:
 
 
 def _ranges(low: IntArray, high: IntArray) -> IntArray:
-    """The whole numbers from each `low` up to below its `high`, one range after another."""
+    """Return the whole numbers from each `low` up to below its `high`, one range after another."""
     counts = high - low
     starts = np.repeat(low - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
     return np.asarray(starts + np.arange(int(counts.sum())), dtype=np.int64)
 
 
 class _Rooms:
-    """What of each room is visible and seen, and what is left of that without some units."""
+    """Totals of each room, visible and seen, and the loss without some units."""
 
     def __init__(self, ledger: CoverageTotals, seen: BoolArray) -> None:
         self._ledger = ledger
@@ -240,7 +240,7 @@ class _Rooms:
         ]
 
     def without(self, units: IntArray) -> tuple[tuple[Share, ...], tuple[float, ...]]:
-        """The rooms that lose, as they are seen without these units, and what each loses."""
+        """Return the rooms that lose, as seen without these units, and each room's loss."""
         size, scale = len(self._sums[0]), self._ledger.scale
         lost = np.bincount(self._room[units] % size, self._ledger.weight[units], minlength=size)
         losing = sorted(np.flatnonzero(lost).tolist(), key=lambda k: (-lost[k], k))

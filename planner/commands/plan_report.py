@@ -211,8 +211,8 @@ def quality_lines(figures: Figures) -> list[str]:
     quality = figures.quality
     if quality is None:
         return []
-    lines = [f"  seen well   {quality.told(figures.unit)}"]
-    return lines + [f"    {item.words:<29} {item.told}" for item in quality.costs]
+    lines = [f"  seen well   {quality.text(figures.unit)}"]
+    return lines + [f"    {item.words:<29} {item.text}" for item in quality.costs]
 
 
 MOST_ROOMS = 12

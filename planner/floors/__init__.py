@@ -65,7 +65,7 @@ def read_floor(path: Path, options: FloorOptions | None = None) -> FloorPlan:
         nothing to such a file.
     """
     file, reader, options = _opened(path, options)
-    with reader.blamed():
+    with reader.named_errors():
         floor = reader.what.load().read(file, options)
     return floor if reader.ours else sound(reader, floor, file.digest)
 
@@ -79,9 +79,9 @@ def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
         As `read_floor` does.
     """
     file, reader, options = _opened(path, options)
-    with reader.blamed():
+    with reader.named_errors():
         found = reader.what.load().survey(file, options)
-    return cast("Survey", reader.noun(found, Survey))
+    return cast("Survey", reader.of_kind(found, Survey))
 
 
 def options_of(settings: Settings) -> FloorOptions:

@@ -14,13 +14,13 @@ def foreign_readers() -> Iterator[Variant[Reader]]:
     """Each reader that an installed package brings."""
     for name in installed("floor"):
         found: Variant[Reader] = variant("floor", name, {}, said=f"floor reader {name}")
-        found.noun(found.what, Reader)
+        found.of_kind(found.what, Reader)
         yield found
 
 
 def sound(reader: Variant[Reader], given: object, digest: str) -> FloorPlan:
     """What another's reader gives, if it is a floor of this file whose every number is finite."""
-    floor: FloorPlan = reader.noun(given, FloorPlan)
+    floor: FloorPlan = reader.of_kind(given, FloorPlan)
     if floor.source.digest != digest:
         raise reader.wrong("gave the floor of another file: its digest is not that of the bytes")
     if not floor.outline:
@@ -28,11 +28,11 @@ def sound(reader: Variant[Reader], given: object, digest: str) -> FloorPlan:
     solids = [polygon for element in floor.elements for polygon in element.solids]
     rooms = [polygon for room in floor.rooms for polygon in room.polygons]
     for ring in (ring for polygon in (*floor.outline, *rooms, *solids) for ring in polygon.rings):
-        reader.check_held(ring, "a ring", (None, 2))
+        reader.check_array(ring, "a ring", (None, 2))
     for line in (line for element in floor.elements for line in element.lines):
-        reader.check_held(line, "a line", (None, 2))
+        reader.check_array(line, "a line", (None, 2))
     for opening in floor.openings:
-        reader.check_held(opening.line, f"the line of {opening.id}", (2, 2))
+        reader.check_array(opening.line, f"the line of {opening.id}", (2, 2))
     for element in floor.elements:
         if element.kind not in KINDS:
             raise reader.wrong(f"{element.id} is of kind '{element.kind}'; known: {', '.join(KINDS)}")

@@ -65,7 +65,7 @@ def route(selection: Selection) -> Route:
 def legs_between(space: NavigableSpace, points: FloatArray) -> Legs:
     """The ways between all pairs of points (n, 2), by the graph of the settings."""
     graph = variant("graph", space.settings.graph, GRAPHS)
-    return Legs(graph, graph.noun(graph.called(space, points), Ways), points)
+    return Legs(graph, graph.of_kind(graph.called(space, points), Ways), points)
 
 
 def points_and_ends(selection: Selection) -> tuple[FloatArray, Ends]:

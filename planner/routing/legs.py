@@ -26,7 +26,7 @@ class Legs:
     def __post_init__(self) -> None:
         if self.graph.ours:
             return
-        with self.graph.blamed():
+        with self.graph.named_errors():
             lengths = self.lengths
         count = len(self.points)
         finite = self.graph.array(np.where(np.isposinf(lengths), 0.0, lengths), "lengths", (count, count))
@@ -44,7 +44,7 @@ class Legs:
         """The polyline (n, 2) from one point to another, both included."""
         if self.graph.ours:
             return self.ways.way(start, end)
-        with self.graph.blamed():
+        with self.graph.named_errors():
             given = self.ways.way(start, end)
         line = frozen(self.graph.array(given, "a way", (None, 2)))
         ends = self.points[[start, end]]

@@ -53,7 +53,7 @@ def seen_well(in_sight: Visibility) -> Visibility:
 
 def _sound(method: Variant[VisibilityMethod], given: object, candidates: Candidates) -> Visibility:
     """What a method gives, if it is runs of units on segments, in order, for each kept candidate."""
-    found: Visibility = method.noun(given, Visibility)
+    found: Visibility = method.of_kind(given, Visibility)
     if found.candidates is not candidates:
         raise method.wrong("is of other candidates than those it was given")
     targets = candidates.space.targets
@@ -69,7 +69,7 @@ def _sound(method: Variant[VisibilityMethod], given: object, candidates: Candida
         raise method.wrong("a run's units do not lie on its segment")
     if method.ours:
         return found
-    method.noun(found.method, str)
+    method.of_kind(found.method, str)
     pointer, segment, first, last = (frozen(values, np.int64) for values in (pointer, segment, first, last))
     return Visibility(candidates, pointer, segment, first, last, found.method)
 

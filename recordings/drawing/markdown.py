@@ -180,8 +180,8 @@ def _coverage_table(figures: Figures | None) -> list[str]:
         numbers = f"{share.total:.1f} | {share.visible:.1f} | {share.seen:.1f} | {percent(share.coverage)}"
         lines.append(f"| {plain(share.name)} | {numbers} |")
     if figures.quality is not None:
-        lines += ["", f"{figures.quality.told(unit)}:", ""]
-        lines += [f"- {item.words}: {item.told}" for item in figures.quality.costs]
+        lines += ["", f"{figures.quality.text(unit)}:", ""]
+        lines += [f"- {item.words}: {item.text}" for item in figures.quality.costs]
     if figures.unreached:
         lines += ["", "Not reached:", ""]
         lines += [

@@ -130,7 +130,7 @@ def _reader_for(path: Path) -> LogReader:
 
 
 def _read_foreign(other: Variant[LogFormat], path: Path, how: Reading) -> FieldLog:
-    with other.blamed():
+    with other.named_errors():
         given = other.what.reader()(path, how)
     return sound_log(other, given)
 

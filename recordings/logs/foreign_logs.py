@@ -18,21 +18,21 @@ def foreign_formats(kind: type[Any]) -> Iterator[Variant[Any]]:
     """Each kind of log that an installed package brings; all are of this kind."""
     for name in installed("log"):
         found: Variant[Any] = variant("log", name, {}, said=f"log reader {name}")
-        found.noun(found.what, kind)
+        found.of_kind(found.what, kind)
         yield found
 
 
 def sound_log(reader: Variant[Any], given: object) -> FieldLog:
     """What another's reader gives, if it is a log whose poses are finite and in the order of their times."""
-    log: FieldLog = reader.noun(given, FieldLog)
+    log: FieldLog = reader.of_kind(given, FieldLog)
     if log.clock not in CLOCKS:
         raise reader.wrong(f"its clock is '{log.clock}'; known: {', '.join(CLOCKS)}")
     for poses in log.poses:
         count = len(poses.ns)
-        reader.check_held(poses.ns, f"the times of {poses.source}", (count,))
-        reader.check_held(poses.xy, f"the places of {poses.source}", (count, 2))
+        reader.check_array(poses.ns, f"the times of {poses.source}", (count,))
+        reader.check_array(poses.xy, f"the places of {poses.source}", (count, 2))
         heading = np.asarray(poses.heading)
-        reader.check_held(
+        reader.check_array(
             np.where(np.isnan(heading), 0.0, heading), f"the headings of {poses.source}", (count,)
         )
         if (np.diff(poses.ns) < 0).any():

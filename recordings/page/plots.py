@@ -37,7 +37,7 @@ def plots(comparison: Comparison) -> str:
 
 
 def _plots(comparison: Comparison) -> Iterator[str]:
-    log, beside = comparison.log, comparison.beside
+    log, beside = comparison.log, comparison.cross_track
     known = np.isfinite(beside.metres)
     if known.any():
         seconds = log.seconds(beside.ns)[known]

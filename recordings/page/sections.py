@@ -142,7 +142,7 @@ def _run(subject: ReportSubject, comparison: Comparison, *, alone: bool) -> Iter
 
 
 def _tiles(comparison: Comparison) -> Iterator[str]:
-    away, beside = comparison.greatest_deviation_m, comparison.beside.greatest_m
+    away, beside = comparison.greatest_deviation_m, comparison.cross_track.greatest_m
     driven = "not ended" if comparison.driven_s is None else duration(comparison.driven_s)
     tolerance = max((stop.tolerance_m for stop in comparison.mission.stops), default=0.0)
     paused, held = (sum(span.state == state for span in comparison.spans) for state in ("PAUSED", "HELD"))
@@ -159,7 +159,7 @@ def _tiles(comparison: Comparison) -> Iterator[str]:
     poses = comparison.log.poses
     driven_m = f"{poses.length_m:.1f} m driven" if len(poses) else "the way is not in the log"
     yield tile("off the route, worst", _millimetres(beside), driven_m)
-    stood = comparison.stood_s("PAUSED", "HELD")
+    stood = comparison.seconds_in("PAUSED", "HELD")
     yield tile("stood still", duration(stood), f"paused {paused}, held {held}")
 
 
@@ -220,7 +220,7 @@ def _stop_grid(comparison: Comparison) -> str:
 
 
 def _stop_cells(item: StopComparison) -> list[str]:
-    told = ": ".join(word for word in (item.seen_beside or item.outcome, item.reason) if word)
+    told = ": ".join(word for word in (item.outside_text or item.outcome, item.reason) if word)
     return [
         *(shown(item.stop), shown(told), _clock(item.planned_s), _clock(item.arrived_s)),
         *(number(item.late_s, sign=True), number(item.along_m, 1000, sign=True)),
@@ -317,8 +317,8 @@ _ROWS = (
     ("coverage", lambda run: "" if run.acquired is None else percent(run.acquired.shares.whole.coverage)),
     ("run time", lambda run: _clock(run.driven_s)),
     ("greatest offset at a stop", lambda run: _millimetres(run.greatest_deviation_m)),
-    ("off the route, worst", lambda run: _millimetres(run.beside.greatest_m)),
-    ("stood still", lambda run: duration(run.stood_s("PAUSED", "HELD"))),
+    ("off the route, worst", lambda run: _millimetres(run.cross_track.greatest_m)),
+    ("stood still", lambda run: duration(run.seconds_in("PAUSED", "HELD"))),
 )
 """Rows of the table of runs."""
 

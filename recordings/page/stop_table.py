@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from stopgo.mission.stages.figures import percent
-from stopgo.mission.stages.stop_reasons import LEAST_TOLD, StopReason
+from stopgo.mission.stages.stop_reasons import LEAST_PRINTED, StopReason
 from stopgo.recordings.page.words import grid, number, row, section, shown
 
 
@@ -30,7 +30,7 @@ def _row(reason: StopReason) -> str:
     where = [
         f"{room.name} {number(lost)}{'' if room.met else ', then below what is asked'}"
         for room, lost in zip(reason.rooms, reason.lost, strict=True)
-        if lost >= LEAST_TOLD
+        if lost >= LEAST_PRINTED
     ]
     runners = [f"{item.candidate} ({number(item.new)})" for item in reason.runners]
     return row(

@@ -62,9 +62,9 @@ def _followed(
         if heard.system != system or heard.ns >= until_ns:
             continue
         if heard.ns < upload.ns:
-            run.know(heard.message, heard.ns + offset_ns)
+            run.take_earlier(heard.message, heard.ns + offset_ns)
         else:
             last_ns = heard.ns
-            run.hear(heard.message, heard.ns + offset_ns)
+            run.take(heard.message, heard.ns + offset_ns)
     run.end(last_ns + offset_ns)
     return tuple(run.events) if any(isinstance(event, Arrived) for event in run.events) else ()

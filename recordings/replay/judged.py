@@ -36,7 +36,7 @@ def missing(replay: Replay) -> list[StopComparison]:
 
 def outside(replay: Replay) -> list[StopComparison]:
     """Stops at which it stood too far away, or, by a simulator's truth, in truth did."""
-    return [item for item in replay.comparison.asked if item.seen_beside]
+    return [item for item in replay.comparison.asked if item.outside_text]
 
 
 def _sentences(replay: Replay) -> Iterator[str]:

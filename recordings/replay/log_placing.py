@@ -13,7 +13,7 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.frames.geodesy import Geodetic, from_geodetic
 from stopgo.mission.frames.transform import Transform
 from stopgo.mission.geometry import FloatArray
-from stopgo.mission.mavlink.local_frame import is_elsewhere
+from stopgo.mission.mavlink.local_frame import is_other_site
 from stopgo.mission.run.run_log import Alignment, Track
 from stopgo.recordings.logs.field_log import FieldLog, Poses
 from stopgo.recordings.logs.own import AT_EVENTS, SITE
@@ -201,7 +201,7 @@ def _by_georeference(log: FieldLog, source: Poses, mission: Mission) -> Alignmen
     assert source.origin is not None
     assert mission.georeference is not None
     place = Geodetic(lat=source.origin.lat, lon=source.origin.lon)
-    if is_elsewhere(mission.georeference, place):
+    if is_other_site(mission.georeference, place):
         raise InputError(
             f"{log.path}: is at {place.lat:.5f}, {place.lon:.5f}, and the mission's site at "
             f"{mission.georeference.lat:.5f}, {mission.georeference.lon:.5f}: the wrong mission?"

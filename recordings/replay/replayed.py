@@ -82,5 +82,5 @@ class Replay:
     @cached_property
     def beside(self) -> FloatArray:
         """Signed metres beside the route at every pose that was on a leg."""
-        metres = self.comparison.beside.metres
+        metres = self.comparison.cross_track.metres
         return metres[np.isfinite(metres)]

@@ -50,7 +50,7 @@ class Lost:
 
 def way_of(replay: Replay) -> Way:
     """Measured where the robot was on a leg, halts included in the figures beside the route."""
-    beside = replay.comparison.beside
+    beside = replay.comparison.cross_track
     metres = replay.beside
     away = np.abs(metres)
     at = beside.greatest

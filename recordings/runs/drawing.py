@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import rerun as rr
 
-from stopgo.mission.comparing.delayed_deviation import LateBeside
+from stopgo.mission.comparing.delayed_deviation import DelayedDeviation
 from stopgo.mission.document import Mission, Stop
 from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.run.events import (
@@ -32,7 +32,7 @@ from stopgo.mission.run.events import (
     Unconfirmed,
 )
 from stopgo.mission.run.run_log import Track
-from stopgo.mission.run.tolerance import deviation, scanned_beside
+from stopgo.mission.run.tolerance import deviation, outside_tolerance_text
 from stopgo.mission.stages.sight import Sight
 from stopgo.recordings.drawing import entities, palette, strokes
 from stopgo.recordings.drawing.canvas import Canvas, on_screen
@@ -71,7 +71,7 @@ class RunDrawing:
         self._began_ns: int | None = None
         self._place: FloatArray | None = None
         self._growth = AcquiredDrawing(sights[-1]) if sights else None
-        self._thinner, self._trail, self._way = Thinner(), Trail(), LateBeside(mission)
+        self._thinner, self._trail, self._way = Thinner(), Trail(), DelayedDeviation(mission)
         self._stops: dict[str, bool | None] = {}
         self._style()
         self._describe()
@@ -141,7 +141,7 @@ class RunDrawing:
         told["body"] = msgspec.json.encode(event).decode()
         self._at(self.names.events, rr.DynamicArchetype("Event", components=told), event.robot_ns)
         stop = self.stops.get(getattr(event, "stop", ""))
-        beside = scanned_beside(event, stop)
+        beside = outside_tolerance_text(event, stop)
         level = "WARN" if isinstance(event, WARNINGS) or beside else "INFO"
         line = rr.TextLog(f"{type(event).__name__} {_about(event, stop)}".rstrip(), level=level)
         self._at(self.names.log, line, event.robot_ns)
@@ -301,7 +301,7 @@ _LIMITED = {entities.METRIC_DEVIATION: (1,), entities.METRIC_CROSS_TRACK: (-1, 1
 def _about(event: AnyEvent, stop: Stop | None) -> str:
     """The event's particulars in a few words; `stop` is the one it is of."""
     words = [getattr(event, name, "") for name in ("stop", "reason", "commander", "kind")]
-    words.append(scanned_beside(event, stop))
+    words.append(outside_tolerance_text(event, stop))
     if isinstance(event, Arrived):
         words.append(f"{event.deviation_m * 1000:.0f} mm beside")
     if isinstance(event, Scanned):

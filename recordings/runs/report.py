@@ -17,7 +17,7 @@ from stopgo.mission.run.events import (
     Skipped,
     Unconfirmed,
 )
-from stopgo.mission.run.tolerance import deviation, scanned_beside
+from stopgo.mission.run.tolerance import deviation, outside_tolerance_text
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class StopRecord:
             )
         if isinstance(event, Scanned):
             away = self.deviation_m if stop is None else deviation(event.pose, stop)
-            outcome = f"scanned {scanned_beside(event, stop)}".rstrip()
+            outcome = f"scanned {outside_tolerance_text(event, stop)}".rstrip()
             return replace(self, deviation_m=away, outcome=outcome, scanned=True)
         if isinstance(event, Unconfirmed | Skipped | Failed):
-            told = (scanned_beside(event, stop), event.reason)
+            told = (outside_tolerance_text(event, stop), event.reason)
             words = "; ".join(word for word in told if word)
             return replace(self, outcome=f"{type(event).__name__.lower()}: {words}", scanned=False)
         return self

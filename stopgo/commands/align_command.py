@@ -1,4 +1,4 @@
-"""`stopgo align`: how the site lies on a robot's map, from points that are known in both."""
+"""`stopgo align`: the transform from the site to a robot's map, from points that are known in both."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ def align(
         typer.Option(metavar="X,Y=MAPX,MAPY", help="A point of the site and on the map; repeatable."),
     ] = None,
     mission: Annotated[
-        Path | None, typer.Option(help="With -o: the mission whose frame.to_map is to be set.")
+        Path | None, typer.Option(help="With -o: the mission whose frame.to_map to set.")
     ] = None,
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Where to write that mission.")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="File to write that mission to.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> None:
-    """Fit how the site is turned and shifted onto a robot's map, and tell how far each point is off.
+    """Fit the rotation and shift from the site to a robot's map, and print the residual of each point.
 
     Drive the robot onto points of the drawing, such as crosses on the floor, and note its pose there. Two
-    points are needed; with more, their residuals tell which was noted wrongly. The result is what
-    `robot --map` takes.
+    points are needed; with more, their residuals show which was noted wrongly. The result is the value for
+    `robot --map`.
 
     Example: stopgo align --pair 0,0=12.10,-4.70 --pair 8,0=20.06,-3.91 --pair 8,6=19.47,2.06
     """
@@ -48,15 +48,15 @@ def align(
     from stopgo.mission.frames.rigid_fit import rigid_fit
 
     if (mission is None) != (out is None):
-        raise InputError("give --mission FILE and -o FILE together: the mission, and where it is written")
+        raise InputError("give --mission FILE and -o FILE together: the mission, and the file to write")
     points = [*(_read(pairs) if pairs else ()), *map(_pair, pair or ())]
     if not points:
         raise InputError(f"no points given; name a CSV file, or use --pair: {FORM}")
     site, there = _arrays(points)
     fit = rigid_fit(site, there)
-    written = None if mission is None or out is None else _placed(mission, out, fit)
-    told = _told(fit, points, written)
-    typer.echo(json_text(told) if as_json else _text(fit, points, written))
+    written = None if mission is None or out is None else _with_transform(mission, out, fit)
+    report = _report(fit, points, written)
+    typer.echo(json_text(report) if as_json else _text(fit, points, written))
 
 
 PointPair = tuple[float, float, float, float]
@@ -78,7 +78,7 @@ def _read(path: Path) -> list[PointPair]:
             f"{path}: cannot be read ({error.strerror}); give a CSV of x,y,map_x,map_y"
         ) from None
     except UnicodeDecodeError:
-        raise InputError(f"{path}: is no text; give a CSV of x,y,map_x,map_y") from None
+        raise InputError(f"{path}: is not a text file; give a CSV of x,y,map_x,map_y") from None
     lines = [(number, row) for number, row in enumerate(csv.reader(text.splitlines()), start=1) if any(row)]
     return [_row(row, f"{path}: line {number}") for number, row in lines if not _is_header(number, row)]
 
@@ -108,8 +108,8 @@ def _arrays(points: Sequence[PointPair]) -> tuple[FloatArray, FloatArray]:
     return array[:, :2], array[:, 2:]
 
 
-def _placed(mission: Path, out: Path, fit: RigidFit) -> str:
-    """Write the mission with the transform in its frame; its revision as it is told."""
+def _with_transform(mission: Path, out: Path, fit: RigidFit) -> str:
+    """Write the mission with the transform in its frame; return its revision in words."""
     from msgspec.structs import replace
 
     from stopgo.mission.document import sealed
@@ -124,12 +124,12 @@ def _placed(mission: Path, out: Path, fit: RigidFit) -> str:
 
 
 def map_option(fit: RigidFit) -> str:
-    """What `robot --map` takes: micrometres, and degrees as fine as that at 100 m."""
+    """Return the value for `robot --map`: micrometres, and degrees as fine as that at 100 m."""
     at = fit.transform
     return f"{at.x:.6f},{at.y:.6f},{math.degrees(at.heading):.6f}"
 
 
-def _told(fit: RigidFit, points: Sequence[PointPair], written: str | None) -> dict[str, Any]:
+def _report(fit: RigidFit, points: Sequence[PointPair], written: str | None) -> dict[str, Any]:
     return {
         "map": map_option(fit),
         "to_map": fit.transform,
@@ -147,15 +147,15 @@ def _told(fit: RigidFit, points: Sequence[PointPair], written: str | None) -> di
 def _text(fit: RigidFit, points: Sequence[PointPair], written: str | None) -> str:
     from stopgo.mission.console.table import table
 
-    header = ("x m", "y m", "map x m", "map y m", "off mm")
+    header = ("x m", "y m", "map x m", "map y m", "residual mm")
     rows = [
         (*(f"{number:.3f}" for number in pair), f"{1000 * off:.0f}")
         for pair, off in zip(points, fit.residuals, strict=True)
     ]
-    few = "; two points cannot tell of a mistake: add a third" if len(points) == 2 else ""
+    few = "; two points cannot show a mistake: add a third" if len(points) == 2 else ""
     lines = [
         table(header, rows), "",
-        f"off by {1000 * fit.rms_m:.0f} mm (root mean square), {1000 * fit.max_m:.0f} mm at most{few}",
+        f"residuals {1000 * fit.rms_m:.0f} mm (root mean square), {1000 * fit.max_m:.0f} mm at most{few}",
         f"--map {map_option(fit)}", *([] if written is None else [written]),
     ]  # fmt: skip
     return "\n".join(lines)

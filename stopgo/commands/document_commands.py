@@ -1,4 +1,4 @@
-"""Commands on a mission as it stands in its file: show it, check it, export it, import it."""
+"""Commands on mission files: show, check, export, import."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 MissionFile = Annotated[Path, typer.Argument(metavar="MISSION", help="A mission.json.")]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout and nothing else.")]
 Floor = Annotated[
-    Path | None, typer.Option(help="The floor it was planned on: its digest, and whether the mission fits.")
+    Path | None, typer.Option(help="The floor it was planned on, to check digest, clearances and coverage.")
 ]
 
 
 def add_commands(app: typer.Typer) -> None:
-    """Add this folder's verbs to the front door."""
+    """Add the commands of this module to the front door."""
     app.command()(show)
     app.command()(check)
     app.command()(export)
@@ -37,20 +37,18 @@ def add_commands(app: typer.Typer) -> None:
 def show(mission: MissionFile, as_json: AsJson = False) -> None:
     """Show a mission as a table.
 
-    Its stops stand in the order of driving, each with the planned time of arrival.
+    It lists the stops in the order of driving, each with the planned time of arrival.
 
     Example: stopgo show out/mission.json
     """
-    from stopgo.mission.document.problems import problems_of
     from stopgo.mission.document.schedule import schedule
     from stopgo.mission.files.mission_json import read
-    from stopgo.mission.files.mission_text import json_text, page, report
+    from stopgo.mission.files.mission_text import json_text, mission_report, mission_text
 
     document = read(mission)
-    for problem in problems_of(document)[:1]:
-        raise NegativeResult(f"{mission}: {problem} (stopgo check {mission} lists all)")
+    _check_problems(mission, document)
     times = schedule(document)
-    typer.echo(json_text(report(document, times)) if as_json else page(document, times))
+    typer.echo(json_text(mission_report(document, times)) if as_json else mission_text(document, times))
 
 
 def check(
@@ -61,14 +59,15 @@ def check(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Check that a mission makes sense.
+    """Check that a mission is valid.
 
-    Schema, digest, numbers, legs that join up. With --floor also that it was planned on that floor, that
-    stops and legs keep every clearance there, measured anew, and that the stops see what the mission claims,
-    counted anew by holding every sight line against every wall; with --coverage, what that file claims.
+    It checks schema, digest, numbers, and that the legs join. With --floor it also checks that the mission
+    was planned on that floor, that stops and legs keep every clearance, and that the stops see the targets
+    that the mission claims. All of it is computed again, each line of sight against every wall. With
+    --coverage it checks the claims of that file.
 
-    Exit code 0: in order; 1: readable but senseless, of another floor, unfit for it, or claiming more than
-    its stops see; 2: not readable.
+    Exit code 0: valid; 1: readable but invalid, of another floor, without clearance, or with more coverage
+    claimed than its stops have; 2: not readable.
 
     Example: stopgo check out/mission.json --floor office.dxf
     """
@@ -86,20 +85,20 @@ def check(
 
         typer.echo(printable_lines("\n".join(map(str, found.problems))))
     else:
-        typer.echo(f"{mission}: in order; {identity(document)}, {len(document.stops)} stops")
-    if found.told is not None and not as_json:
-        typer.echo(f"coverage {found.told}")
+        typer.echo(f"{mission}: valid; {identity(document)}, {len(document.stops)} stops")
+    if found.coverage_text is not None and not as_json:
+        typer.echo(f"coverage {found.coverage_text}")
     if found.problems:
         raise NegativeResult(f"{mission}: {len(found.problems)} problem{'s' * (len(found.problems) > 1)}")
 
 
 @dataclass(frozen=True)
 class _Checked:
-    """What is wrong with a mission, what its stops were counted to see, and what was not checked."""
+    """Result of a check: problems, recomputed coverage, and notes on parts that were not checked."""
 
     problems: tuple[Problem, ...]
     coverage: dict[str, Any] | None = None
-    told: str | None = None
+    coverage_text: str | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -110,7 +109,7 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
     problems = problems_of(mission)
     if floor is None:
         if coverage is not None:
-            raise InputError(f"--coverage {coverage}: is held against the floor; give it with --floor")
+            raise InputError(f"--coverage {coverage}: needs the floor; give it with --floor")
         return _Checked(problems)
     claims = None if coverage is None else read_coverage(coverage, mission)
     other = _other_floor(mission, floor)
@@ -118,28 +117,28 @@ def _checked(mission: Mission, floor: Path | None, coverage: Path | None) -> _Ch
         from stopgo.planner.checking.verdict import verdict
 
         if sys.stderr.isatty():
-            typer.echo(f"holding the mission against {floor} …", err=True)
+            typer.echo(f"checking the mission against {floor} …", err=True)
         found = verdict(mission, floor, claims)
     except ModuleNotFoundError as error:
-        if not _is_of_plan(error):
+        if not _is_library(error):
             raise
         unchecked = "neither clearances nor coverage were checked"
         note = f'{error.name} is not installed, so {unchecked}; pip install "stopgo[plan]"'
         return _Checked((*problems, *other), notes=(note,))
     except InputError:
-        if other:  # not the floor, and no floor either
+        if other:  # not the mission's floor, and not readable as a floor
             return _Checked((*problems, *other))
         raise
     counted = found.counted
     return _Checked(
         (*problems, *other, *found.problems),
         coverage=None if counted is None else counted.as_json(),
-        told=None if counted is None else counted.in_words(),
+        coverage_text=None if counted is None else counted.in_words(),
     )
 
 
-def _is_of_plan(error: ModuleNotFoundError) -> bool:
-    """Whether what is missing is a library of the extra, not a part of this program."""
+def _is_library(error: ModuleNotFoundError) -> bool:
+    """Return True if the missing module is a library of the extra, not a part of this program."""
     return (error.name or "").partition(".")[0] not in ("", "stopgo")
 
 
@@ -180,63 +179,79 @@ FORMAT_NAMES = "plan, waypoints, dxf, csv, geojson, nav2, mcap, vda5050 or vda50
 AutopilotOption = Annotated[str | None, typer.Option(help="ardupilot, px4 or generic")]
 
 
+FormatOption = Annotated[str | None, typer.Option(metavar="FORMAT", help=FORMAT_NAMES)]
+TriggerOption = Annotated[
+    str | None, typer.Option(metavar="auto|script|camera|none", help="What makes the vehicle scan.")
+]
+ScanWaitOption = Annotated[
+    str | None, typer.Option(metavar="delay|script_time", help="How the vehicle waits for a scan.")
+]
+SettleOption = Annotated[
+    str | None, typer.Option(metavar="delay|hold", help="Settle in an item of its own, or as a hold.")
+]
+MapOption = Annotated[
+    str | None,
+    typer.Option("--map", metavar="X,Y,HEADING", help="Site to map: rotate, then shift."),
+]
+
+
 def export(
     mission: MissionFile,
     out: Annotated[Path, typer.Option("-o", "--out", help="The file; its suffix names the format.")],
-    to: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FORMAT",
-            help=FORMAT_NAMES,
-        ),
-    ] = None,
+    to: FormatOption = None,
     floor: Annotated[Path | None, typer.Option(help="The floor's .dxf, to draw over.")] = None,
     coverage: Annotated[Path | None, typer.Option(help="coverage.json, to draw what is seen.")] = None,
     autopilot: AutopilotOption = None,
-    trigger: Annotated[
-        str | None, typer.Option(metavar="auto|script|camera|none", help="What makes the vehicle scan.")
-    ] = None,
-    scan_wait: Annotated[
-        str | None, typer.Option(metavar="delay|script_time", help="How the vehicle waits for a scan.")
-    ] = None,
-    settle: Annotated[
-        str | None, typer.Option(metavar="delay|hold", help="Settle in an item of its own, or as a hold.")
-    ] = None,
+    trigger: TriggerOption = None,
+    scan_wait: ScanWaitOption = None,
+    settle: SettleOption = None,
     origin: OriginOption = None,
-    map_: Annotated[
-        str | None,
-        typer.Option("--map", metavar="X,Y,HEADING", help="Site to map: turn by HEADING, then shift."),
-    ] = None,
+    map_: MapOption = None,
     as_json: AsJson = False,
 ) -> None:
-    """Write a mission in a format that others open.
+    """Write a mission in a format of other programs.
 
     .plan (QGroundControl), .waypoints (QGC WPL 110), .dxf, .csv, .geojson, .nav2.yaml, .mcap (nav_msgs/Path),
-    .vda5050.json (3.0), .vda5050-2.1.json; docs/how-to/exports.md tells what opens where.
+    .vda5050.json (3.0), .vda5050-2.1.json; docs/how-to/exports.md lists the programs that open each.
 
     Example: stopgo export plan/mission.json --floor floor.dxf --coverage plan/coverage.json -o site.dxf
     """
-    from stopgo.mission.document.problems import problems_of
-    from stopgo.mission.files.atomic import must_not_replace, write_checked
-    from stopgo.mission.files.exports import check_uses, exported, form_of, format_named
+    from stopgo.mission.files.atomic import must_not_replace
+    from stopgo.mission.files.exports import check_uses, format_named
     from stopgo.mission.files.exports.placing import moved, placed
     from stopgo.mission.files.mission_json import read
 
     document = read(mission)
     there = placed(document, origin=origin, to_map=map_)
-    for problem in problems_of(there)[:1]:
-        raise NegativeResult(f"{mission}: {problem} (stopgo check {mission} lists all)")
+    _check_problems(mission, there)
     name = format_named(to, out)
     writing = {"autopilot": autopilot, "trigger": trigger, "scan-wait": scan_wait, "settle": settle}
     drawn = {"floor": floor, "coverage": coverage}
     check_uses(name, {**drawn, **writing, "origin": origin, "map": map_})
     must_not_replace(out, mission, floor, coverage)
     supplements = _supplements(document, floor, coverage, writing)
-    data = exported(there, name, supplements)
+    report = _write_export(out, there, name, supplements)
+    notes = (*moved(document, there), *report.pop("notes"))
+    _print_export({"mission": str(mission), **report, "notes": notes}, as_json)
+
+
+def _write_export(out: Path, mission: Mission, name: str, supplements: Supplements) -> dict[str, Any]:
+    """Write the file; return the report on it."""
+    from stopgo.mission.files.atomic import write_checked
+    from stopgo.mission.files.exports import exported, form_of
+
+    data = exported(mission, name, supplements)
     write_checked(out, data)
-    notes = (*moved(document, there), *form_of(name).notes(there, supplements))
-    report = {"mission": str(mission), "file": str(out), "format": name, "stops": len(there.stops)}
-    _say_export({**report, "bytes": len(data), "notes": notes}, form_of(name).title, as_json)
+    report = {"file": str(out), "format": name, "stops": len(mission.stops), "bytes": len(data)}
+    return {**report, "notes": form_of(name).notes(mission, supplements)}
+
+
+def _check_problems(path: Path, mission: Mission) -> None:
+    """Refuse an invalid mission, with its first problem."""
+    from stopgo.mission.document.problems import problems_of
+
+    for problem in problems_of(mission)[:1]:
+        raise NegativeResult(f"{path}: {problem} (stopgo check {path} lists all)")
 
 
 def _supplements(
@@ -257,7 +272,7 @@ def _supplements(
 
 
 def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
-    """The drawing the mission was planned on, in the unit it was planned in."""
+    """Return the drawing the mission was planned on, in the unit it was planned in."""
     from stopgo.mission.files.exports.format import FloorDrawing
     from stopgo.mission.files.plan_toml import read_settings
     from stopgo.planner.floors import options_of
@@ -266,7 +281,7 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
 
     if path.suffix.lower() != ".dxf":
         raise InputError(
-            f"--floor {path}: layers are drawn over a .dxf only; leave --floor out to have them alone"
+            f"--floor {path}: layers can be drawn only over a .dxf; leave --floor out to write them alone"
         )
     for problem in _other_floor(mission, path):
         raise InputError(f"--floor {path}: is not the floor of this mission: its digest {problem.message}")
@@ -277,18 +292,19 @@ def _floor_drawing(path: Path, mission: Mission) -> FloorDrawing:
     return FloorDrawing(lambda: open_drawing(data, source=path)[0], metres)
 
 
-def _say_notes(notes: Iterable[str]) -> None:
+def _print_notes(notes: Iterable[str]) -> None:
     from stopgo.mission.console.table import printable
 
     for note in notes:
         typer.echo(f"stopgo: {printable(note)}", err=True)
 
 
-def _say_export(report: dict[str, Any], title: str, as_json: bool) -> None:
-    _say_notes(report["notes"])
+def _print_export(report: dict[str, Any], as_json: bool) -> None:
+    from stopgo.mission.files.exports import form_of
     from stopgo.mission.files.mission_text import json_text
 
-    line = f"{report['file']}: {title}, {report['stops']} stops, read back"
+    _print_notes(report["notes"])
+    line = f"{report['file']}: {form_of(report['format']).title}, {report['stops']} stops, read back"
     typer.echo(json_text(report) if as_json else line)
 
 
@@ -308,10 +324,10 @@ def import_command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Make a mission of waypoints or stops that another program wrote.
+    """Make a mission from another program's waypoints or stops.
 
-    Waypoints at which something is waited for or triggered become stops, others corners of the way between.
-    A file that holds anything a scanning robot would not do is refused, naming the item.
+    Waypoints with a wait or a trigger become stops, others become corners of the legs between. A file with an
+    item that a scanning robot cannot execute is refused, with the item's number.
 
     Example: stopgo import site.plan -o mission.json --origin 47.3769,8.5417,408,0
     """
@@ -329,18 +345,18 @@ def import_command(
     made, track = read_mission(file, settings, kind=kind, autopilot=autopilot)
     mission = sealed(replace(made, revision=next_revision(out, made)))
     write_checked(out, encode(mission))
-    _say_import(read(out), out, (*track.notes, UNASKED), as_json)
+    _print_import(read(out), out, (*track.notes, LEGS_UNCHECKED), as_json)
 
 
-UNASKED = (
-    "legs are straight between the file's places; stopgo check --floor FLOOR.dxf says whether they are free"
+LEGS_UNCHECKED = (
+    "legs are straight between the file's positions; stopgo check --floor FLOOR.dxf tests if they are free"
 )
 
 
-def _say_import(mission: Mission, out: Path, notes: tuple[str, ...], as_json: bool) -> None:
+def _print_import(mission: Mission, out: Path, notes: tuple[str, ...], as_json: bool) -> None:
     from stopgo.mission.files.mission_text import identity, json_text, route_length
 
-    _say_notes(notes)
+    _print_notes(notes)
     report = {
         **{"mission": str(out), "id": mission.id, "revision": mission.revision, "digest": mission.digest},
         **{"imported": mission.origin.floor, "stops": len(mission.stops), "route_m": route_length(mission)},

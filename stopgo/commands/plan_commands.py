@@ -224,7 +224,7 @@ def _write_part(
         written = dict(zip((key for key in WRITTEN if key in files), others, strict=False))
         if recording is not None:
             sight = sight_of(part.route, mission, part.figures)
-            for noun in (*part.nouns(), mission, schedule(mission), sight):
+            for noun in (*part.stage_results(), mission, schedule(mission), sight):
                 recording.observe(noun)
             recording.write(written["recording"])
         watch.lap("recording")

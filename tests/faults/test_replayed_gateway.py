@@ -70,7 +70,7 @@ def test_a_run_through_the_gateway_is_told_as_the_vehicle_drove_it(
         told = replay(read_log(tmp_path / name), mission, Placing())
         outcomes = [(item.outcome, item.tries) for item in told.comparison.asked]
         assert outcomes == [("scanned", 2), ("skipped", 0), *(("scanned", 1) for _ in range(stops - 2))]
-        assert told.comparison.stood_s("HELD", "PAUSED") > 0
+        assert told.comparison.seconds_in("HELD", "PAUSED") > 0
         _is_true(told, rows)
     driven = sum(math.dist(a[1:], b[1:]) for a, b in pairwise(rows))
     assert way_of(told).driven_m == pytest.approx(driven, abs=0.05)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from stopgo.mission.comparing.compare import arriving
+from stopgo.mission.comparing.compare import arrival_direction
 from stopgo.mission.comparing.comparison import StopComparison
 from stopgo.mission.document import Stop
 from stopgo.recordings.logs import read_log
@@ -52,7 +52,7 @@ def _is_true_of_stop(witness: Witness, stop: Stop, told: StopComparison) -> None
         return
     pose = good[-1].pose if good else arrivals[-1][1]
     near = UM if good else UM + 2 * witness.shakes_m
-    x, y, ahead = pose.x - stop.x, pose.y - stop.y, arriving(stop)
+    x, y, ahead = pose.x - stop.x, pose.y - stop.y, arrival_direction(stop)
     assert told.along_m == pytest.approx(x * math.cos(ahead) + y * math.sin(ahead), abs=near)
     assert told.across_m == pytest.approx(y * math.cos(ahead) - x * math.sin(ahead), abs=near)
     assert told.deviation_m == pytest.approx(math.hypot(x, y), abs=near)
@@ -62,8 +62,8 @@ def _is_true_of_stop(witness: Witness, stop: Stop, told: StopComparison) -> None
 def _is_true_of_run(witness: Witness, told: Replay) -> None:
     comparison = told.comparison
     assert comparison.driven_s == pytest.approx(witness.seconds(witness.ended_ns), abs=NS)
-    assert comparison.stood_s("PAUSED") == pytest.approx(witness.stood_s("pause"), abs=NS)
-    assert comparison.stood_s("HELD") == pytest.approx(witness.stood_s("held"), abs=NS)
+    assert comparison.seconds_in("PAUSED") == pytest.approx(witness.stood_s("pause"), abs=NS)
+    assert comparison.seconds_in("HELD") == pytest.approx(witness.stood_s("held"), abs=NS)
     for number, stop in enumerate(told.mission.stops):
         shots, visits = witness.shots_at(stop), told.at(number)
         assert len(visits) == bool(witness.arrivals(stop))

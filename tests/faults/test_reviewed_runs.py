@@ -19,7 +19,7 @@ import pytest
 from msgspec.structs import replace
 
 from stopgo.command_line import main
-from stopgo.mission.comparing.compare import arriving
+from stopgo.mission.comparing.compare import arrival_direction
 from stopgo.mission.comparing.comparison_text import HEADER, comparison_json, comparison_text
 from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.console.table import duration
@@ -222,7 +222,7 @@ def _is_true_of_stop(story: Story, stop: Stop, told: dict[str, Any]) -> None:
 
 def _is_true_of_place(story: Story, stop: Stop, pose: Any, told: dict[str, Any], *, good: bool) -> None:
     near = UM if good else UM + 2 * story.witness.shakes_m
-    x, y, ahead = pose.x - stop.x, pose.y - stop.y, arriving(stop)
+    x, y, ahead = pose.x - stop.x, pose.y - stop.y, arrival_direction(stop)
     assert told["along_m"] == pytest.approx(x * math.cos(ahead) + y * math.sin(ahead), abs=near)
     assert told["across_m"] == pytest.approx(y * math.cos(ahead) - x * math.sin(ahead), abs=near)
     assert told["deviation_m"] == pytest.approx(math.hypot(x, y), abs=near)

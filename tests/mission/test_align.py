@@ -15,13 +15,13 @@ from stopgo.bridge.commands.robot_commands import read_map
 from stopgo.command_line import main
 from stopgo.mission.errors import InputError
 from stopgo.mission.files.mission_json import read, write
-from stopgo.mission.frames.frame_transform import turned
+from stopgo.mission.frames.frame_transform import to_map_point
 from stopgo.mission.frames.rigid_fit import rigid_fit
 from tests.mission.worlds import square_tour
 
 CORNERS = np.array([(0.0, 0.0), (8.0, 0.0), (8.0, 6.0)])
 QUARTER = np.array([(10.0, 5.0), (10.0, 13.0), (4.0, 13.0)])
-"""The corners turned by 90° to the left, then shifted by (10, 5)."""
+"""The corners rotated by 90° to the left, then shifted by (10, 5)."""
 
 
 def test_a_quarter_turn_is_found() -> None:
@@ -41,9 +41,9 @@ def test_any_turn_and_shift_is_found(x: float, y: float, heading: float, far: fl
 
     wanted = Transform(x=x, y=y, heading=heading)
     site = CORNERS + far
-    there = np.array([turned(wanted, (px, py)) for px, py in site.tolist()])
+    there = np.array([to_map_point(wanted, (px, py)) for px, py in site.tolist()])
     found = rigid_fit(site, there).transform
-    back = np.array([turned(found, (px, py)) for px, py in site.tolist()])
+    back = np.array([to_map_point(found, (px, py)) for px, py in site.tolist()])
     assert np.abs(back - there).max() < 1e-8
 
 
@@ -60,7 +60,7 @@ def test_a_point_that_was_noted_wrongly_has_the_largest_residual() -> None:
     ("first", "second", "said"),
     [
         ([(0, 0)], [(1, 1)], "one pair of points: two are needed"),
-        ([(1, 1), (1, 1)], [(2, 2), (2, 2)], "too near each other to tell a turn"),
+        ([(1, 1), (1, 1)], [(2, 2), (2, 2)], "too near each other to fix a rotation"),
         ([(0, 0), (0.1, 0)], [(0, 0), (0.1, 0)], "at least 2 m apart"),
         ([(0, 0), (8, 0)], [(0, 0), (8000, 0)], "1000.000 times as far apart"),
         ([(0, 0), (8, 0), (8, 6)], [(0, 0), (-8, 0), (-8, 6)], "the map is mirrored"),

@@ -22,7 +22,7 @@ def test_what_is_written_is_there_and_nothing_else(tmp_path: Path) -> None:
 
 
 def test_a_missing_folder_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"the folder .*/nowhere does not exist"):
+    with pytest.raises(InputError, match=r"folder .*/nowhere does not exist"):
         write_atomic(tmp_path / "nowhere" / "a.json", b"")
 
 
@@ -102,5 +102,5 @@ def test_what_is_read_is_never_written_over(
     monkeypatch.chdir(tmp_path)
     Path("office.dxf").write_text("a drawing")
     assert main(command) == 2
-    assert "is read, and would be written over" in capsys.readouterr().err
+    assert "is also an input and would be overwritten" in capsys.readouterr().err
     assert Path("office.dxf").read_text() == "a drawing"

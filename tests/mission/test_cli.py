@@ -86,7 +86,7 @@ def test_check_of_a_sound_mission_on_its_floor(
     bare = [msgspec.structs.replace(stop, sees=Sees(units=0, new_units=0)) for stop in mission.stops]
     write(msgspec.structs.replace(mission, stops=tuple(bare)), path)
     assert main(["check", str(path), "--floor", str(floor)]) == 0
-    assert "in order; id 0123456789abcdef0123456789abcdef revision 1, 2 stops" in capsys.readouterr().out
+    assert "valid; id 0123456789abcdef0123456789abcdef revision 1, 2 stops" in capsys.readouterr().out
 
 
 def test_check_against_another_floor_is_no(path: str, capsys: pytest.CaptureFixture[str]) -> None:

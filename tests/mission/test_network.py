@@ -60,4 +60,4 @@ def test_skipping_a_stop_in_between_is_told() -> None:
     told = msgspec.structs.replace(tour, stops=stops, network=(pair(1, 2), pair(2, 3)))
     assert apart_in_words(told, names) == ""
     words = apart_in_words(told, ["s01", "s03"])
-    assert words == "the scans fall into 2 pieces without s02: apart from the others s03"
+    assert words == "the scans are in 2 components without s02; separate: s03"

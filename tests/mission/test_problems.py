@@ -34,7 +34,7 @@ def test_a_sound_mission_has_no_problems(mission: Mission) -> None:
 
 def test_two_stops_of_one_name_are_told() -> None:
     (problem,) = problems_of(with_stop(1, id="S1"))
-    assert str(problem) == "$.stops[1].id: is 'S1', which $.stops[0] has already"
+    assert str(problem) == "$.stops[1].id: is 'S1', already used by $.stops[0]"
 
 
 def test_a_leg_ends_at_its_stop() -> None:
@@ -88,8 +88,7 @@ def test_numbers_that_are_none_are_told() -> None:
 def test_a_waypoint_that_no_robot_drives_to_is_told() -> None:
     (problem,) = problems_of(with_stop(1, approach=((4.0, 0.0), (1e6, 0.0), (4.0, 3.0))))
     assert str(problem) == (
-        "$.stops[1].approach[1]: (1000000.000, 0.000) is 1000.0 km from the start; "
-        "no mission reaches beyond 20 km"
+        "$.stops[1].approach[1]: (1000000.000, 0.000) is 1000.0 km from the start; the limit is 20 km"
     )
     assert paths(with_stop(1, x=0.0, y=20_001.0, approach=((4.0, 0.0), (0.0, 20_001.0)))) == [
         *("$.stops[1]", "$.stops[1].approach[1]", "$.return[0]"),

@@ -52,7 +52,7 @@ def test_a_pose_that_is_not_finite_is_no_pose(bad: float) -> None:
 
 
 def test_arrays_of_different_lengths_are_no_track() -> None:
-    with pytest.raises(ValueError, match="2 times, 1 places"):
+    with pytest.raises(ValueError, match="2 times, 1 positions"):
         Track.of([1, 2], [(0, 0)], [0.0])
 
 

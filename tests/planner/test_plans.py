@@ -168,4 +168,4 @@ def test_all_parts_of_the_duplex_are_planned_apart() -> None:
     assert len(made.parts) >= 2
     assert len({part.candidates.chosen_part for part in made.parts}) == len(made.parts)
     for part in made.parts:
-        check_plan(part.mission, {type(noun): noun for noun in part.nouns()}, made.settings)
+        check_plan(part.mission, {type(noun): noun for noun in part.stage_results()}, made.settings)

@@ -113,7 +113,7 @@ def test_a_scan_from_outside_its_tolerance_is_told_by_log_report_and_plot(
         for report in run.reports(mission):
             moved = isinstance(report, Scanned) and report.stop == first.id
             tell(recording, msgspec.structs.replace(report, pose=aside) if moved else report)
-    words = "120 mm beside its place (50 mm are tolerated)"
+    words = "120 mm from its stop (50 mm are tolerated)"
     names = entities.RunEntities(run.RUN)
     log = on(path, names.log, "TextLog:text", entities.MISSION_TIME)
     levels = on(path, names.log, "TextLog:level", entities.MISSION_TIME)
@@ -196,11 +196,11 @@ def test_ctrl_c_keeps_the_run_so_far(tmp_path: Path, mission: Mission) -> None:
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("none/field.rrd", "no folder"),
+        ("none/field.rrd", "does not exist"),
         (".", "is a folder"),
         ("file/field.rrd", "is a file, not a folder"),
-        ("/dev/null", "is no file"),
-        ("/proc/field.rrd", "no such file can be made in /proc"),
+        ("/dev/null", "is not a file"),
+        ("/proc/field.rrd", "no file can be created in /proc"),
         (f"{'x' * 250}.rrd", "File name too long"),
     ],
 )
@@ -216,7 +216,7 @@ def test_watching_into_an_unwritable_place_is_refused_before_the_robot_is_asked(
 ) -> None:
     assert main(["watch", "--robot", "r1", "--timeout", "0.1", "--rrd", "/proc/field.rrd"]) == 2
     (line,) = capfd.readouterr().err.splitlines()
-    assert line.startswith("stopgo: /proc/field.rrd: no such file can be made in /proc")
+    assert line.startswith("stopgo: /proc/field.rrd: no file can be created in /proc")
 
 
 # ---- the disk is full ----

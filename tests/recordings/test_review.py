@@ -41,7 +41,7 @@ def test_both_for_a_person(plan: Path, field: Path, capsys: pytest.CaptureFixtur
     assert main(["review", str(plan), str(field)]) == 0
     text = capsys.readouterr().out
     assert "coverage: 0.7857" in text
-    assert "greatest deviation at a stop 30.0 mm, beside the route 30.0 mm" in text
+    assert "greatest position error 30.0 mm, cross-track error 30.0 mm" in text
 
 
 def test_a_skipped_stop_is_told_with_what_it_cost(

@@ -28,7 +28,7 @@ from stopgo.mission.mavlink.following.steps import (
     tried_again,
 )
 from stopgo.mission.mavlink.read_back import differences
-from stopgo.mission.mavlink.telemetry import began_again
+from stopgo.mission.mavlink.telemetry import has_restarted
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import Arrived
 from stopgo.mission.run.states import Change, Run
@@ -150,7 +150,7 @@ class AutoFollower:
         """A vehicle that was started anew stands, and has forgotten its mode, origin and item."""
         began_ns, before_ms = self._observer.began_ns, self._book.boot_ms
         self._book.boot_ms = self._observer.boot_ms
-        went_back = began_again(before_ms, self._book.boot_ms)
+        went_back = has_restarted(before_ms, self._book.boot_ms)
         if self._looks_only or began_ns is None or not self._book.booted(began_ns, went_back=went_back):
             return
         self._commands.ask_for_telemetry()
@@ -226,7 +226,7 @@ class AutoFollower:
         """A vehicle that waits at a stop that was left out goes on at once."""
         if self.run.state not in ("RUNNING", "HOMING") or not observed.drives or self._looks_only:
             return
-        place = progress.passed_by(self.run, listed, observed)
+        place = progress.after_skipped(self.run, listed, observed)
         if place is not None:
             pending = PendingCommand(command="jump", place=place, since_ns=self._book.clock.now_ns())
             self._book.journal.store_fact("pending", pending)

@@ -20,8 +20,8 @@ from stopgo.bridge.robot.runner import Position
 from stopgo.mission.document import Mission
 from stopgo.mission.errors import RobotUnreachable
 from stopgo.mission.mavlink.enums import MessageId
-from stopgo.mission.mavlink.following.observer import TOLD, Observer
-from stopgo.mission.mavlink.following.steps import held_by_vehicle
+from stopgo.mission.mavlink.following.observer import USED_MESSAGES, Observer
+from stopgo.mission.mavlink.following.steps import run_on_vehicle
 from stopgo.mission.mavlink.telemetry import Message, is_lost
 from stopgo.mission.run.orders import Answer, Order
 from stopgo.mission.run.states import Run
@@ -73,7 +73,7 @@ class AutoRunner:
     def snapshot(self) -> tuple[Run, Mission | None]:
         """The run as seen, if this process only looks; else as stored, by whichever process."""
         listed, run = self._book.listed, self._follower.run if self._looks_only else self._book.run
-        return held_by_vehicle(run, self._observer.items), None if listed is None else listed.mission
+        return run_on_vehicle(run, self._observer.items), None if listed is None else listed.mission
 
     def position(self) -> Position | None:
         fix = self._observer.fix
@@ -129,7 +129,7 @@ class AutoRunner:
 
     def _look(self) -> None:
         asked_ns = 0
-        with self._peer.wire.filling(Telemetry(frozenset(TOLD), self._peer.who)) as waiting:
+        with self._peer.wire.filling(Telemetry(frozenset(USED_MESSAGES), self._peer.who)) as waiting:
             while not self._closing.is_set():
                 now_ns = self._book.clock.now_ns()
                 if now_ns > asked_ns + ASK_AGAIN_S * 1e9 and not self._observer.fresh(ASK_AGAIN_S, now_ns):

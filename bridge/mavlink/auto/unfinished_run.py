@@ -6,7 +6,7 @@ from stopgo.bridge.mavlink.auto.logbook import Logbook
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.bridge.mavlink.line.url import Url
 from stopgo.mission.errors import NegativeResult
-from stopgo.mission.run.tolerance import told_outside
+from stopgo.mission.run.tolerance import stops_outside_text
 
 
 def check_run_over(peer: Peer, url: Url, book: Logbook, what: str) -> None:
@@ -21,7 +21,7 @@ def check_run_over(peer: Peer, url: Url, book: Logbook, what: str) -> None:
     if run.over or listed is None:
         return
     mission = listed.mission
-    outside = told_outside(run.outside, len(run.outside))
+    outside = stops_outside_text(run.outside, len(run.outside))
     stops = f"{len(run.done)} of {len(mission.stops)} stops done{outside}"
     seen = ", unless stopgo watch sees that it has come to its end" if run.state == "RUNNING" else ""
     raise NegativeResult(

@@ -22,7 +22,7 @@ from stopgo.mission.mavlink.autopilots.kind import AUTO, HOLD, why_no_rover
 from stopgo.mission.mavlink.following import steps as progress
 from stopgo.mission.mavlink.following.listed_mission import ListedMission
 from stopgo.mission.mavlink.following.observer import Observer
-from stopgo.mission.mavlink.following.resuming import ON_WAY_M, resume_place, way
+from stopgo.mission.mavlink.following.resuming import ON_LINE_M, resume_place, route_lines
 from stopgo.mission.mavlink.following.steps import Observation
 from stopgo.mission.mavlink.local_frame import apart
 from stopgo.mission.mavlink.read_back import differences
@@ -198,7 +198,7 @@ class VehicleOrders:
         """The way to the stop is still driven; the vehicle is led past its waits once it is there."""
         before, after = self._book.run, decision.change.run
         observed = self._observe(after, listed)
-        beyond = progress.passed_by(after, listed, observed)
+        beyond = progress.after_skipped(after, listed, observed)
         if after.over:
             self._commands.hold()
         elif before.state == "HELD":
@@ -333,8 +333,8 @@ VERBS: dict[str, Callable[[VehicleOrders, Order, ListedMission, Decision], Chang
 
 def on_way(run: Run, listed: ListedMission, pose: Pose) -> Pose:
     """The pose, or the nearest point of the way if that is so near that the vehicle is on it."""
-    near = min(way(run, listed), key=lambda piece: piece.away(pose), default=None)
-    if near is None or near.away(pose) > ON_WAY_M:
+    near = min(route_lines(run, listed), key=lambda piece: piece.away(pose), default=None)
+    if near is None or near.away(pose) > ON_LINE_M:
         return pose
     x, y = near.nearest(pose)
     return Pose(x=x, y=y, heading=pose.heading)

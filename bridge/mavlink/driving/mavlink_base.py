@@ -21,7 +21,7 @@ from stopgo.mission.frames.transform import SiteOrigin
 from stopgo.mission.mavlink.local_frame import UNPLACED, LocalFrame, VehicleOrigin, apart, local_frame
 from stopgo.mission.run.events import Pose
 from stopgo.mission.run.route_position import foot, legs_of
-from stopgo.mission.run.scans import needs_heading, turned_away
+from stopgo.mission.run.scans import heading_error, needs_heading
 
 TICK_S = 0.1
 AGAIN_S = 1.0
@@ -258,7 +258,7 @@ class MavlinkBase:
     def _check_heading(self, heading: float) -> None:
         """A heading that was missed matters only to a scanner that does not see all around."""
         mission = self._mission
-        missing = 0.0 if mission is None else turned_away(mission.scanner, heading, self.pose().heading)
+        missing = 0.0 if mission is None else heading_error(mission.scanner, heading, self.pose().heading)
         if missing:
             wanted = math.degrees(heading)
             _must(f"the vehicle does not turn to {wanted:.0f}°: {math.degrees(missing):.0f}° are missing")

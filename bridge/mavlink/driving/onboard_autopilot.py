@@ -37,7 +37,7 @@ from stopgo.mission.mavlink.local_frame import VehicleOrigin
 from stopgo.mission.mavlink.telemetry import (
     Message,
     charge_of,
-    complains,
+    is_arming_refusal,
     is_lost,
     local_speed,
     origin_of,
@@ -486,6 +486,6 @@ def _said(waiting: MessageQueue) -> str:
     until_s, said = time.monotonic() + WORDS_S, ""
     while (message := waiting.get(until_s - time.monotonic())) is not None:
         said = message.text
-        if complains(said):
+        if is_arming_refusal(said):
             break
     return said

@@ -5,7 +5,7 @@ from __future__ import annotations
 from stopgo.bridge.mavlink.line.peer import Peer
 from stopgo.mission.errors import NegativeResult
 from stopgo.mission.frames.transform import SiteOrigin
-from stopgo.mission.mavlink.local_frame import VehicleOrigin, how_far_off
+from stopgo.mission.mavlink.local_frame import VehicleOrigin, origin_distance
 
 
 def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> VehicleOrigin:
@@ -31,7 +31,7 @@ def check_origin(peer: Peer, site: SiteOrigin, *, set_it: bool = False) -> Vehic
             f"{peer} has no origin, {tried}, or --any-origin if it finds its place by satellites; "
             "nothing was sent"
         )
-    away = how_far_off(site, held.place)
+    away = origin_distance(site, held.place)
     if away:
         raise NegativeResult(
             f"{peer}: its origin {_told(held)} is {away} from the mission's {_told(wanted)}, "

@@ -33,7 +33,7 @@ from stopgo.mission.mavlink.autopilots.kind import Autopilot
 from stopgo.mission.mavlink.enums import CommandResult, Component, Firmware, MessageId, ModeFlag, VehicleType
 from stopgo.mission.mavlink.items import Command, MavFrame
 from stopgo.mission.mavlink.local_frame import VehicleOrigin
-from stopgo.mission.mavlink.telemetry import Message, began_again, origin_of, place_of
+from stopgo.mission.mavlink.telemetry import Message, has_restarted, origin_of, place_of
 
 PATIENCE_S = 5.0
 """Silence after which a vehicle is given up."""
@@ -107,7 +107,7 @@ class Newest(MessageQueue):
             self._count_boots(now_ms)
 
     def _count_boots(self, now_ms: int) -> None:
-        anew = began_again(self._boot_ms, now_ms)
+        anew = has_restarted(self._boot_ms, now_ms)
         self.boots += anew
         self._boot_ms = now_ms if anew else max(now_ms, self._boot_ms)
 

@@ -98,7 +98,7 @@ class AutoMission:
 
     def replaced(self, marked: int | None, now_ns: int) -> None:
         """Another list has come, or none."""
-        keeps = self._autopilot.habits.restarts_item and self.current < len(self._store.kept.mission)
+        keeps = self._autopilot.behaviour.restarts_item and self.current < len(self._store.kept.mission)
         number = self.current if keeps else (marked or 0)
         active, self.state = self.state == "active", "idle"
         self.current = number

@@ -103,7 +103,7 @@ def _reboot(vehicle: Vehicle, who: Who, order: ReceivedCommand) -> None:
 
 def _no(vehicle: Vehicle) -> int:
     """How the autopilot says no to what it could do at other times."""
-    return int(vehicle.autopilot.habits.says_no)
+    return int(vehicle.autopilot.behaviour.says_no)
 
 
 def _arm(vehicle: Vehicle, order: ReceivedCommand) -> int:
@@ -131,7 +131,7 @@ def _mode_of(vehicle: Vehicle, flags: int, custom: int) -> ModeName | None:
     modes = vehicle.autopilot.modes
     if flags & ModeFlag.CUSTOM_MODE_ENABLED:
         return next((name for name, mode in modes.numbers.items() if modes.custom(mode) == custom), None)
-    if not vehicle.autopilot.habits.modes_by_flags:
+    if not vehicle.autopilot.behaviour.modes_by_flags:
         return None
     if flags & ModeFlag.AUTO_ENABLED:
         return "auto"
@@ -140,13 +140,13 @@ def _mode_of(vehicle: Vehicle, flags: int, custom: int) -> ModeName | None:
 
 def _set_mode_message(vehicle: Vehicle, who: Who, message: Message) -> None:
     result = _change_mode(vehicle, message.base_mode, message.custom_mode)
-    if vehicle.autopilot.habits.acknowledges_set_mode:
+    if vehicle.autopilot.behaviour.acknowledges_set_mode:
         _acknowledge(vehicle, who, MessageId.SET_MODE, result)
 
 
 def _set_current(vehicle: Vehicle, order: ReceivedCommand) -> int:
     """-1 means: stay; param2 1 means: count everything anew."""
-    if not vehicle.autopilot.habits.jumps_by_command:
+    if not vehicle.autopilot.behaviour.jumps_by_command:
         return int(UNSUPPORTED)
     number = order.whole(0, -2)
     if number == -1:
@@ -160,7 +160,7 @@ def _set_current_message(vehicle: Vehicle, message: Message) -> None:
 
 
 def _start(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    first, habits = order.whole(0, 0), vehicle.autopilot.habits
+    first, habits = order.whole(0, 0), vehicle.autopilot.behaviour
     if first > 0 and not (habits.start_takes_item and vehicle.auto.jump(first, vehicle.now_ns)):
         return int(DENIED)
     if not vehicle.set_mode("auto"):
@@ -171,7 +171,7 @@ def _start(vehicle: Vehicle, order: ReceivedCommand) -> int:
 
 
 def _pause(vehicle: Vehicle, order: ReceivedCommand) -> int:
-    if not vehicle.autopilot.habits.pauses_by_command:
+    if not vehicle.autopilot.behaviour.pauses_by_command:
         return int(UNSUPPORTED)
     return int(ACCEPTED) if vehicle.set_mode("auto" if order.params[0] == 1 else "hold") else int(DENIED)
 
@@ -198,7 +198,7 @@ def _heading(vehicle: Vehicle, yaw: float) -> float | None:
 
 def _change_speed(vehicle: Vehicle, order: ReceivedCommand) -> int:
     drives = vehicle.auto.state == "active" or vehicle.target.goes_somewhere
-    if vehicle.autopilot.habits.speed_while_driving and not drives:
+    if vehicle.autopilot.behaviour.speed_while_driving and not drives:
         return int(FAILED)
     if not vehicle.rover.set_speed(order.params[1]):
         return int(DENIED)

@@ -28,14 +28,14 @@ def verdict(autopilot: Autopilot, kind: int, item: Item) -> int:
     """The MAV_MISSION_RESULT for one item of a mission, fence or rally list."""
     if kind != MISSION:
         return _of_area(kind, item)
-    if item.command not in autopilot.habits.takes:
+    if item.command not in autopilot.behaviour.takes:
         return MissionResult.UNSUPPORTED
     placed = item.command in PLACED
-    if autopilot.habits.checks_frame_first:
+    if autopilot.behaviour.checks_frame_first:
         return _frame_first(item, placed)
     if placed and item.frame not in GLOBAL_FRAMES | {MavFrame.MISSION}:
         return MissionResult.UNSUPPORTED_FRAME
-    if placed and abs(item.z) >= autopilot.habits.highest_m:
+    if placed and abs(item.z) >= autopilot.behaviour.highest_m:
         return MissionResult.INVALID_PARAM7
     return _of_numbers(item, MAY_BE_NAN.get(item.command, ())) or (_of_place(item) if placed else ACCEPTED)
 

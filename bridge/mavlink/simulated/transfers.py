@@ -79,7 +79,7 @@ class Transfers:
         event: Callable[[int], bool],
         mishaps: Mishaps,
     ) -> None:
-        self._autopilot, self._habits = autopilot, autopilot.habits
+        self._autopilot, self._habits = autopilot, autopilot.behaviour
         self._one_by_one = autopilot.gives_items == "in order"
         self._store, self._clock = store, clock
         self._say, self._text, self._home, self._stored = say, text, home, stored

@@ -110,7 +110,7 @@ class Vehicle:
             self.rover, wall, patience_s=lambda: tuning.values.get(driving.gives_up_parameter, PATIENCE_S)
         )
         self.parameters = Parameters(
-            self.autopilot.habits, tuning, speed=self.rover.speed, set_speed=self.rover.set_speed
+            self.autopilot.behaviour, tuning, speed=self.rover.speed, set_speed=self.rover.set_speed
         )
         self.camera = Camera(self.store, self.rover, self._mishaps, default_s=lambda: self.parameters.scan_s)
         tells = AutoEvents(
@@ -262,7 +262,7 @@ class Vehicle:
 
     def set_origin(self, origin: SiteOrigin) -> None:
         """Take a global origin; ArduPilot takes one per boot, and says nothing about others."""
-        if self.rover.origin is not None and not self.autopilot.habits.origin_again:
+        if self.rover.origin is not None and not self.autopilot.behaviour.origin_again:
             return
         self.rover.origin = origin
         self.tell(MessageId.GPS_GLOBAL_ORIGIN)
@@ -339,8 +339,8 @@ class Vehicle:
     def _finish(self, now_ns: int) -> None:
         self.text("Mission Complete")
         self.tell(MessageId.MISSION_CURRENT)
-        if self.autopilot.habits.done_mode != self.mode:
-            self.mode = self.autopilot.habits.done_mode
+        if self.autopilot.behaviour.done_mode != self.mode:
+            self.mode = self.autopilot.behaviour.done_mode
             self.tell(MessageId.HEARTBEAT)
 
     def _scanned(self) -> None:

@@ -140,7 +140,7 @@ def mission_state(vehicle: Vehicle) -> int:
         return int(MissionState.ACTIVE)
     if auto.state == "complete":
         return int(MissionState.COMPLETE)
-    paused = vehicle.autopilot.habits.pauses and auto.current > 0
+    paused = vehicle.autopilot.behaviour.pauses and auto.current > 0
     return int(MissionState.PAUSED if paused else MissionState.NOT_STARTED)
 
 

@@ -30,7 +30,7 @@ class Left:
 
 def left_on(peer: Peer, before: Sequence[Item]) -> Left:
     """See what a failed upload left, and make good what is neither the mission before nor none."""
-    if peer.autopilot.habits.atomic:
+    if peer.autopilot.behaviour.atomic:
         try:
             held = download(peer)
         except (NegativeResult, RobotUnreachable):

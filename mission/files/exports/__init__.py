@@ -1,4 +1,4 @@
-"""Writes a mission in the formats that others open: one module per format, one line in `FORMATS`."""
+"""Export of a mission to other programs' formats: one module per format, one line in `FORMATS`."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from stopgo.mission.files.exports import (
 from stopgo.mission.files.exports.format import Format, Supplements
 
 QUANTUM = 0.008
-"""Metres by which 1e-7 degrees move a place at most."""
+"""Largest distance in metres of 1e-7 degrees."""
 
 WRITING = ("autopilot", "trigger", "scan-wait", "settle")
-"""Options by which a mission is written as items."""
+"""Options for the writing of a mission as items."""
 
 FORMATS: dict[str, Format] = {
     "plan": Format(
@@ -70,7 +70,7 @@ FORMATS: dict[str, Format] = {
 
 
 def format_named(name: str | None, path: Path) -> str:
-    """The name of the format for a file: as given, or by suffix.
+    """Return the name of the format for a file: as given, or by suffix.
 
     Raises
     ------
@@ -88,26 +88,26 @@ def format_named(name: str | None, path: Path) -> str:
 
 
 def form_of(name: str) -> Format:
-    """The format of this name: ours, an installed package's, or `package.module:FORMAT`."""
+    """Return the format of this name: ours, an installed package's, or `package.module:FORMAT`."""
     return _form(name).what
 
 
 def _form(name: str) -> Variant[Format]:
     found = variant("format", name, FORMATS, said=f"--to {name}")
-    found.noun(found.what, Format)
+    found.of_kind(found.what, Format)
     return found
 
 
 def check_uses(name: str, given: Mapping[str, object]) -> None:
-    """Refuse an option that a format has no use for, rather than leave it out in silence."""
+    """Refuse an option that a format does not use, instead of ignoring it."""
     for option, value in given.items():
         if value is not None and option not in form_of(name).uses:
             fitting = ", ".join(form.suffix for form in FORMATS.values() if option in form.uses)
-            raise InputError(f"--{option}: {form_of(name).title} has no use for it; it is for {fitting}")
+            raise InputError(f"--{option}: not used by {form_of(name).title}; only by {fitting}")
 
 
 def exported(mission: Mission, name: str, supplements: Supplements) -> bytes:
-    """The mission in a format of `FORMATS`, read back and compared before it is handed out.
+    """Return the mission in a format of `FORMATS`, read back and compared before it is returned.
 
     Raises
     ------
@@ -120,11 +120,11 @@ def exported(mission: Mission, name: str, supplements: Supplements) -> bytes:
     form = found.what
     if form.georeferenced and mission.georeference is None:
         raise InputError(
-            f"{mission.name}: has no georeference, and {form.title} holds latitudes and longitudes; "
+            f"{mission.name}: no georeference, but {form.title} holds latitudes and longitudes; "
             "give --origin LAT,LON,ALT,HEADING, or plan with it"
         )
-    with found.blamed():
-        data = found.noun(form.write(mission, supplements), bytes)
+    with found.named_errors():
+        data = found.of_kind(form.write(mission, supplements), bytes)
         places = form.read_back(data, mission, supplements)
     if not found.ours:
         found.array(places, "read_back", (None, 2))

@@ -1,4 +1,4 @@
-"""What an export format is, and what an export may be given besides the mission."""
+"""Export formats, and the supplements that an export may use in addition to the mission."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class FloorDrawing:
 
 @dataclass(frozen=True)
 class Supplements:
-    """What an exporter is given besides the mission; each uses only what its `Format.uses` names."""
+    """Supplements of an exporter; each uses only those that its `Format.uses` names."""
 
     autopilot: str = "ardupilot"
     trigger: Trigger = "auto"
     scan_wait: ScanWait = "delay"
     settle: Settle = "delay"
-    """How the mission is written as items; `stopgo.mission.mavlink.translate` says what each means."""
+    """Options for the mission's items; `stopgo.mission.mavlink.translate` describes each."""
     floor: FloorDrawing | None = None
     coverage: Stretches | None = None
     written: datetime = datetime(1970, 1, 1, tzinfo=UTC)
@@ -61,8 +61,8 @@ def written_as(options: Mapping[str, str | None]) -> Supplements:
 
 Writer = Callable[[Mission, Supplements], bytes]
 ReadBack = Callable[[bytes, Mission, Supplements], list[Point]]
-"""Where a reader of the file finds the stops, in the site's frame and in order; it may use the mission's
-frame and georeference to get there, nothing else of it."""
+"""Returns the stops in the file, in the site's frame and in order. It may use the mission's frame and
+georeference to transform them, and nothing else of it."""
 
 
 def _nothing(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
@@ -71,17 +71,17 @@ def _nothing(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Format:
-    """A file format others open."""
+    """A file format of other programs."""
 
     suffix: str
     title: str
     write: Writer
     read_back: ReadBack
     tolerance: float
-    """Metres by which a stop may move on the way into the file and back."""
+    """Greatest change of a stop's position by writing and reading, in metres."""
     georeferenced: bool = False
-    """Whether it holds latitudes and longitudes, so that a mission without georeference is refused."""
+    """True if it holds latitudes and longitudes, so that a mission without georeference is refused."""
     uses: tuple[str, ...] = ()
-    """The options it has a use for, by their names without hyphens in front."""
+    """Names of the options that it uses, without hyphens in front."""
     notes: Callable[[Mission, Supplements], tuple[str, ...]] = _nothing
-    """What the person should know of this export, such as what the format cannot hold."""
+    """Returns notes on this export for the user, such as what the format cannot hold."""

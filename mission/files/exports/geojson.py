@@ -1,4 +1,4 @@
-"""Writes stops, legs and coverage as GeoJSON (RFC 7946): WGS84, longitude before latitude."""
+"""GeoJSON export of stops, legs and coverage (RFC 7946): WGS84, longitude before latitude."""
 
 from __future__ import annotations
 

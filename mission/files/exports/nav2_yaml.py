@@ -1,6 +1,6 @@
-"""Writes the stops as the waypoints file of Nav2's RViz panel ("save WPs"), each with the leg to it.
+"""Waypoints file of Nav2's RViz panel ("save WPs"): each stop with the leg to it.
 
-The panel reads `pose` and `orientation` of every waypoint and passes over other keys: `approach` and `return`
+The panel reads `pose` and `orientation` of every waypoint and ignores other keys: `approach` and `return`
 are for programs that let Nav2 follow the mission's legs.
 """
 
@@ -14,14 +14,14 @@ from stopgo.mission.console.table import printable
 from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.waypoints import frame_name, mapped
-from stopgo.mission.frames.frame_transform import SAME, turned_back
+from stopgo.mission.frames.frame_transform import SAME, from_map_point
 
 _NUMBER = r"(-?\d+\.\d+)"
 _POSE = re.compile(rf"^    pose: \[{_NUMBER}, {_NUMBER}, {_NUMBER}\]$", re.MULTILINE)
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:
-    """One waypoint per stop, on the robot's map, and the way back."""
+    """Return one waypoint per stop, on the robot's map, and the return leg."""
     there = mapped(mission)
     lines = [*_head(mission), "waypoints:"]
     for number, stop in enumerate(there.stops):
@@ -32,14 +32,14 @@ def write(mission: Mission, supplements: Supplements) -> bytes:
 
 
 def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
-    """The poses' places, back on the site."""
+    """Return the positions of the poses, back in the site's frame."""
     to_map = mission.frame.to_map or SAME
     places = [(float(x), float(y)) for x, y, _ in _POSE.findall(data.decode())]
-    return [turned_back(to_map, place) for place in places]
+    return [from_map_point(to_map, place) for place in places]
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
-    """What Nav2 does otherwise than the mission says."""
+    """Return the notes on differences between Nav2's behaviour and the mission."""
     way = (
         "Nav2's panel plans its own way between the waypoints; the mission's legs are their 'approach', "
         "for a program that sends them to Nav2's FollowPath"
@@ -48,7 +48,7 @@ def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
 
 
 def unmapped(mission: Mission) -> tuple[str, ...]:
-    """That the poses are the drawing's, where the mission does not say where its drawing lies on the map."""
+    """Return a note that the poses are the drawing's, if the mission has no transform to the map."""
     if mission.frame.to_map is not None:
         return ()
     return (

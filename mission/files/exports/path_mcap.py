@@ -1,6 +1,6 @@
-"""Writes the way as `nav_msgs/Path` and the stops as `geometry_msgs/PoseArray` in an MCAP bag of ROS 2.
+"""MCAP bag of ROS 2: the route as `nav_msgs/Path`, the stops as `geometry_msgs/PoseArray`.
 
-The rosbags writer makes a folder of a bag; what it holds is one .mcap, which ROS 2, Foxglove and rosbags
+The rosbags writer creates a folder for a bag. It contains one .mcap file, which ROS 2, Foxglove and rosbags
 open without the folder.
 """
 
@@ -15,7 +15,7 @@ from stopgo.mission.document import Mission, Point
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.nav2_yaml import unmapped
 from stopgo.mission.files.exports.waypoints import Waypoint, frame_name, mapped, way
-from stopgo.mission.frames.frame_transform import SAME, turned_back
+from stopgo.mission.frames.frame_transform import SAME, from_map_point
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -25,7 +25,7 @@ STOPS = "/stopgo/stops"
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:
-    """The way with a pose per corner and stop on /stopgo/path, the stops alone on /stopgo/stops.
+    """Return the route with a pose per corner and stop on /stopgo/path, the stops alone on /stopgo/stops.
 
     Stamps in the headers are zero, which a viewer takes as "any time"; the log time is
     `supplements.written`.
@@ -47,10 +47,10 @@ def write(mission: Mission, supplements: Supplements) -> bytes:
 
 
 def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
-    """The places in the PoseArray, back on the site."""
+    """Return the positions in the PoseArray, back in the site's frame."""
     poses = [pose.position for pose in read_messages(data)[STOPS].poses]
     to_map = mission.frame.to_map or SAME
-    return [turned_back(to_map, (position.x, position.y)) for position in poses]
+    return [from_map_point(to_map, (position.x, position.y)) for position in poses]
 
 
 def read_messages(data: bytes) -> dict[str, Any]:
@@ -99,7 +99,7 @@ def _pose(waypoint: Waypoint, kinds: Any) -> Any:
 
 
 def _latched() -> Any:
-    """Whoever subscribes late still gets the message: transient local, as maps are published."""
+    """Quality of service for late subscribers: transient local, as for maps."""
     from rosbags.interfaces import (
         Qos,
         QosDurability,

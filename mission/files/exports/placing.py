@@ -1,4 +1,4 @@
-"""A mission placed on the earth or on a robot's map by what a person types; its file stays as it is."""
+"""Georeference and map pose of a mission as the user types them; its file stays unchanged."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAP = "write X,Y,HEADING in metres and degrees, such as 1.5,2,90"
 
 
 def placed(mission: Mission, *, origin: str | None, to_map: str | None) -> Mission:
-    """The mission with the georeference `LAT,LON,ALT,HEADING` and the map's pose `X,Y,HEADING`, where given.
+    """Return the mission with georeference `LAT,LON,ALT,HEADING` and map pose `X,Y,HEADING`, if given.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def placed(mission: Mission, *, origin: str | None, to_map: str | None) -> Missi
 
 
 def map_transform(text: str) -> Transform:
-    """How the site lies on a map or in a log's frame, as `--map X,Y,HEADING` tells.
+    """Return the site's transform to a map or to a log's frame, from `--map X,Y,HEADING`.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def map_transform(text: str) -> Transform:
 
 
 def moved(mission: Mission, there: Mission) -> tuple[str, ...]:
-    """A line if `there` is placed elsewhere on the earth than the mission itself says."""
+    """Return a note if `there` has another georeference than the mission."""
     own = mission.georeference
     if own is None or own == there.georeference:
         return ()

@@ -1,4 +1,4 @@
-"""Writes QGroundControl's .plan: the items an autopilot would be sent, with home at the site's origin."""
+"""QGroundControl's .plan: the items for an autopilot, with home at the site's origin."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ FILE_FRAMES = {
     MavFrame.GLOBAL_INT: MavFrame.GLOBAL,
     MavFrame.GLOBAL_RELATIVE_ALT_INT: MavFrame.GLOBAL_RELATIVE_ALT,
 }
-"""In files places are degrees, so their frames are those without INT."""
+"""Files give positions in degrees, so their frames are those without INT."""
 
 
 def write(mission: Mission, supplements: Supplements) -> bytes:
-    """The plan; `stopgo` holds what items cannot: the stops' ids and the bearing of the site's +y axis."""
+    """Return the plan; `stopgo` holds what items cannot: stop ids and the bearing of the site's +y axis."""
     items = items_of(mission, supplements)
     origin, speed = items.origin, mission.robot.speed
     own = {"heading_deg": origin.heading_deg, "stops": _ids(items)}
@@ -83,12 +83,12 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
-    """What the autopilot does not do by itself."""
+    """Return the notes on what the autopilot does not do by itself."""
     return items_of(mission, supplements).notes
 
 
 def _simple(item: Item, number: int) -> dict[str, Any]:
-    """An item as QGroundControl writes it; null is NaN, "not said"."""
+    """Return an item in QGroundControl's form; null is NaN, "not given"."""
     numbers = [*item.params, *place(item), item.z]
     return {
         "type": "SimpleItem",
@@ -100,7 +100,7 @@ def _simple(item: Item, number: int) -> dict[str, Any]:
 
 
 def place(item: Item) -> tuple[float, float]:
-    """Latitude and longitude in degrees, or the two plain numbers of a command without a place."""
+    """Return latitude and longitude in degrees, or the two plain numbers of a command without a position."""
     if item.command in PLACED:
         return item.x / STEPS_PER_DEGREE, item.y / STEPS_PER_DEGREE
     return float(item.x), float(item.y)

@@ -1,4 +1,4 @@
-"""Writes QGC WPL 110, the table that Mission Planner, MAVProxy and QGroundControl read; row 0 is home."""
+"""QGC WPL 110, the table that Mission Planner, MAVProxy and QGroundControl read; row 0 is home."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
-    """What the autopilot does not do by itself, and what the table has no column for."""
+    """Return the notes on the autopilot's limits, and on values that the table has no column for."""
     heading = "the bearing of the site's +y axis and the stops' ids are not in this table"
     return (heading, *items_of(mission, supplements).notes)
 

@@ -1,7 +1,7 @@
-"""Writes the stops as a table, one row each, that a spreadsheet opens alike in every country.
+"""Table of stops, one row each, that opens the same in spreadsheets of every country.
 
-RFC 4180: commas, full stops in numbers, CRLF, UTF-8. Text that a spreadsheet would take for a formula gets
-an apostrophe in front, which `stopgo.mission.files.imports.stops_csv` takes off again.
+RFC 4180: commas, full stops in numbers, CRLF, UTF-8. Text that a spreadsheet would read as a formula gets
+an apostrophe in front, which `stopgo.mission.files.imports.stops_csv` removes again.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from stopgo.mission.frames.geodesy import bearing_deg, to_geodetic
 from stopgo.mission.geometry import frozen, polyline_length
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "'")
-"""What spreadsheets take for the beginning of a formula, and the apostrophe that guards against it."""
+"""First characters of a formula in a spreadsheet, and the apostrophe that prevents it."""
 PLACES = 6
 """Decimals of metres, as in mission.json."""
 DEGREES = 9
@@ -36,18 +36,18 @@ def write(mission: Mission, supplements: Supplements) -> bytes:
 
 
 def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
-    """The places in the table's columns x_m and y_m."""
+    """Return the positions in the table's columns x_m and y_m."""
     rows = csv.DictReader(io.StringIO(data.decode(), newline=""))
     return [(float(row["x_m"]), float(row["y_m"])) for row in rows]
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
-    """The table has no row for the way back."""
+    """Return the note that the table has no row for the return leg."""
     return () if mission.return_ is None else ("the way back to the start is not in a table of stops",)
 
 
 def guarded(text: str) -> str:
-    """Text that no spreadsheet takes for a formula."""
+    """Return text that no spreadsheet reads as a formula."""
     return f"'{text}" if text.startswith(FORMULA) else text
 
 

@@ -1,13 +1,13 @@
-"""Draws stops, route and coverage on layers of their own, over the floor's drawing or alone, as DXF.
+"""DXF layers with stops, route and coverage, over the floor's drawing or alone.
 
 | layer | what |
 |---|---|
 | SCAN_STOPS | a block SCAN_STOP per stop: number, id, an arrow where it faces, further attributes hidden |
-| SCAN_ROUTE | a polyline per leg, the way back dashed, a mark at the start |
+| SCAN_ROUTE | a polyline per leg, the return leg dashed, a mark at the start |
 | SCAN_COVERAGE | stretches of boundary that the stops see |
-| SCAN_NOT_SEEN | the other stretches of the elements that are to be scanned |
+| SCAN_NOT_SEEN | the other stretches of the targets |
 
-What the drawing held before stays as it was.
+The rest of the drawing stays unchanged.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MODEL = "IFC"
 """Names the data of a line that hold the GlobalId of its element."""
 
 BROKEN_DRAWING = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
-"""What ezdxf raises where a drawing it read does not hold what it trusts in."""
+"""Errors of ezdxf for a drawing that is damaged inside."""
 
 DISC = 0.3
 """Radius of a stop's disc in metres."""
@@ -61,12 +61,12 @@ def write(mission: Mission, supplements: Supplements) -> bytes:
 
 
 def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
-    """Where the blocks on SCAN_STOPS stand, in metres.
+    """Return the positions of the blocks on SCAN_STOPS, in metres.
 
     Raises
     ------
     StopgoError
-        When an audit finds more amiss than in the floor's drawing alone.
+        When an audit finds more faults than in the floor's drawing alone.
     """
     drawing = _decoded(data)
     bare, size = _paper(supplements)
@@ -79,7 +79,7 @@ def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[P
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
-    """What the layers do without."""
+    """Return the notes on what the layers lack."""
     found = []
     if supplements.floor is None:
         found.append("no --floor: the layers stand alone, in metres, without the drawing")
@@ -153,7 +153,7 @@ def _dashes(drawing: Drawing, size: float) -> dict[str, object]:
 
 
 def _start_block(drawing: Drawing) -> str:
-    """A ring around the first place with an arrowhead where the robot faces, in metres."""
+    """Draw a ring around the first position with an arrowhead in the robot's heading, in metres."""
     name = _free("SCAN_START", drawing.blocks)
     block = drawing.blocks.new(name)
     block.add_circle((0, 0), 1.5 * DISC, dxfattribs=_BLOCK)
@@ -172,7 +172,7 @@ def _draw_stops(drawing: Drawing, mission: Mission, size: float) -> None:
 
 
 def _stop_block(drawing: Drawing) -> str:
-    """A disc with an arrow along +x, in metres; on layer 0 with the colour of the block's place."""
+    """Draw a disc with an arrow along +x, in metres; on layer 0, with the colour of the block's layer."""
     name = _free("SCAN_STOP", drawing.blocks)
     block = drawing.blocks.new(name)
     block.add_circle((0, 0), DISC, dxfattribs=_BLOCK)
@@ -199,9 +199,9 @@ _PROMPTS = {
 
 
 def _label(insert: Insert, number: int, stop: Stop, size: float) -> None:
-    """Attributes upright, whichever way the block is turned: the number beside the disc, the id below it.
+    """Add upright attributes, whatever the block's rotation: the number next to the disc, the id below it.
 
-    Inside the disc the route would run through the number.
+    Inside the disc the route would cross the number.
     """
     from ezdxf.enums import TextEntityAlignment as Align
 
@@ -227,7 +227,7 @@ def _free_side(heading: float) -> int:
 
 
 def _arrowhead(at: float) -> list[Point]:
-    """A triangle along +x whose base stands at x = `at`; a SOLID repeats its last corner."""
+    """Draw a triangle along +x with its base at x = `at`; a SOLID repeats its last corner."""
     tip = (at + 0.15, 0.0)
     return [(at, 0.09), (at, -0.09), tip, tip]
 

@@ -1,4 +1,4 @@
-"""Reads coverage.json as stretches of boundary: those that the mission's stops see, and the rest."""
+"""Stretches of boundary from coverage.json: those that the mission's stops see, and the rest."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ Fraction = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Stretches:
-    """Straight pieces of the targets' boundary (n, 2, 2) in the site's metres."""
+    """Straight segments of the targets' boundary (n, 2, 2) in the site's metres."""
 
     seen: FloatArray
     unseen: FloatArray
     seen_of: tuple[str, ...] = ()
-    """GlobalId of the element that each piece of `seen` is of, or an empty text; none without a model."""
+    """GlobalId of the element of each segment of `seen`, or an empty text; empty without a model."""
     unseen_of: tuple[str, ...] = ()
 
 
 def read_stretches(path: Path, mission: Mission) -> Stretches:
-    """The stretches in the coverage.json of `mission`.
+    """Return the stretches in the coverage.json of `mission`.
 
     Raises
     ------
@@ -52,13 +52,13 @@ def _check_segments(segments: Sequence[CoverageSegment], path: Path) -> None:
         near = all(abs(value) <= FAR for value in (*segment.a, *segment.b))
         if not near or not all(0 <= first <= last <= 1 for first, last in segment.seen):
             raise InputError(
-                f"{path}: a segment from {segment.a} to {segment.b} makes no sense; give the file that was "
+                f"{path}: a segment from {segment.a} to {segment.b} is invalid; give the file that was "
                 "written with the mission"
             )
 
 
 def _between(seen: tuple[Fraction, ...]) -> Iterator[Fraction]:
-    """What of 0 to 1 lies in none of the fractions, which are in order."""
+    """Yield the parts of 0 to 1 outside the fractions, which are in order."""
     begin = 0.0
     for first, last in seen:
         if first > begin:

@@ -1,7 +1,7 @@
-"""Writes the mission as an order of VDA 5050, version 3.0 or 2.1: what a fleet control sends to a vehicle.
+"""Order of VDA 5050, version 3.0 or 2.1, from a mission: the message of a fleet control to a vehicle.
 
-Every pose of the way is a node and every straight piece between two an edge, so that a vehicle drives the
-mission's legs and no others. A scan is an action at the stop's node.
+Every pose of the route is a node, and every straight segment between two is an edge, so that a vehicle drives
+exactly the mission's legs. A scan is an action at the stop's node.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from stopgo.mission.document import Mission, Point, Stop
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.nav2_yaml import unmapped
 from stopgo.mission.files.exports.waypoints import Waypoint, frame_name, mapped, way
-from stopgo.mission.frames.frame_transform import SAME, turned_back
+from stopgo.mission.frames.frame_transform import SAME, from_map_point
 
 
 @dataclass(frozen=True)
 class Edition:
-    """What an order says otherwise in one version of VDA 5050 than in another."""
+    """Differences between two versions of VDA 5050 in an order."""
 
     version: str
     told: str
-    """How keys of texts for people end: `nodeDescriptor`."""
+    """Ending of keys of texts for people: `nodeDescriptor`."""
     max_speed: str
     edge_names_its_nodes: bool
     deviation: Callable[[float], object]
     """`allowedDeviationXY` for a tolerance in metres."""
     retriable: bool
-    """Whether an action can say that it may be tried again."""
+    """True if an action can be marked as repeatable."""
 
 
 def _ellipse(tolerance: float) -> object:
@@ -51,7 +51,7 @@ UNNAMED = "unknown"
 
 
 def write(mission: Mission, supplements: Supplements, *, edition: Edition = V3_0) -> bytes:
-    """The order; fleet control sets headerId, timestamp, manufacturer and serialNumber when it sends it."""
+    """Return the order; fleet control sets headerId, timestamp, manufacturer and serialNumber on sending."""
     poses = way(mapped(mission))
     nodes = [
         _node(waypoint, name, 2 * number, mission, edition)
@@ -69,15 +69,15 @@ def write(mission: Mission, supplements: Supplements, *, edition: Edition = V3_0
 
 
 def read_back(data: bytes, mission: Mission, supplements: Supplements) -> list[Point]:
-    """The places of the nodes that have an action, back on the site."""
+    """Return the positions of the nodes that have an action, back in the site's frame."""
     nodes = msgspec.json.decode(data)["nodes"]
     places = [node["nodePosition"] for node in nodes if node["actions"]]
     to_map = mission.frame.to_map or SAME
-    return [turned_back(to_map, (place["x"], place["y"])) for place in places]
+    return [from_map_point(to_map, (place["x"], place["y"])) for place in places]
 
 
 def notes(mission: Mission, supplements: Supplements) -> tuple[str, ...]:
-    """What the sender has to fill in."""
+    """Return the note on keys that the sender has to fill in."""
     header = "manufacturer and serialNumber are 'unknown': fleet control names the vehicle when it sends"
     return (header, *unmapped(mission))
 
@@ -111,7 +111,7 @@ def _node(waypoint: Waypoint, name: str, sequence: int, mission: Mission, editio
 
 
 def _arrival(waypoint: Waypoint, stop: Stop, mission: Mission, edition: Edition) -> dict[str, object]:
-    """How exactly a vehicle must stand at a stop; one that scans all round may face anywhere."""
+    """Return the tolerances of a vehicle at a stop; any heading for a scanner that sees all round."""
     arrival = {"theta": waypoint.heading, "allowedDeviationXY": edition.deviation(stop.tolerance_m)}
     if mission.scanner.fov_deg == 360.0:
         arrival["allowedDeviationTheta"] = math.pi

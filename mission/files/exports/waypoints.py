@@ -1,4 +1,4 @@
-"""The way of a mission as poses one after another: the start, corners, stops, and the way back."""
+"""Route of a mission as successive poses: the start, corners, stops, and the return leg."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from itertools import pairwise
 import msgspec
 
 from stopgo.mission.document import Frame, Mission, Point, Stop
-from stopgo.mission.frames.frame_transform import turned
+from stopgo.mission.frames.frame_transform import to_map_point
 from stopgo.mission.frames.transform import Transform
 
 
 @dataclass(frozen=True)
 class Waypoint:
-    """A pose on the way: a stop, or a place that is passed (`stop` is None)."""
+    """A pose on the route: a stop, or a corner (`stop` is None)."""
 
     x: float
     y: float
@@ -32,7 +32,7 @@ class Waypoint:
 
 
 def way(mission: Mission) -> tuple[Waypoint, ...]:
-    """Every pose of the way in the order of driving; the start is left out where it is the first stop."""
+    """Return the poses of the route in the order of driving; without the start if it is the first stop."""
     poses: list[Waypoint] = []
     for number, stop in enumerate(mission.stops):
         leg = _distinct(stop.approach)
@@ -47,7 +47,7 @@ def way(mission: Mission) -> tuple[Waypoint, ...]:
 
 
 def _distinct(leg: Sequence[Point]) -> list[Point]:
-    """A polyline without points that stand on the one before."""
+    """Return a polyline without repeated points."""
     return [point for number, point in enumerate(leg) if number == 0 or point != leg[number - 1]]
 
 
@@ -63,11 +63,11 @@ def frame_name(mission: Mission) -> str:
 
 
 def mapped(mission: Mission) -> Mission:
-    """The mission with all its places on the robot's map (`frame.to_map` applied)."""
+    """Return the mission with all its positions on the robot's map (`frame.to_map` applied)."""
     to_map = mission.frame.to_map
     if to_map is None:
         return mission
-    x, y = turned(to_map, (mission.start.x, mission.start.y))
+    x, y = to_map_point(to_map, (mission.start.x, mission.start.y))
     start = msgspec.structs.replace(
         mission.start, x=x, y=y, heading=_turned_heading(to_map, mission.start.heading)
     )
@@ -81,7 +81,7 @@ def mapped(mission: Mission) -> Mission:
 
 
 def _turned_stop(to_map: Transform, stop: Stop) -> Stop:
-    x, y = turned(to_map, (stop.x, stop.y))
+    x, y = to_map_point(to_map, (stop.x, stop.y))
     heading = _turned_heading(to_map, stop.heading)
     return msgspec.structs.replace(
         stop, x=x, y=y, heading=heading, approach=_turned_leg(to_map, stop.approach)
@@ -89,7 +89,7 @@ def _turned_stop(to_map: Transform, stop: Stop) -> Stop:
 
 
 def _turned_leg(to_map: Transform, leg: Sequence[Point]) -> tuple[Point, ...]:
-    return tuple(turned(to_map, point) for point in leg)
+    return tuple(to_map_point(to_map, point) for point in leg)
 
 
 def _turned_heading(to_map: Transform, heading: float) -> float:

@@ -1,4 +1,4 @@
-"""Reads missions from the formats of others: one module per format, one line in `READERS`."""
+"""Import of missions from other programs' formats: one module per format, one line in `READERS`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ READERS: dict[str, MissionReader] = {
     "waypoints": qgc_waypoints.read,
     "csv": stops_csv.read,
 }
-"""Every format that is read, by its name, which `--from` takes and which is also its suffix."""
+"""Every readable format by its name, which `--from` takes and which is also its suffix."""
 
 LARGEST = 64_000_000
 """Bytes; no mission is larger."""
@@ -27,12 +27,12 @@ LARGEST = 64_000_000
 def read_mission(
     path: Path, settings: Settings, *, kind: str | None = None, autopilot: str | None = None
 ) -> tuple[Mission, ImportedRoute]:
-    """The mission in a file of a format of `READERS`, and what was read.
+    """Return the mission in a file of a format of `READERS`, and the track that was read.
 
     Raises
     ------
     InputError
-        Naming the file, what is wrong in it or means nothing to a mission, and the way out.
+        Naming the file, the problem in it, and the action.
     """
     reader = READERS[_kind(path, kind)]
     data = _bytes_of(path)
@@ -56,7 +56,7 @@ def _kind(path: Path, given: str | None) -> str:
 def _bytes_of(path: Path) -> bytes:
     try:
         if path.stat().st_size > LARGEST:
-            raise InputError(f"{path}: is larger than {LARGEST // 1_000_000} MB, which no mission is")
+            raise InputError(f"{path}: is larger than {LARGEST // 1_000_000} MB, too large for a mission")
         return path.read_bytes()
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error

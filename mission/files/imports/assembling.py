@@ -1,4 +1,4 @@
-"""Track -> mission: what the file does not say comes from the settings."""
+"""Track -> mission: values that the file does not contain come from the parameters."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from stopgo.mission.settings import Settings
 
 
 def mission_of(track: ImportedRoute, settings: Settings, *, name: str, file: str, digest: str) -> Mission:
-    """The mission of a track; legs are straight between the places that the file names.
+    """Return the mission of a track; legs are straight between the positions in the file.
 
     Parameters
     ----------
@@ -69,12 +69,12 @@ def mission_of(track: ImportedRoute, settings: Settings, *, name: str, file: str
         )
     )
     for problem in problems_of(mission):
-        raise InputError(f"{file}: the mission in it makes no sense: {problem}; correct the file")
+        raise InputError(f"{file}: the mission in it is implausible: {problem}; correct the file")
     return mission
 
 
 def _legs(track: ImportedRoute, settings: Settings) -> Iterator[list[Point]]:
-    """The approach of each visit; the first begins at the start, where one is known."""
+    """Return the approach of each visit; the first begins at the start, if one is known."""
     start = settings.start[:2] if settings.start is not None else track.start
     before = [] if start is None else [start]
     for visit in track.visits:
@@ -84,7 +84,7 @@ def _legs(track: ImportedRoute, settings: Settings) -> Iterator[list[Point]]:
 
 
 def _distinct(leg: Sequence[Point]) -> list[Point]:
-    """Rounded to DECIMALS, without points that stand on the one before."""
+    """Round to DECIMALS, and leave out repeated points."""
     points = [(rounded(x), rounded(y)) for x, y in leg]
     return [point for number, point in enumerate(points) if number == 0 or point != points[number - 1]]
 
@@ -99,7 +99,7 @@ def _start(track: ImportedRoute, settings: Settings, leg: Sequence[Point], file:
 
 
 def _direction(leg: Sequence[Point], otherwise: float) -> float:
-    """The direction of a polyline's last piece."""
+    """Return the direction of a polyline's last segment."""
     if len(leg) < 2:
         return otherwise
     (x0, y0), (x1, y1) = leg[-2:]
@@ -109,7 +109,7 @@ def _direction(leg: Sequence[Point], otherwise: float) -> float:
 def _stops(
     visits: Sequence[Visit], legs: Sequence[list[Point]], heading: float, settings: Settings
 ) -> Iterator[Stop]:
-    """A stop whose heading is not known faces as the robot arrives."""
+    """Return the heading of a stop; an unknown one is the direction of arrival."""
     width = max(2, len(str(len(visits))))
     for number, (visit, leg) in enumerate(zip(visits, legs, strict=True), 1):
         heading = _direction(leg, heading) if visit.heading is None else visit.heading

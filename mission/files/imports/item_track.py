@@ -1,7 +1,7 @@
-"""Mission items of a file -> track: waypoints where something is waited for or triggered are stops.
+"""Mission items of a file -> track: waypoints with a wait or a trigger are stops.
 
-Only what a robot of stopgo would do in the same way is read; every other command is refused by its number,
-for a mission that leaves out half of a plan is worse than none.
+Only items that a stopgo robot executes in the same way are read. Every other command is refused by its
+number, because half of a plan is worse than none.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LONGEST = 1e6
 BRAKING = 1.0
 """Seconds of hold by which ArduPilot is made to stop at a corner."""
 FARTHEST = 10_000.0
-"""Metres from the origin beyond which a place is not of this site."""
+"""Metres from the origin beyond which a position does not belong to this site."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Listed:
     command: int
     frame: int
     params: tuple[float, ...]
-    """param1 to param7; degrees where the command has a place, NaN where the file says nothing."""
+    """param1 to param7; degrees if the command has a position, NaN if the file contains nothing."""
     id: str | None = None
     """Id of the stop, where the file names it."""
 
@@ -78,14 +78,14 @@ def track_of(items: Sequence[Listed], *, origin: SiteOrigin, autopilot: str, sou
 
 
 def autopilot_for(given: str | None, firmware: int | None = None) -> str:
-    """By whose rule to read degrees: as given, else of the plan's MAV_AUTOPILOT, else ArduPilot's."""
+    """Return the autopilot whose rule the degrees follow: as given, else the plan's, else ArduPilot's."""
     if given is not None:
         return autopilot_named(given).name
     return "ardupilot" if firmware is None else {3: "ardupilot", 12: "px4"}.get(firmware, "generic")
 
 
 def assumptions(given: ImportOptions, *, heading: bool, firmware: bool) -> tuple[str, ...]:
-    """What was taken for granted, a line each: `heading`, `firmware` tell what the file itself says."""
+    """Return the assumptions, a line each; `heading` and `firmware` are those of the file itself."""
     lines = []
     if given.origin is None and not heading:
         lines.append("no --origin: the site's origin is the file's home, its +y axis north")
@@ -116,7 +116,7 @@ def _place(item: Listed) -> str:
     if item.frame not in GLOBAL_FRAMES:
         return f"is in frame {item.frame}, which is no latitude and longitude"
     if not (abs(lat) <= 90 and abs(lon) <= 180) or lat == lon == 0:
-        return f"is at latitude {lat:g}, longitude {lon:g}, which is no place"
+        return f"is at latitude {lat:g}, longitude {lon:g}, which is no position"
     return _seconds(item)
 
 
@@ -156,11 +156,11 @@ _CHECKS: dict[int, Callable[[Listed], str]] = {
     Command.IMAGE_START_CAPTURE: _capture,
     Command.DO_CHANGE_SPEED: _speed,
 }
-"""What is wrong with an item of each command that is read; empty if nothing is."""
+"""Checks of an item by its command; each returns the problem, or an empty text."""
 
 
 def _check_pauses(placed: Sequence[Placed], items: Sequence[Listed]) -> None:
-    """At a corner a vehicle may hold to brake, as ArduPilot must; a robot of stopgo waits only to scan."""
+    """Refuse a wait at a corner, except a braking hold, as ArduPilot needs."""
     for one, item in zip(placed, items, strict=True):
         if one.role in ("corner", "return") and item.params[0] > BRAKING:
             raise InputError(
@@ -170,7 +170,7 @@ def _check_pauses(placed: Sequence[Placed], items: Sequence[Listed]) -> None:
 
 
 def _item(item: Listed) -> Item:
-    """As it would go over the wire."""
+    """Return the item as it would be sent."""
     p1, p2, p3, p4, x, y, z = item.params
     steps = STEPS_PER_DEGREE if item.command in PLACES else 1
     whole = [round(value * steps) if abs(value) < 2**31 else 0 for value in (x, y)]  # NaN is not below it
@@ -213,7 +213,7 @@ def _done_at(visit: RecognisedStop, items: Sequence[Listed]) -> list[Listed]:
 
 
 def _is_ours(item: Listed) -> bool:
-    """The message by which stopgo has a script scan: it carries duration and timeout."""
+    """Return True for the message that makes a script scan: it carries duration and timeout."""
     return item.command == Command.DO_SEND_SCRIPT_MESSAGE and item.params[0] == SCAN_MESSAGE
 
 

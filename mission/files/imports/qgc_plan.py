@@ -1,4 +1,4 @@
-"""Reads QGroundControl's .plan: its simple items, with home as the site's origin unless another is given."""
+"""Reader of QGroundControl's .plan: its simple items, with home as the site's origin unless given."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _home(mission: dict[str, Any], ours: object, source: str) -> SiteOrigin:
     lat, lon, alt = map(float, home)
     if not (abs(lat) <= 90 and abs(lon) <= 180) or lat == lon == 0:
         raise InputError(
-            f"{source}: home is at latitude {lat:g}, longitude {lon:g}, which is no place; "
+            f"{source}: home is at latitude {lat:g}, longitude {lon:g}, which is no position; "
             "give --origin LAT,LON,ALT,HEADING"
         )
     heading = ours.get("heading_deg", 0.0) if isinstance(ours, dict) else 0.0
@@ -119,7 +119,7 @@ def _listed(value: object, number: int, source: str) -> Listed:
 
 
 def _named(item: Listed, ours: object) -> Listed:
-    """The item with the id that stopgo wrote beside the items, by their places."""
+    """Return the item with the id that stopgo wrote for its index."""
     stops = ours.get("stops") if isinstance(ours, dict) else None
     name = stops.get(str(item.number)) if isinstance(stops, dict) else None
     return Listed(item.number, item.command, item.frame, item.params, name if isinstance(name, str) else None)

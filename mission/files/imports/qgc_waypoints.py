@@ -1,4 +1,4 @@
-"""Reads QGC WPL 110, the table of Mission Planner, MAVProxy and QGroundControl: row 0 is home."""
+"""Reader of QGC WPL 110, the table of Mission Planner, MAVProxy and QGroundControl: row 0 is home."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _home(row: Listed, source: str) -> SiteOrigin:
     lat, lon, alt = row.params[4:7]
     if not (abs(lat) <= 90 and abs(lon) <= 180 and math.isfinite(alt)) or lat == lon == 0:
         raise InputError(
-            f"{source}: home (row 0) is at latitude {lat:g}, longitude {lon:g}, which is no place; "
+            f"{source}: home (row 0) is at latitude {lat:g}, longitude {lon:g}, which is no position; "
             "give --origin LAT,LON,ALT,HEADING"
         )
     return SiteOrigin(lat=lat, lon=lon, alt=alt, heading_deg=0.0)

@@ -1,4 +1,4 @@
-"""Reads a table of stops: what `stopgo export` writes, or a surveyor's own with some of its columns.
+"""Reads a table of stops: the output of `stopgo export`, or a surveyor's own with some of its columns.
 
 Numbers have full stops. A spreadsheet that writes decimal commas separates cells by semicolons: there commas
 are decimal, unless full stops are there too.
@@ -24,7 +24,7 @@ from stopgo.mission.frames.geodesy import Geodetic, from_geodetic, heading_of
 METRES = ("x_m", "y_m")
 DEGREES = ("lat_deg", "lon_deg")
 TOLD = ("number", "approach_m")
-"""Columns that only tell: the order, and a length that follows from the rest."""
+"""Informative columns: the order, and a length that follows from the rest."""
 KNOWN = (
     *METRES, *DEGREES, *TOLD, "id", "heading_deg", "bearing_deg", "doorway", "tolerance_m", "settle_s",
     "scan_profile", "scan_s", "scan_timeout_s", "on_failure", "retries", "approach_wkt",
@@ -37,13 +37,13 @@ _WKT = re.compile(r"(?:LINESTRING|POINT)\s*\(([^()]*)\)", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class _Row:
-    """A row by its column names, and where it stands."""
+    """A row by its column names, and its line in the file."""
 
     cells: dict[str, str]
     line: int
     source: str
     comma: bool
-    """Whether a comma is decimal."""
+    """True if a comma is decimal."""
 
     def refused(self, column: str, right: str) -> InputError:
         return InputError(
@@ -132,7 +132,7 @@ def _names(cells: Sequence[str], source: str) -> list[str]:
         if name not in KNOWN:
             raise InputError(f"{source}: column {name[:40]!r} is not known; known: {', '.join(KNOWN)}")
         if names.count(name) > 1:
-            raise InputError(f"{source}: column {name} stands there {names.count(name)} times; keep one")
+            raise InputError(f"{source}: column {name} occurs {names.count(name)} times; keep one")
     return names
 
 
@@ -149,14 +149,14 @@ def _in_order(rows: list[_Row]) -> list[_Row]:
 
 
 def _placing(columns: dict[str, str], source: str, given: ImportOptions) -> Callable[[_Row], Point]:
-    """How a row says where its stop is: metres if the table has them, else degrees."""
+    """Return the form of positions: metres if the table has them, else degrees."""
     if all(name in columns for name in METRES):
         return lambda row: _pair(row, METRES)
     if not all(name in columns for name in DEGREES):
         raise InputError(f"{source}: has neither columns x_m, y_m nor lat_deg, lon_deg; name the columns so")
     origin = given.origin
     if origin is None:
-        raise InputError(f"{source}: places are in degrees; give --origin LAT,LON,ALT,HEADING of the site")
+        raise InputError(f"{source}: positions are in degrees; give --origin LAT,LON,ALT,HEADING of the site")
 
     def place(row: _Row) -> Point:
         lat, lon = _pair(row, DEGREES)

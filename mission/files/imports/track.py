@@ -1,4 +1,4 @@
-"""What an imported file says: which places are visited in which order, and what is known of each."""
+"""Contents of an imported file: the visited positions in order, and the known values of each."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from stopgo.mission.frames.transform import SiteOrigin
 
 @dataclass(frozen=True)
 class Visit:
-    """A place to scan from, in the site's metres; `None` is what the file does not say."""
+    """A scan position, in the site's metres; `None` for values that the file does not contain."""
 
     xy: Point
     via: tuple[Point, ...] = ()
-    """Places driven through on the way to it, in order."""
+    """Points driven through on the leg to it, in order."""
     id: str | None = None
     heading: float | None = None
     """Radians counter-clockwise from +x."""
@@ -35,23 +35,23 @@ class ImportedRoute:
 
     visits: tuple[Visit, ...]
     back: tuple[Point, ...] = ()
-    """Places driven through after the last visit."""
+    """Points driven through after the last visit."""
     start: Point | None = None
     origin: SiteOrigin | None = None
     speed: float | None = None
     """Metres per second."""
     notes: tuple[str, ...] = ()
-    """What of the file was not taken over, a line each."""
+    """Parts of the file that were not imported, a line each."""
 
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """What the person says that the file may not."""
+    """Values given by the user, which the file may not contain."""
 
     origin: SiteOrigin | None = None
     autopilot: str | None = None
-    """By whose rule degrees are metres, one of `stopgo.mission.mavlink.autopilots.AUTOPILOTS`."""
+    """Autopilot whose rule is used for degrees, one of `stopgo.mission.mavlink.autopilots.AUTOPILOTS`."""
 
 
 MissionReader = Callable[[bytes, str, ImportOptions], ImportedRoute]
-"""`(data, source, given)`; `source` stands in error messages."""
+"""`(data, source, given)`; `source` is used in error messages."""

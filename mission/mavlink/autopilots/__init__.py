@@ -1,4 +1,4 @@
-"""The kinds of autopilot: one module holds all that is known of one, `kind` says what there is to know."""
+"""Kinds of autopilot: one module for each, and `kind` for their common fields."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ AUTOPILOTS: dict[str, Autopilot] = {kind.name: kind for kind in (ARDUPILOT, PX4,
 
 
 def autopilot_named(name: str) -> Autopilot:
-    """One of `AUTOPILOTS`.
+    """Return one of `AUTOPILOTS`.
 
     Raises
     ------
@@ -20,10 +20,10 @@ def autopilot_named(name: str) -> Autopilot:
         If there is none of that name.
     """
     if name not in AUTOPILOTS:
-        raise InputError(f"autopilot {name!r} is not known; it is one of {', '.join(AUTOPILOTS)}")
+        raise InputError(f"autopilot {name!r}: unknown; choose one of {', '.join(AUTOPILOTS)}")
     return AUTOPILOTS[name]
 
 
 def autopilot_of(firmware: int) -> Autopilot:
-    """The kind that a heartbeat's MAV_AUTOPILOT tells; `generic` for one that is not known."""
+    """Return the kind of a heartbeat's MAV_AUTOPILOT; `generic` for an unknown one."""
     return next((kind for kind in AUTOPILOTS.values() if kind.firmware == firmware), GENERIC)

@@ -41,11 +41,11 @@ from stopgo.mission.mavlink.items import Command, Item, MavFrame
 CUSTOM, MANUAL = ModeFlag.CUSTOM_MODE_ENABLED, ModeFlag.MANUAL_INPUT_ENABLED
 STABILIZE, GUIDED, AUTO = ModeFlag.STABILIZE_ENABLED, ModeFlag.GUIDED_ENABLED, ModeFlag.AUTO_ENABLED
 AUTO_OF_COPTERS = 3
-"""As of submarines; planes and rovers have another."""
+"""The number of copters and submarines; planes and rovers have another."""
 
 
 def keeps(item: Item) -> Item:
-    """What it stores of an item; an unknown command's numbers are taken to stay."""
+    """Return the item as ArduPilot stores it; an unknown command's numbers are assumed to stay."""
     item = as_sent(item)
     one, two, three, four = (
         field(param) for field, param in zip(FIELDS.get(item.command, ALL), item.params, strict=True)
@@ -108,7 +108,7 @@ DRIVING = Driving(
     reposition_mode="guided",
 )  # fmt: skip
 
-HABITS = ProtocolBehaviour(
+BEHAVIOUR = ProtocolBehaviour(
     asks_int=False, ask_again_s=1.0, give_up_s=8.0, tells_giving_up=True, atomic=False, strays="tell",
     last_again=MissionResult.ERROR, forgives_late=False, other_station=MissionResult.DENIED,
     busy_in_words=False, begins_again=True, cancels=False, clears_in_auto=False, counts_again=True,
@@ -202,7 +202,7 @@ GROUND_STEERING, THROTTLE_LEFT, THROTTLE_RIGHT = 26, 73, 74
 """Functions of servo outputs."""
 
 
-def like_a_car(values: Mapping[str, float]) -> str:
+def car_steering(values: Mapping[str, float]) -> str:
     """Source (AP_MotorsUGV::have_skid_steering): with an output for each side it turns on the spot."""
     found = {int(value): name for name, value in values.items() if name in SERVOS}
     if GROUND_STEERING not in found or {THROTTLE_LEFT, THROTTLE_RIGHT} <= found.keys():
@@ -226,7 +226,7 @@ ARDUPILOT = Autopilot(
     keep=keeps, brake_hold_s=1, longest_hold_s=32_767, max_delay_s=4_294_967.0, keeps_arrival=False,
     radius_parameter="WP_RADIUS",
     reached="within its parameter WP_RADIUS, or once past it", turns=False, gives_items="any order",
-    modes=MODES, in_auto=in_auto, driving=DRIVING, drivable=True, habits=HABITS,
-    steering=Steering(SERVOS, like_a_car),
+    modes=MODES, in_auto=in_auto, driving=DRIVING, drivable=True, behaviour=BEHAVIOUR,
+    steering=Steering(SERVOS, car_steering),
     parameters=PARAMETERS,
 )  # fmt: skip

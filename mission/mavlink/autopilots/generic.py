@@ -1,6 +1,6 @@
-"""An autopilot that keeps to the letter of the specification: everything is kept, degrees are WGS84.
+"""An autopilot that follows the specification exactly: it keeps all fields, degrees are WGS84.
 
-It has PX4's mode numbers, for the specification has none.
+It has PX4's mode numbers, because the specification has none.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ UINT16_MAX = 65_535
 
 
 def in_auto(heartbeat: Heartbeat) -> bool:
-    """By its flags; others that number their modes as PX4 does have them set on hold too."""
+    """Return True by its flags; others that number their modes as PX4 does have them set on hold too."""
     holds = px4.MODES.of(heartbeat.custom_mode) == px4.MODES.hold
     return not holds and bool(heartbeat.base_mode & ModeFlag.AUTO_ENABLED)
 
 
-HABITS = ProtocolBehaviour(
+BEHAVIOUR = ProtocolBehaviour(
     asks_int=True, ask_again_s=0.25, give_up_s=1.5, tells_giving_up=True, atomic=True, strays="ask",
     last_again=MissionResult.ACCEPTED, forgives_late=True, other_station=MissionResult.DENIED,
     busy_in_words=False, begins_again=True, cancels=True, clears_in_auto=True, counts_again=False,
@@ -54,5 +54,5 @@ GENERIC = Autopilot(
         streams=False, gives_up_s=3.0, gives_up_parameter="", turns=True, courses="heading",
         reposition_mode="hold",
     ),
-    drivable=False, habits=HABITS,
+    drivable=False, behaviour=BEHAVIOUR,
 )  # fmt: skip

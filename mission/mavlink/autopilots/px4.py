@@ -30,7 +30,7 @@ STABILIZE, GUIDED, AUTO = ModeFlag.STABILIZE_ENABLED, ModeFlag.GUIDED_ENABLED, M
 
 
 def keeps(item: Item) -> Item:
-    """What it stores of an item (source): all of one without a place, and hold, radius, yaw of one with."""
+    """Return the item as PX4 stores it (source): all without a position; hold, radius, yaw with one."""
     item = as_sent(item)
     if item.frame == MavFrame.MISSION or item.command != Command.NAV_WAYPOINT:
         return item
@@ -75,7 +75,7 @@ DRIVING = Driving(
     reposition_mode="hold",
 )  # fmt: skip
 
-HABITS = ProtocolBehaviour(
+BEHAVIOUR = ProtocolBehaviour(
     asks_int=True, ask_again_s=0.25, give_up_s=5.0, tells_giving_up=False, atomic=True, strays="ignore",
     last_again=MissionResult.ACCEPTED, forgives_late=False,
     other_station=MissionResult.ERROR,
@@ -134,7 +134,7 @@ PARAMETERS = (
 ACKERMANN = 5
 
 
-def like_a_car(values: Mapping[str, float]) -> str:
+def car_steering(values: Mapping[str, float]) -> str:
     """Source (rc.rover_ackermann_defaults)."""
     return f"CA_AIRFRAME is {ACKERMANN}, Ackermann" if values.get("CA_AIRFRAME") == ACKERMANN else ""
 
@@ -152,7 +152,7 @@ PX4 = Autopilot(
     keep=keeps, brake_hold_s=0, longest_hold_s=32_767, max_delay_s=4_294_967.0, keeps_arrival=True,
     radius_parameter="NAV_ACC_RAD",
     reached="within its parameter NAV_ACC_RAD, 10 m unless set", turns=False, gives_items="in order",
-    modes=MODES, in_auto=in_auto, driving=DRIVING, drivable=True, habits=HABITS,
-    steering=Steering(("CA_AIRFRAME",), like_a_car),
+    modes=MODES, in_auto=in_auto, driving=DRIVING, drivable=True, behaviour=BEHAVIOUR,
+    steering=Steering(("CA_AIRFRAME",), car_steering),
     parameters=PARAMETERS, whole_bytewise=True,
 )  # fmt: skip

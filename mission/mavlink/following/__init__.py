@@ -1,5 +1,5 @@
-"""A vehicle's messages -> the steps of a run that it drives by itself: for a live line and for a log alike.
+"""A vehicle's messages -> the events of a run in AUTO: for a live link and for a log alike.
 
-`observer` gathers what is told into what is known at a moment, `steps` says what has happened by then,
-`resuming` where the vehicle must go on. Nothing here touches a vehicle, a clock or a disk.
+`observer` collects messages into the vehicle's present state, `steps` derives the events from it,
+`resuming` the item to go on with. Nothing here touches a vehicle, a clock or a disk.
 """

@@ -1,7 +1,7 @@
-"""The run of a vehicle that is only listened to, as in a log: its messages become the run's events.
+"""The run of a vehicle that is only observed, as in a log: its messages become the run's events.
 
-Nothing is told to the vehicle and nothing decided for it. What it did after a failure is seen, and so is a
-second visit to a stop.
+No command is sent to the vehicle, and no decision is made for it. Its reaction to a failure is detected, and
+so is a second visit to a stop.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from stopgo.mission.mavlink.following.steps import (
     steps,
     taken_over,
 )
-from stopgo.mission.mavlink.telemetry import Message, began_again
+from stopgo.mission.mavlink.telemetry import Message, has_restarted
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import AnyEvent, Arrived
-from stopgo.mission.run.states import Change, Run, changed, told_of
+from stopgo.mission.run.states import Change, Run, changed, events_of
 
 
 class FollowedRun:
@@ -38,28 +38,28 @@ class FollowedRun:
     listed
         The mission and the list that the vehicle holds.
     name
-        A run's id: this, and from the second on its number behind it.
+        Id of the first run; later runs append their number.
     """
 
     def __init__(self, listed: ListedMission, autopilot: Autopilot, *, name: str, robot: str) -> None:
-        self._listed = replace(listed, mission=as_seen(listed.mission))
+        self._listed = replace(listed, mission=as_observed(listed.mission))
         self._observer = Observer(autopilot)
         self._name, self._robot = name, robot
         self._run = runs.installed(Run(), listed.mission)
         self._used: Picture = NONE_YET
         self._boot_ms = 0
         self._left_ns: int | None = None
-        """Since when the vehicle is beyond the stop that is worked on, without a word of its scan."""
+        """Time since when the vehicle is beyond the current stop, without a confirmed scan."""
         self._runs = 0
         self.events: list[AnyEvent] = []
 
-    def know(self, message: Message, now_ns: int) -> None:
-        """A message from before the vehicle was given this list: it tells of no run of it."""
+    def take_earlier(self, message: Message, now_ns: int) -> None:
+        """Take a message from before the vehicle got this list: it belongs to no run of it."""
         self._observer.take(message, self._listed, now_ns)
         self._boot_ms = self._observer.boot_ms
 
-    def hear(self, message: Message, now_ns: int) -> None:
-        """A message that the vehicle sent at this time."""
+    def take(self, message: Message, now_ns: int) -> None:
+        """Take a message that the vehicle sent at this time."""
         name = self._observer.take(message, self._listed, now_ns)
         if name in CLOCKS:
             self._look_at_clock(now_ns)
@@ -67,12 +67,12 @@ class FollowedRun:
             pass
 
     def end(self, now_ns: int) -> None:
-        """Nothing more is heard: no scan can be confirmed later."""
+        """End the log: no scan can be confirmed later."""
         while self._step(now_ns + GRACE_NS + 1):
             pass
 
     def _step(self, now_ns: int) -> bool:
-        """Take in what is seen of the stop that is worked on; whether the run went on by it."""
+        """Apply the observation of the current stop; return True if the run went on to another stop."""
         observed = self._observe(now_ns)
         if observed is None:
             return False
@@ -99,15 +99,15 @@ class FollowedRun:
     def _happened(self, observed: Observation, now_ns: int) -> tuple[Change, ...]:
         if self._run.over:
             return self._begun(observed, now_ns)
-        told = steps(self._run, self._listed, observed)
-        now = told[-1].run if told else self._run
+        changes = steps(self._run, self._listed, observed)
+        now = changes[-1].run if changes else self._run
         if now.over or not self._observer.mode_explained(now_ns):
-            return told
+            return changes
         other = taken_over(now, self._listed, observed)
-        return told if other is None else (*told, other)
+        return changes if other is None else (*changes, other)
 
     def _begun(self, observed: Observation, now_ns: int) -> tuple[Change, ...]:
-        """A run begins when the vehicle begins to drive its list; the one before is no longer the newest."""
+        """Return the start of a run, when the vehicle begins to drive its list; the newest run counts."""
         if not observed.drives or observed.place > self._listed.stops[0].at:
             return ()
         self._runs += 1
@@ -116,7 +116,7 @@ class FollowedRun:
         return (runs.started(self._run, run_id=name, now_ns=now_ns, by=SOMEBODY),)
 
     def _go_back(self, observed: Observation) -> None:
-        """A vehicle that is at an earlier stop again, which was left out, has another try at it."""
+        """Give a skipped stop another try, if the vehicle is at it again."""
         for at, items in enumerate(self._listed.stops[: self._run.at]):
             if items.stop in self._run.skipped and items.first <= observed.place < items.after:
                 left_out = tuple(stop for stop in self._run.skipped if stop != items.stop)
@@ -126,16 +126,16 @@ class FollowedRun:
 
     def _look_at_clock(self, now_ns: int) -> None:
         before_ms, self._boot_ms = self._boot_ms, self._observer.boot_ms
-        if began_again(before_ms, self._boot_ms) and not self._run.over:
+        if has_restarted(before_ms, self._boot_ms) and not self._run.over:
             self._take(runs.rebooted(self._run), now_ns)
 
     def _take(self, change: Change, now_ns: int) -> None:
         self._run = change.run
-        for event in told_of(change, robot=self._robot, boot_id="", now_ns=now_ns):
+        for event in events_of(change, robot=self._robot, boot_id="", now_ns=now_ns):
             self.events.append(changed(event, number=len(self.events) + 1))
 
     def _arrived(self) -> Arrived | None:
-        """That the vehicle was seen at the stop that is worked on."""
+        """Return the arrival at the current stop, if the vehicle was seen there."""
         if self._run.at >= len(self._listed.stops) or self._run.stop_state not in AT_STOP:
             return None
         last = next((event for event in reversed(self.events) if isinstance(event, Arrived)), None)
@@ -143,13 +143,13 @@ class FollowedRun:
         return last if own else None
 
 
-def as_seen(mission: Mission) -> Mission:
-    """The mission for whoever only looks: what stands beside a stop has arrived there, with its distance.
+def as_observed(mission: Mission) -> Mission:
+    """Return the mission for observation: a robot near a stop has arrived there, with its position error.
 
-    Whether that is within the stop's tolerance is for the comparison to say.
+    The comparison decides later if that is within the stop's tolerance.
     """
-    return changed(mission, stops=tuple(map(_as_seen, mission.stops)))
+    return changed(mission, stops=tuple(map(_as_observed, mission.stops)))
 
 
-def _as_seen(stop: Stop) -> Stop:
+def _as_observed(stop: Stop) -> Stop:
     return changed(stop, tolerance_m=max(stop.tolerance_m, NEAR_M), on_failure="skip", retries=0)

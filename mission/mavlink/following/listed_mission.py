@@ -1,4 +1,4 @@
-"""Which items of a list belong to which stop, so that an item's number tells what a vehicle is doing."""
+"""Assignment of a list's items to stops, so that an item's number shows the vehicle's progress."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from stopgo.mission.mavlink.items import ItemList, Placed
 
 @dataclass(frozen=True)
 class StopItems:
-    """A stop's items by their places in an `ItemList`."""
+    """A stop's items by their indices in an `ItemList`."""
 
     stop: str
     first: int
-    """Where the way to the stop begins: its first corner, or its waypoint."""
+    """First item of the leg to the stop: its first corner, or its waypoint."""
     at: int
     """Its waypoint."""
     scan: int
-    """What follows settling: the trigger, or the wait for the scan."""
+    """First item after settling: the trigger, or the wait for the scan."""
     after: int
-    """What comes once the scan is over."""
+    """First item after the scan."""
 
 
 @dataclass(frozen=True)
@@ -38,25 +38,25 @@ class ListedMission:
 
     @property
     def end(self) -> int:
-        """The place that means that all is done."""
+        """The index that means that all is done."""
         return len(self.sent.placed)
 
     def place(self, sequence: int) -> int:
-        """Place in the list of a sequence number on the vehicle; home counts as the first."""
+        """Return the index in the list of a sequence number on the vehicle; home counts as the first."""
         return max(0, min(self.end, autopilot_named(self.sent.autopilot).index(sequence)))
 
     def sequence(self, place: int) -> int:
-        """Number on the vehicle of the item at a place of the list."""
+        """Return the sequence number on the vehicle of the item at an index of the list."""
         return autopilot_named(self.sent.autopilot).sequence(place)
 
     @property
     def speed(self) -> float | None:
-        """What the first change of speed in the list sets, metres per second."""
+        """Speed of the first change of speed in the list, metres per second."""
         return next((one.item.params[1] for one in self.sent.placed if one.role == "speed"), None)
 
 
 def listed_mission(mission: Mission, sent: ItemList) -> ListedMission:
-    """A mission that was sent as this list.
+    """Return a mission with the list that it was sent as.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def listed_mission(mission: Mission, sent: ItemList) -> ListedMission:
 
 
 def _forward(mission: Mission) -> Mission:
-    """The mission as AUTO can do it, forward only: where a stop says "home", somebody must decide."""
+    """Return the mission without returns, which AUTO cannot do: "home" at a stop becomes "ask"."""
     stops = (replace(stop, on_failure="ask") if stop.on_failure == "home" else stop for stop in mission.stops)
     return replace(mission, stops=tuple(stops))
 
@@ -80,6 +80,6 @@ def _stop_items(stop: str, placed: tuple[Placed, ...]) -> StopItems:
     ]
     at = next((place for place in own if placed[place].role == "stop"), None)
     if at is None:
-        raise InputError(f"stop {stop} is not among the items that were sent; push the mission again")
+        raise InputError(f"stop {stop}: not among the sent items; push the mission again")
     settles = [place for place in own if placed[place].role == "settle"]
     return StopItems(stop, own[0], at, max([at, *settles]) + 1, own[-1] + 1)

@@ -1,8 +1,7 @@
-"""What is seen of a vehicle in AUTO, told as the steps of a run: arrived, settled, scanned, or why not.
+"""Events of a vehicle in AUTO from observations: arrived, settled, scanned, or why not.
 
-Nothing here touches a vehicle, a clock or a disk. That a waypoint is reached is the vehicle's word; whether
-the robot stands at the stop is measured here, by its pose. That a scan was made is believed only of the
-vehicle's camera or scanner.
+Nothing here touches a vehicle, a clock or a disk. The vehicle reports a reached waypoint; the robot's pose is
+checked here against the stop. Only the vehicle's camera or scanner can confirm a scan.
 """
 
 from __future__ import annotations
@@ -18,18 +17,18 @@ from stopgo.mission.document import Stop
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, StopItems
 from stopgo.mission.run import states as runs
 from stopgo.mission.run.events import Pose, Settled, Unconfirmed
-from stopgo.mission.run.scans import ScanFailed, ScanResult, turned_away
+from stopgo.mission.run.scans import ScanFailed, ScanResult, heading_error
 from stopgo.mission.run.states import Change, Run, changed
 from stopgo.mission.run.tolerance import deviation, is_outside
 
 SOMEBODY = "the vehicle's operator"
-"""Who gives orders that were not given here."""
-TELLS_LATE = ("NAVIGATING", "SCANNING")
-"""Of a stop that was left in these, the scanner's word is still waited for."""
+"""Commander of commands that were not sent from here."""
+LATE_REPORTS = ("NAVIGATING", "SCANNING")
+"""States in which a scanner's report is still expected after the stop was left."""
 GRACE_NS = 2 * 10**9
-"""How long a confirmation may come after the end of a scan's wait, if the next stop is not reached before."""
+"""Time that a confirmation may come after a scan's wait, if the next stop is not reached before."""
 COUNTS_NOT_YET = ("NAVIGATING", "SETTLING", "SCANNING")
-"""At these a scan that was told of does not count yet."""
+"""States in which a reported scan does not count yet."""
 AT_STOP = ("SETTLING", "SCANNING", "VERIFYING")
 
 
@@ -41,38 +40,38 @@ class Observation:
     """"AUTO", "HOLD", or what else it calls itself."""
     armed: bool
     place: int
-    """The item it works on, as a place in the list; the list's length once all is done."""
+    """Index of the current item in the list; the list's length once all is done."""
     pose: Pose | None = None
-    """Measured while it worked on that item."""
+    """Measured while it was at that item."""
     still: bool = False
-    """Stands, by that measurement."""
+    """True for a standstill, by that measurement."""
     scan: ScanResult | ScanFailed | None = None
-    """What the scanner told of the stop that is worked on."""
+    """Scanner's report for the current stop."""
     stood: Pose | None = None
-    """Where the robot stood at that stop, as the scanner told, or as it was seen there before."""
-    in_vain: bool = False
-    """No word of the scanner is to be expected any more, which would say where it stood too."""
+    """Pose of the robot at that stop, as the scanner reported it, or as it was observed before."""
+    report_overdue: bool = False
+    """True if no scanner report, with its pose, is expected any more."""
 
     @property
     def drives(self) -> bool:
-        """Whether it follows its mission."""
+        """True if it follows its mission."""
         return self.mode == "AUTO" and self.armed
 
 
 def has_left(run: Run, listed: ListedMission, observed: Observation) -> bool:
-    """Whether it has left the present stop, of which the scanner's word may still come."""
-    at_work = run.stop_state in TELLS_LATE and run.at < len(listed.stops)
+    """Return True if it has left the current stop, and the scanner's report may still come."""
+    at_work = run.stop_state in LATE_REPORTS and run.at < len(listed.stops)
     return at_work and observed.place >= listed.stops[run.at].after
 
 
 def since_left(run: Run, listed: ListedMission, observed: Observation, waited_ns: int) -> Observation:
-    """The same of a stop that was left so long ago: whether the scanner's word is waited for in vain."""
+    """Return the observation after waiting: is a report still expected from the stop that was left?"""
     beyond = run.at + 1 < len(listed.stops) and observed.place > listed.stops[run.at + 1].at
-    return replace(observed, in_vain=beyond or waited_ns > GRACE_NS)
+    return replace(observed, report_overdue=beyond or waited_ns > GRACE_NS)
 
 
 def steps(run: Run, listed: ListedMission, observed: Observation) -> tuple[Change, ...]:
-    """What has happened since the run was stored, one after another, up to the end of the present stop."""
+    """Return the changes since the run was stored, in order, up to the end of the current stop."""
     taken: list[Change] = []
     while (change := step(run, listed, observed)) is not None:
         taken.append(change)
@@ -85,7 +84,7 @@ def steps(run: Run, listed: ListedMission, observed: Observation) -> tuple[Chang
 
 
 def step(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
-    """The next thing that has happened, if anything has."""
+    """Return the next change, if there is any."""
     if run.state == "PAUSED":
         return _ends_scan(run, listed, observed)
     if run.state == "HOMING":
@@ -96,7 +95,7 @@ def step(run: Run, listed: ListedMission, observed: Observation) -> Change | Non
 
 
 def _ends_scan(run: Run, listed: ListedMission, observed: Observation) -> Change | None:
-    """A vehicle that is paused still ends the scan it was in."""
+    """Return the end of a scan: a paused vehicle still ends it."""
     if run.stop_state == "VERIFYING":
         return _verified(run, listed, observed)
     if run.stop_state == "SCANNING" and isinstance(observed.scan, ScanResult):
@@ -105,7 +104,7 @@ def _ends_scan(run: Run, listed: ListedMission, observed: Observation) -> Change
 
 
 def _ended(run: Run, listed: ListedMission, observed: Observation, scan: ScanResult) -> Change:
-    """The scan is there; where from is known now, and no more once the vehicle has left."""
+    """End the scan with the pose known now; once the vehicle has left, it is not known."""
     return runs.scan_ended(run, listed.mission, msgspec.structs.replace(scan, pose=observed.stood))
 
 
@@ -114,15 +113,15 @@ def _begun(run: Run, listed: ListedMission, observed: Observation, items: StopIt
 
 
 def _driven(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
-    """The vehicle says that it is there; is it?"""
+    """Check a waypoint that the vehicle reports as reached."""
     if observed.place <= items.at:
         return None
     left = observed.place >= items.after
     pose = observed.stood if left else observed.pose
     if pose is None:
-        reason = "nobody saw where the vehicle stood"
-        return _unconfirmed(run, listed, None, reason) if left and observed.in_vain else None
-    stop, wrong = listed.mission.stops[run.at], misplaced(pose, run, listed)
+        reason = "no pose of the vehicle at the stop"
+        return _unconfirmed(run, listed, None, reason) if left and observed.report_overdue else None
+    stop, wrong = listed.mission.stops[run.at], stop_error_text(pose, run, listed)
     if not wrong:
         return runs.reached(changed(run, leg=run.at), listed.mission, pose, deviation(pose, stop))
     if left:
@@ -139,7 +138,7 @@ def _settled(run: Run, listed: ListedMission, observed: Observation, items: Stop
         return None
     if observed.place >= items.after or observed.pose is None:
         return Change(changed(run, stop_state="SCANNING")) if observed.place >= items.after else None
-    wrong = misplaced(observed.pose, run, listed)
+    wrong = stop_error_text(observed.pose, run, listed)
     if wrong:
         return runs.failed(run, listed.mission, f"moved while it settled: {wrong}")
     settled = partial(Settled, stop=items.stop, pose=observed.pose)
@@ -147,7 +146,7 @@ def _settled(run: Run, listed: ListedMission, observed: Observation, items: Stop
 
 
 def _scanned(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
-    """The scanner's word is taken when it comes; the stop is done when its wait is over."""
+    """Take the scanner's report when it comes; the stop is done when its wait is over."""
     if observed.place <= items.at:
         return Change(changed(run, stop_state="NAVIGATING"))
     if isinstance(observed.scan, ScanResult):
@@ -156,18 +155,18 @@ def _scanned(run: Run, listed: ListedMission, observed: Observation, items: Stop
         left = observed.place >= items.after
         tried = _last_try(run, listed.mission.stops[run.at]) if left else run
         return runs.scan_ended(tried, listed.mission, observed.scan)
-    if observed.place < items.after or not observed.in_vain:
+    if observed.place < items.after or not observed.report_overdue:
         return None
-    return _unconfirmed(run, listed, observed.stood, "the vehicle told nothing of a scan")
+    return _unconfirmed(run, listed, observed.stood, "no scan report from the vehicle")
 
 
 def _last_try(run: Run, stop: Stop) -> Run:
-    """From a stop that was left there is no planned way back to it."""
+    """Use up the tries: there is no planned way back to a stop that was left."""
     return changed(run, attempt=stop.retries)
 
 
 def _scan_over(run: Run, listed: ListedMission, observed: Observation, items: StopItems) -> Change | None:
-    """A scan that has come in counts once its wait is over."""
+    """Verify a reported scan once its wait is over."""
     return None if items.at < observed.place < items.after else _verified(run, listed, observed)
 
 
@@ -177,11 +176,11 @@ def _verified(run: Run, listed: ListedMission, observed: Observation) -> Change 
 
 
 def _unconfirmed(run: Run, listed: ListedMission, pose: Pose | None, reason: str) -> Change:
-    """The vehicle is through with the stop, and that is all that is known."""
+    """Complete the stop without a confirmed scan."""
     stop = listed.mission.stops[run.at]
     behind = runs.next_stop(runs.with_done(changed(run, leg=run.at + 1), stop, pose), listed.mission)
-    telling = partial(Unconfirmed, stop=stop.id, pose=pose, reason=reason)
-    return Change(behind.run, (telling, *behind.events))
+    event = partial(Unconfirmed, stop=stop.id, pose=pose, reason=reason)
+    return Change(behind.run, (event, *behind.events))
 
 
 STEPS: dict[str, Callable[[Run, ListedMission, Observation, StopItems], Change | None]] = {
@@ -194,13 +193,13 @@ STEPS: dict[str, Callable[[Run, ListedMission, Observation, StopItems], Change |
 
 
 def tried_again(before: Run, after: Run) -> bool:
-    """Whether the vehicle must go back to the stop's waypoint for another attempt."""
+    """Return True if the vehicle must go back to the stop's waypoint for another attempt."""
     same = (before.at, after.state, after.stop_state) == (after.at, "RUNNING", "WAITING")
     return same and after.attempt > before.attempt
 
 
-def passed_by(run: Run, listed: ListedMission, observed: Observation) -> int | None:
-    """Where a vehicle goes on that waits at a stop that was left out; `None` if it does not."""
+def after_skipped(run: Run, listed: ListedMission, observed: Observation) -> int | None:
+    """Return the item to go on with for a vehicle at a skipped stop; `None` if it is not there."""
     for items in listed.stops[: run.at]:
         if items.stop in run.skipped and items.at < observed.place < items.after < listed.end:
             return items.after
@@ -210,7 +209,7 @@ def passed_by(run: Run, listed: ListedMission, observed: Observation) -> int | N
 def taken_over(
     run: Run, listed: ListedMission, observed: Observation, *, by: str = SOMEBODY
 ) -> Change | None:
-    """What a change of the vehicle's mode that was not ordered here means for the run."""
+    """Return the change of the run by a change of the vehicle's mode that was not commanded here."""
     going = run.state in ("RUNNING", "HOMING")
     if going and not observed.drives and observed.place < listed.end:
         why = "disarmed" if observed.mode == "AUTO" else f"mode {observed.mode}"
@@ -222,19 +221,19 @@ def taken_over(
     return None
 
 
-def held_by_vehicle(run: Run, items: int | None) -> Run:
-    """The run as it is told; a mission that lay ready is gone if the vehicle says that it holds none."""
+def run_on_vehicle(run: Run, items: int | None) -> Run:
+    """Return the run as reported; a ready mission is dropped if the vehicle reports no items."""
     return Run() if run.state == "READY" and items == 0 else run
 
 
-def misplaced(pose: Pose, run: Run, listed: ListedMission) -> str:
-    """How the robot stands elsewhere than at its stop, or turned away; empty if it stands there."""
+def stop_error_text(pose: Pose, run: Run, listed: ListedMission) -> str:
+    """Return the position or heading error outside tolerance, in words; empty if within."""
     stop, away = listed.mission.stops[run.at], deviation(pose, listed.mission.stops[run.at])
     if is_outside(away, stop.tolerance_m):
         return (
-            f"{away:.3f} m from the stop, tolerance is {stop.tolerance_m:g} m; the vehicle calls it reached"
+            f"{away:.3f} m from the stop, tolerance is {stop.tolerance_m:g} m; the vehicle reports it reached"
         )
-    turned = turned_away(listed.mission.scanner, stop.heading, pose.heading)
-    if turned:
-        return f"turned {math.degrees(turned):.1f}° from the heading that its scanner needs"
+    error = heading_error(listed.mission.scanner, stop.heading, pose.heading)
+    if error:
+        return f"turned {math.degrees(error):.1f}° from the heading that its scanner needs"
     return ""

@@ -9,7 +9,7 @@ import pytest
 from stopgo.bridge.robot.simulator import Fault, Faults
 from stopgo.mission.document.schedule import schedule
 from stopgo.mission.errors import NegativeResult
-from stopgo.mission.run.battery import time_left, what_is_missing
+from stopgo.mission.run.battery import battery_shortfall, time_left
 from tests.bridge.world import EXACT, Field, corridor
 
 TOTAL_S = schedule(corridor()).total_s
@@ -22,7 +22,7 @@ def lasting(seconds: float, *faults: Fault) -> Field:
 
 
 def missing(battery: float, endurance_s: float | None, first: int = 0) -> str:
-    return what_is_missing(corridor(), battery=battery, endurance_s=endurance_s, first=first)
+    return battery_shortfall(corridor(), battery=battery, endurance_s=endurance_s, first=first)
 
 
 def test_a_battery_that_lasts_exactly_is_enough() -> None:
@@ -36,7 +36,7 @@ def test_a_robot_that_cannot_tell_takes_every_mission() -> None:
 
 def test_the_refusal_has_both_times_in_one_line() -> None:
     # 54 times 67 s (2 m, 2 s still, a scan), a turn of 4 s, and 108 m back in 217 s: 3839 s.
-    told = what_is_missing(corridor(stops=54), battery=0.55, endurance_s=3600.0)
+    told = battery_shortfall(corridor(stops=54), battery=0.55, endurance_s=3600.0)
     assert told == (
         "the mission takes 1.1 h as planned; the battery, at 55%, lasts 0.4 h until 15%:"
         " charge it, or plan fewer stops"

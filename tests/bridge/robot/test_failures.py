@@ -215,7 +215,7 @@ def test_a_skip_does_not_turn_a_robot_round_that_is_on_its_way_home() -> None:
     field.work_until(lambda run: run.done == ("s1",))
     field.order("home")
     field.work()
-    assert field.controller.run.place == "HELD homing"
+    assert field.controller.run.detailed_state == "HELD homing"
     assert field.order("skip").reason == "wrong_state"
     field.order("retry")
     field.work()

@@ -108,9 +108,9 @@ def moved(index: int, **details: Any) -> Mission:
 @pytest.mark.parametrize(
     ("revision", "why"),
     [
-        (moved(0, x=2.0005), "stop s1 or the way to it"),
-        (moved(0, id="t1"), "stop s1 or the way to it"),
-        (moved(0, approach=((0.0, 0.0), (1.0, 0.5), (2.0, 0.0))), "stop s1 or the way to it"),
+        (moved(0, x=2.0005), "stop s1 or the leg to it differs"),
+        (moved(0, id="t1"), "stop s1 or the leg to it differs"),
+        (moved(0, approach=((0.0, 0.0), (1.0, 0.5), (2.0, 0.0))), "stop s1 or the leg to it differs"),
         (changed(frame=TURNED), "frame"),
     ],
 )  # fmt: skip

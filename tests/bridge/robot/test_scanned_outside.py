@@ -14,7 +14,7 @@ from stopgo.mission.comparing.run_collector import RunCollector
 from stopgo.mission.run.events import Scanned
 from tests.bridge.world import Field, corridor
 
-BESIDE = "120 mm beside its place (50 mm are tolerated)"
+BESIDE = "120 mm from its stop (50 mm are tolerated)"
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stopgo.mission.comparing.delayed_deviation import LateBeside
-from stopgo.mission.comparing.path_deviation import WayFollower, beside
+from stopgo.mission.comparing.delayed_deviation import DelayedDeviation
+from stopgo.mission.comparing.path_deviation import PathFollower, cross_track_of
 from stopgo.mission.document import Mission
 from stopgo.mission.run.events import Arrived, Finished, Homing, Scanned, Skipped, Started
 from stopgo.mission.run.run_log import RunLog
@@ -30,7 +30,7 @@ def line(begin: float, a: tuple[float, float], b: tuple[float, float], count: in
 
 
 def greatest(log: RunLog, mission: Mission) -> float:
-    found = beside(log, [mission]).greatest_m
+    found = cross_track_of(log, [mission]).greatest_m
     assert found is not None
     return found
 
@@ -50,7 +50,7 @@ def test_a_way_that_is_driven_exactly_has_nothing_beside_it() -> None:
 
 
 def test_left_is_positive_and_right_is_negative() -> None:
-    follower = WayFollower(hook())
+    follower = PathFollower(hook())
     assert follower.measure(np.array([(2.0, 0.2), (3.0, -0.3)]))[:, 0].tolist() == pytest.approx([0.2, -0.3])
 
 
@@ -71,17 +71,17 @@ def test_a_robot_on_the_leg_of_a_skipped_stop_is_on_its_way() -> None:
 
 def test_a_pose_near_a_later_piece_is_measured_from_the_one_that_is_driven() -> None:
     """0.6 m left of the first leg is 0.4 m from a leg that is driven later."""
-    follower = WayFollower(hook())
-    follower.tell(told(hook(), (Started, 0, {"commander": "ann"})).events[0])
+    follower = PathFollower(hook())
+    follower.take(told(hook(), (Started, 0, {"commander": "ann"})).events[0])
     assert follower.measure(np.array([(1.0, 0.0), (2.0, 0.6)]))[1, 0] == pytest.approx(0.6)
 
 
 def test_what_is_measured_does_not_depend_on_how_poses_come() -> None:
     """A run that is heard pose by pose is measured as one that is read whole."""
     xy = np.array([pose[1:] for pose in line(0, (10, 0.1), (10, 1.1)) + line(0, (9.9, 1.2), (0, 1))])
-    whole, single = WayFollower(hook()), WayFollower(hook())
+    whole, single = PathFollower(hook()), PathFollower(hook())
     for follower in (whole, single):
-        follower.tell(_scanned("S1"))
+        follower.take(_scanned("S1"))
     one_by_one = np.concatenate([single.measure(pose) for pose in xy])
     assert np.array_equal(whole.measure(xy), one_by_one)
 
@@ -97,7 +97,7 @@ def test_events_that_come_late_change_nothing() -> None:
         (Scanned, 99, {"stop": "S1", "pose": at(10, 0), **SCAN}),
         poses=poses,
     )
-    late = LateBeside(mission)
+    late = DelayedDeviation(mission)
     late.poses(log.poses)
     assert not late.knows(1)
     for event in log.events:
@@ -106,34 +106,34 @@ def test_events_that_come_late_change_nothing() -> None:
     rest, others = late.measured()
     assert (len(early), late.knows(3)) == (5, True)
     assert np.array_equal(np.concatenate([early, rest]), log.poses.ns)
-    whole = WayFollower(mission)
+    whole = PathFollower(mission)
     expected = []
     xy = log.poses.xy
     for event, before in zip(log.events, (xy[:1], xy[1:21], xy[21:21]), strict=True):
         expected.append(whole.measure(before))
-        whole.tell(event)
+        whole.take(event)
     expected.append(whole.measure(xy[21:]))
     assert np.array_equal(np.concatenate([metres, others]), np.concatenate(expected)[:, 0])
 
 
 def test_home_is_by_the_return_or_back_the_way_it_came() -> None:
     mission = hook()
-    follower = WayFollower(mission)
-    follower.tell(_scanned("S1"))
+    follower = PathFollower(mission)
+    follower.take(_scanned("S1"))
     follower.measure(np.array([(10.0, 0.5)]))
-    follower.tell(told(mission, (Homing, 5, {"reason": "sent home"})).events[0])
+    follower.take(told(mission, (Homing, 5, {"reason": "sent home"})).events[0])
     back = follower.measure(np.array([(10.0, 0.5), (9.0, 0.1), (1.0, 0.1)]))[:, 0]
     assert back.tolist() == pytest.approx([0.0, -0.1, -0.1])
     for name in ("S1", "S2", "S3"):
-        follower.tell(_scanned(name))
-    follower.tell(told(mission, (Homing, 9, {"reason": "all stops are behind"})).events[0])
+        follower.take(_scanned(name))
+    follower.take(told(mission, (Homing, 9, {"reason": "all stops are behind"})).events[0])
     assert follower.measure(np.array([(0.2, 3.0)]))[0, 0] == pytest.approx(0.2)
 
 
 def test_after_the_end_there_is_no_way() -> None:
     mission = hook()
-    follower = WayFollower(mission)
-    follower.tell(told(mission, (Finished, 9, {})).events[0])
+    follower = PathFollower(mission)
+    follower.take(told(mission, (Finished, 9, {})).events[0])
     assert np.isnan(follower.measure(np.array([(5.0, 5.0)]))).all()
 
 
@@ -141,7 +141,7 @@ def test_a_hundred_thousand_poses_are_measured_as_one(
     count: int = 100_000,
 ) -> None:
     x = np.linspace(0.0, 10.0, count)
-    measured = WayFollower(hook()).measure(np.stack([x, np.full(count, -0.25)], axis=1))
+    measured = PathFollower(hook()).measure(np.stack([x, np.full(count, -0.25)], axis=1))
     assert np.allclose(measured[:, 0], -0.25)
     assert np.allclose(measured[:, 1], x)
 

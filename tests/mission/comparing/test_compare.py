@@ -13,7 +13,7 @@ from stopgo.mission.comparing.compare import compare
 from stopgo.mission.comparing.comparison import Comparison
 from stopgo.mission.comparing.comparison_text import comparison_json, comparison_text
 from stopgo.mission.comparing.run_verdict import judge
-from stopgo.mission.comparing.spans import stood_s
+from stopgo.mission.comparing.spans import paused_s
 from stopgo.mission.document import Mission, sealed
 from stopgo.mission.run.events import (
     Aborted,
@@ -158,13 +158,13 @@ def test_a_stop_that_a_revision_has_moved_is_not_counted_by_the_old_plan() -> No
 def test_a_scan_from_outside_the_tolerance_is_none_of_the_plan() -> None:
     away = run(*visit("S1", 0, 1, 1), *visit("S2", 70, 3.2, 1.2), (Finished, 133.0, {}))
     assert judge(away).answer == "no"
-    assert "S2 was scanned 200 mm beside its place (50 mm are tolerated)." in judge(away).text
+    assert "S2 was scanned 200 mm from its stop (50 mm are tolerated)." in judge(away).text
 
 
 def test_a_stop_passed_outside_its_tolerance_was_not_acquired_whether_it_was_scanned_or_not() -> None:
     passed = (Unconfirmed, 133.0, {"stop": "S2", "pose": at(3.2, 1.2), "reason": "no word"})
     away = run(*visit("S1", 0, 1, 1), *visit("S2", 70, 3.2, 1, scan=False), passed, (Finished, 134.0, {}))
-    words = "passed 200 mm beside its place (50 mm are tolerated)"
+    words = "passed 200 mm from its stop (50 mm are tolerated)"
     assert judge(away).answer == "no" and f"S2 was {words}." in judge(away).text
     assert f"{words}; no word" in comparison_text(away)
     assert [item["outside_tolerance"] for item in comparison_json(away)["stops"]] == [False, True]
@@ -234,7 +234,7 @@ def test_the_states_of_a_run_follow_one_another_without_a_gap() -> None:
         ("RUNNING", 70.0, 80.0),
         ("HOMING", 80.0, 90.0),
     ]
-    assert compared.stood_s("PAUSED", "HELD") == 45.0
+    assert compared.seconds_in("PAUSED", "HELD") == 45.0
 
 
 def test_what_is_told_is_what_was_computed() -> None:
@@ -255,7 +255,7 @@ def test_a_log_of_nothing_is_compared_too() -> None:
     empty = RunLog("r1", None, None, None, told(mission).source)
     compared = compare(empty, [mission])
     assert [item.outcome for item in compared.stops] == ["not reached", "not reached"]
-    assert (compared.spans, compared.beside.greatest_m) == ((), None)
+    assert (compared.spans, compared.cross_track.greatest_m) == ((), None)
     assert comparison_text(compared)
 
 
@@ -267,9 +267,9 @@ def test_standing_still_is_counted_between_two_times() -> None:
         (Resumed, 25.0, {"commander": "ann"}),
         (Held, 40.0, {"reason": "blocked"}),
     ).events
-    assert stood_s(events, since_s=0.0, until_s=30.0) == 15.0
-    assert stood_s(events, since_s=20.0, until_s=50.0) == 5.0 + 10.0
-    assert stood_s(events[:1], since_s=0.0, until_s=50.0) == 0.0
+    assert paused_s(events, since_s=0.0, until_s=30.0) == 15.0
+    assert paused_s(events, since_s=20.0, until_s=50.0) == 5.0 + 10.0
+    assert paused_s(events[:1], since_s=0.0, until_s=50.0) == 0.0
 
 
 def test_of_repeated_visits_the_last_reason_counts_and_of_a_skip_after_a_failure_both() -> None:

@@ -81,8 +81,8 @@ REFUSED = {
     "no georeference": (["-o", "x.plan"], "--origin LAT,LON,ALT,HEADING"),
     "unknown suffix": (["-o", "x.dwg"], ".plan, .waypoints, .dxf"),
     "unknown format": (["-o", "x.csv", "--to", "dwg"], "known: plan"),
-    "useless option": (["-o", "x.csv", "--map", "1,2,3"], "--map: table of stops has no use for it"),
-    "another useless option": (["-o", "x.dxf", "--autopilot", "px4"], "--autopilot: DXF drawing has no use"),
+    "useless option": (["-o", "x.csv", "--map", "1,2,3"], "--map: not used by table of stops"),
+    "another useless option": (["-o", "x.dxf", "--autopilot", "px4"], "--autopilot: not used by DXF drawing"),
     "origin of three": (["-o", "x.csv", "--origin", "1,2,3"], "write LAT,LON,ALT,HEADING"),
     "origin of words": (["-o", "x.csv", "--origin", "here"], "write LAT,LON,ALT,HEADING"),
     "origin beyond the pole": (["-o", "x.csv", "--origin", "91,0,0,0"], "latitude must be within"),
@@ -90,9 +90,9 @@ REFUSED = {
     "map of nan": (["-o", "x.mcap", "--map", "nan,0,0"], "write X,Y,HEADING"),
     "strange autopilot": (["-o", "x.plan", "--autopilot", "kk"], "--autopilot kk: one of ardupilot"),
     "strange trigger": (["-o", "x.plan", "--trigger", "kk"], "--trigger kk: one of auto, script"),
-    "trigger of none": (["-o", "x.csv", "--trigger", "auto"], "--trigger: table of stops has no use"),
+    "trigger of none": (["-o", "x.csv", "--trigger", "auto"], "--trigger: not used by table of stops"),
     "floor missing": (["-o", "x.dxf", "--floor", "no.dxf"], "no.dxf: cannot be read"),
-    "floor no dxf": (["-o", "x.dxf", "--floor", "README.md"], "over a .dxf only"),
+    "floor no dxf": (["-o", "x.dxf", "--floor", "README.md"], "only over a .dxf"),
     "floor of another mission": (["-o", "x.dxf", "--floor", str(SAMPLE)], "is not the floor of this mission"),
     "coverage missing": (["-o", "x.dxf", "--coverage", "no.json"], "no.json: cannot be read"),
     "folder missing": (["-o", "no/x.csv"], "does not exist"),
@@ -113,7 +113,7 @@ def test_the_mission_itself_is_never_overwritten(path: str, capsys: Captured) ->
     before = Path(path).read_bytes()
     code, _, err = exit_of([path, "-o", path, "--to", "csv"], capsys)
     assert code == 2
-    assert "is read, and would be written over" in err
+    assert "is also an input and would be overwritten" in err
     assert Path(path).read_bytes() == before
 
 
@@ -128,7 +128,7 @@ def test_neither_floor_nor_coverage_is_overwritten(
     for out in (name, "link"):
         code, _, err = exit_of([*arguments, "-o", str(tmp_path / out)], capsys)
         assert code == 2
-        assert "would be written over; choose another file" in err
+        assert "would be overwritten; choose another file" in err
     assert (tmp_path / name).read_bytes() == b"kept"
 
 

@@ -21,7 +21,7 @@ from stopgo.mission.document import Mission, OnFailure
 from stopgo.mission.files.exports import FORMATS, exported, format_named
 from stopgo.mission.files.exports.format import Supplements
 from stopgo.mission.files.exports.waypoints import mapped, way
-from stopgo.mission.frames.frame_transform import turned, turned_back
+from stopgo.mission.frames.frame_transform import from_map_point, to_map_point
 from stopgo.mission.frames.transform import Transform
 from tests.mission.exports.vda5050_order import ORDERS
 from tests.mission.exports.worlds import MAP, laboratory, on_a_map
@@ -31,8 +31,8 @@ FileOf = Callable[[bytes, str], str]
 
 
 def test_turning_onto_the_map_and_back_is_nothing() -> None:
-    assert turned(Transform(x=1.0, y=2.0, heading=math.pi / 2), (3.0, 0.0)) == pytest.approx((1.0, 5.0))
-    assert turned_back(MAP, turned(MAP, (12.5, -7.25))) == pytest.approx((12.5, -7.25))
+    assert to_map_point(Transform(x=1.0, y=2.0, heading=math.pi / 2), (3.0, 0.0)) == pytest.approx((1.0, 5.0))
+    assert from_map_point(MAP, to_map_point(MAP, (12.5, -7.25))) == pytest.approx((12.5, -7.25))
 
 
 def test_the_way_is_start_corners_stops_and_back() -> None:

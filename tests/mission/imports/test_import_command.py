@@ -42,7 +42,7 @@ def test_the_mission_passes_its_check(name: str, folder: Path, capsys: Captured)
     code, said, err = run([str(folder / name), "-o", out], capsys)
     assert code == 0
     assert said.startswith(f"{out}: ")
-    assert "stopgo check --floor FLOOR.dxf says" in err
+    assert "stopgo check --floor FLOOR.dxf tests" in err
     assert main(["check", out]) == 0
     mission = read(out)
     assert mission.origin.floor == name
@@ -102,7 +102,7 @@ REFUSED = {
     "suffix": (["plan.toml"], "files with this suffix are not read"),
     "format": (["site.plan", "--from", "dwg"], "--from dwg: no such format; known: plan"),
     "wrong format": (["site.plan", "--from", "waypoints"], "not 'QGC WPL 110'"),
-    "autopilot": (["site.plan", "--autopilot", "kk"], "'kk' is not known"),
+    "autopilot": (["site.plan", "--autopilot", "kk"], "'kk': unknown"),
     "origin": (["site.plan", "--origin", "1,2"], "write LAT,LON,ALT,HEADING"),
     "start": (["site.plan", "--start", "x"], "write X,Y,HEADING"),
     "settings": (["site.plan", "-p", "stops.csv"], "not a TOML file"),

@@ -157,5 +157,5 @@ def test_noise_is_refused_in_one_line(name: str, data: bytes) -> None:
 
 def test_two_stops_of_one_name_are_refused(tmp_path: Path) -> None:
     (tmp_path / "stops.csv").write_text("id,x_m,y_m\na,1,2\na,3,4\n")
-    with pytest.raises(InputError, match=r"makes no sense: \$.stops\[1\].id: is 'a', which"):
+    with pytest.raises(InputError, match=r"is implausible: \$.stops\[1\].id: is 'a', already used by"):
         read_mission(tmp_path / "stops.csv", Settings())

@@ -56,7 +56,7 @@ def test_degrees_need_an_origin() -> None:
     (visit,) = track(text, ZURICH).visits
     assert visit.xy == pytest.approx((0.0, 0.0), abs=1e-6)
     assert visit.heading == pytest.approx(0.0)
-    with pytest.raises(InputError, match="places are in degrees; give --origin LAT,LON,ALT,HEADING"):
+    with pytest.raises(InputError, match="positions are in degrees; give --origin LAT,LON,ALT,HEADING"):
         track(text)
 
 
@@ -80,7 +80,7 @@ REFUSED = {
     "empty": ("", "holds no stop"),
     "only names": ("x_m,y_m\n", "holds no stop"),
     "unknown column": ("x_m,y_m,Höhe\n1,2,3\n", "column 'Höhe' is not known; known: x_m, y_m"),
-    "column twice": ("x_m,y_m,x_m\n1,2,3\n", "column x_m stands there 2 times"),
+    "column twice": ("x_m,y_m,x_m\n1,2,3\n", "column x_m occurs 2 times"),
     "no place": ("id\na\n", "has neither columns x_m, y_m nor lat_deg, lon_deg"),
     "half a place": ("x_m,y_m\n1,\n", "line 2: y_m is ''; every stop needs its place"),
     "a word": ("x_m,y_m\n1,2\neins,2\n", "line 3: x_m is 'eins'; it must be a number"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from stopgo.mission.mavlink.accuracy import stops_within, why_beside
+from stopgo.mission.mavlink.accuracy import accuracy_warning, stops_within
 from stopgo.mission.mavlink.autopilots import AUTOPILOTS
 from tests.bridge.mavlink.driving.world import cornered_mission
 
@@ -18,22 +18,24 @@ def test_it_stops_within_its_radius_or_where_it_has_rolled_to() -> None:
 
 def test_what_is_asked_and_cannot_be_is_told_with_two_ways_out() -> None:
     mission = cornered_mission()
-    assert why_beside(mission, AUTOPILOTS["px4"], {"NAV_ACC_RAD": 0.5}) == (
+    assert accuracy_warning(mission, AUTOPILOTS["px4"], {"NAV_ACC_RAD": 0.5}) == (
         "this vehicle stops within 0.50 m in AUTO (NAV_ACC_RAD 0.5 m, 0.5 m/s),"
         " and 5 of 5 stops must be met within less, the tightest within 0.05 m:"
         " set NAV_ACC_RAD to 0.05 and plan with --speed 0.16,"
         " or drive it by stopgo robot --controller mavlink:URL"
     )
-    assert "(WP_RADIUS 0.02 m, 0.5 m/s)" in why_beside(mission, AUTOPILOTS["ardupilot"], {"WP_RADIUS": 0.02})
-    assert "set WP_RADIUS" not in why_beside(mission, AUTOPILOTS["ardupilot"], {"WP_RADIUS": 0.02})
+    assert "(WP_RADIUS 0.02 m, 0.5 m/s)" in accuracy_warning(
+        mission, AUTOPILOTS["ardupilot"], {"WP_RADIUS": 0.02}
+    )
+    assert "set WP_RADIUS" not in accuracy_warning(mission, AUTOPILOTS["ardupilot"], {"WP_RADIUS": 0.02})
 
 
 def test_of_stops_that_ask_for_no_more_nothing_is_told() -> None:
     mission = cornered_mission(tolerance_m=0.3)
-    assert why_beside(mission, AUTOPILOTS["ardupilot"], {"WP_RADIUS": 0.1}) == ""
+    assert accuracy_warning(mission, AUTOPILOTS["ardupilot"], {"WP_RADIUS": 0.1}) == ""
     slow = msgspec.structs.replace(mission.robot, speed=0.15)
     tight = msgspec.structs.replace(cornered_mission(), robot=slow)
-    assert why_beside(tight, AUTOPILOTS["ardupilot"], {"WP_RADIUS": 0.05}) == ""
+    assert accuracy_warning(tight, AUTOPILOTS["ardupilot"], {"WP_RADIUS": 0.05}) == ""
 
 
 @pytest.mark.parametrize(
@@ -53,4 +55,4 @@ def test_a_rover_that_steers_like_a_car_is_known_by_its_parameters(
 ) -> None:
     why = AUTOPILOTS[kind].why_no_pivot(values)
     assert (told in why and "cannot turn on the spot" in why) if told else why == ""
-    assert (why in why_beside(cornered_mission(), AUTOPILOTS[kind], values)) is True
+    assert (why in accuracy_warning(cornered_mission(), AUTOPILOTS[kind], values)) is True

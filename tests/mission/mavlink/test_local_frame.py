@@ -42,4 +42,4 @@ def test_an_origin_two_centimetres_off_is_the_same_and_counted() -> None:
     ],
 )
 def test_another_origin_is_told_with_its_distance(origin: VehicleOrigin, away: str) -> None:
-    assert f"lies {away} from the mission's (47.4000000, 8.5000000)" in apart(SITE, origin)
+    assert f"is {away} from the mission's (47.4000000, 8.5000000)" in apart(SITE, origin)

@@ -6,7 +6,7 @@ import pytest
 
 from stopgo.mission.frames.geodesy import Geodetic
 from stopgo.mission.frames.transform import SiteOrigin
-from stopgo.mission.mavlink.local_frame import how_far_off
+from stopgo.mission.mavlink.local_frame import origin_distance
 
 SITE = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=0.0)
 
@@ -24,4 +24,4 @@ SITE = SiteOrigin(lat=47.4, lon=8.5, alt=400.0, heading_deg=0.0)
     ],
 )
 def test_origins_within_five_centimetres_are_the_same(lat: float, lon: float, away: str) -> None:
-    assert how_far_off(SITE, Geodetic(lat=lat, lon=lon)) == away
+    assert origin_distance(SITE, Geodetic(lat=lat, lon=lon)) == away

@@ -63,7 +63,7 @@ def test_the_line_tells_sent_predicted_and_read():
     read = read_back(sent)
     read[2] = replace(read[2], x=515_000_007)
     assert differences(sent, read) == (
-        "item 2 (stop of S1): x sent 515000000, should be kept as 515000000, is 515000007",
+        "item 2 (stop of S1): x sent 515000000, expected back 515000000, is 515000007",
     )
 
 
@@ -77,7 +77,7 @@ def test_the_frame_of_an_item_without_a_place_means_nothing():
     assert newer != read_back(sent)
     assert differences(sent, newer) == ()
     relative = [replace(item, frame=MavFrame.GLOBAL_RELATIVE_ALT) for item in newer]
-    assert "frame sent 2, should be kept as 2, is 3" in differences(sent, relative)[0]
+    assert "frame sent 2, expected back 2, is 3" in differences(sent, relative)[0]
 
 
 def test_another_kind_of_vehicle_keeps_other_things():
@@ -85,7 +85,7 @@ def test_another_kind_of_vehicle_keeps_other_things():
     kept = [AUTOPILOTS["px4"].kept(item) for item in sent.items]
     assert differences(sent, kept, AUTOPILOTS["px4"]) == ()
     dropped = [ardupilot_keeps(item) for item in sent.items]
-    assert "param2 sent 0.05, should be kept as 0.05" in differences(sent, dropped, AUTOPILOTS["px4"])[1]
+    assert "param2 sent 0.05, expected back 0.05" in differences(sent, dropped, AUTOPILOTS["px4"])[1]
 
 
 def test_a_second_in_a_day_is_a_difference():

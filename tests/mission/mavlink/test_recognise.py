@@ -146,7 +146,7 @@ def test_where_nothing_waits_a_hold_is_the_scan():
 
 
 def test_plain_waypoints_are_stops_only_when_so_said():
-    with pytest.raises(InputError, match="nothing says which waypoints are scan stops"):
+    with pytest.raises(InputError, match="the scan stops among the waypoints are unknown"):
         round_in(waypoint(100), waypoint(200))
     found = round_in(waypoint(100), waypoint(200), plain_stops=True)
     assert [visit.scan_s for visit in found.visits] == [None, None]
@@ -179,7 +179,7 @@ def test_half_a_degree_is_fifty_kilometres_and_one_and_a_half_is_another_site():
         ([replace(waypoint(0), x=0, y=0)], r"item 1: NAV_WAYPOINT \(16\) is at 0, 0"),
         ([wait(1.0), waypoint(0)], r"item 1: waits or triggers come before the first waypoint"),
         ([waypoint(0), trigger(1), trigger(2), wait(1.0)], r"items 2 and 3 both trigger"),
-        ([], r"nothing says which waypoints"),
+        ([], r"the scan stops among the waypoints"),
     ],
 )
 def test_what_has_no_meaning_is_refused_by_number_and_name(items, told):

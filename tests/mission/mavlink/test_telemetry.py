@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from stopgo.mission.mavlink.telemetry import began_again, charge_of, is_lost, stands_still
+from stopgo.mission.mavlink.telemetry import charge_of, has_restarted, is_lost, stands_still
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,7 @@ def test_a_vehicle_is_lost_when_three_heartbeats_are_missing() -> None:
 
 
 def test_a_clock_that_goes_back_by_more_than_a_second_began_again() -> None:
-    assert [began_again(60_000, now_ms) for now_ms in (61_000, 59_500, 59_000, 58_999, 0)] == [
+    assert [has_restarted(60_000, now_ms) for now_ms in (61_000, 59_500, 59_000, 58_999, 0)] == [
         False, False, False, True, True,
     ]  # fmt: skip
 

@@ -256,7 +256,7 @@ def test_what_counts_as_reached_is_noted_by_parameter(name, within):
         ),
         (
             changed(square_tour(), georeference=SiteOrigin(lat=9.5, lon=181.0, alt=0.0, heading_deg=0.0)),
-            r"lon 181\.0 is no place on earth",
+            r"lon 181\.0 is not a position on Earth",
         ),
     ],
 )

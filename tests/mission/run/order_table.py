@@ -29,11 +29,11 @@ def effect(verb: Verb, place: DetailedState) -> str:
     """The state that an order leads to, or the reason for which it is refused."""
     decided = decide(_order(verb), _situation(place))
     if isinstance(decided, Decision):
-        return decided.change.run.place
+        return decided.change.run.detailed_state
     if decided.reason != "finished_before":
         return decided.reason
     again = decide(_order(verb, again=True), _situation(place))
-    return f"{again.change.run.place} with `again`" if isinstance(again, Decision) else again.reason
+    return f"{again.change.run.detailed_state} with `again`" if isinstance(again, Decision) else again.reason
 
 
 def _cell(effect: str) -> str:

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from stopgo.mission.document import ScannerSpec
-from stopgo.mission.run.scans import turned_away
+from stopgo.mission.run.scans import heading_error
 
 AROUND = ScannerSpec(profile="default", range=5.0)
 AHEAD = ScannerSpec(profile="default", range=5.0, fov_deg=90.0)
@@ -20,5 +20,5 @@ AHEAD = ScannerSpec(profile="default", range=5.0, fov_deg=90.0)
 def test_a_heading_missed_by_more_than_five_degrees_matters_to_a_scanner_that_looks_ahead(
     scanner: ScannerSpec, heading_deg: float, missing_deg: float
 ) -> None:
-    missing = turned_away(scanner, 0.0, math.radians(heading_deg))
+    missing = heading_error(scanner, 0.0, math.radians(heading_deg))
     assert math.degrees(missing) == pytest.approx(missing_deg)

@@ -112,7 +112,7 @@ def test_of_one_mission_of_several_no_share_is_asked_that_is_asked_of_all() -> N
     alone, one_of_two = (prove(item, made.space, COARSEST, None) for item in (made.mission, share))
     assert all(item.required for item in (*alone.rooms[:1], *alone.kinds))
     assert not any(item.required for item in (one_of_two.whole, *one_of_two.rooms, *one_of_two.kinds))
-    assert network_words(one_of_two)[0].startswith("of this mission, one of 2, all scans join")
+    assert network_words(one_of_two)[0].startswith("of this mission, one of 2, all scans are connected")
 
 
 def test_a_mission_without_stops_is_no() -> None:
@@ -248,4 +248,4 @@ def test_a_pair_that_is_to_register_and_does_not_is_caught() -> None:
     lying = changed(made.mission, network=promised)
     simulation = replace(COARSEST, range_m=3.0, joining_m=1.0)
     proof = prove(lying, made.space, simulation, None)
-    assert f"{names[0]} and {names[-1]}: are to register, and do not" in proof.unmet
+    assert f"{names[0]} and {names[-1]}: planned to register, but do not" in proof.unmet

@@ -27,7 +27,7 @@ SKIPPED = MISSION.stops[3].id
 
 
 def run_of(mission: Mission) -> RunLog:
-    """Every stop 12 mm beside its place and scanned, but for one that was skipped."""
+    """Every stop 12 mm from its stop and scanned, but for one that was skipped."""
     events: list[tuple[type, float, dict[str, Any]]] = [(Started, 0.0, {"commander": "me"})]
     for number, stop in enumerate(mission.stops):
         seconds, pose = 60.0 * (number + 1), at(stop.x + 0.012, stop.y, stop.heading)

@@ -68,7 +68,7 @@ def test_a_scan_during_which_the_estimate_jumps_is_told_with_its_deviation_every
     scan = next(event for event in site.events if isinstance(event, Scanned) and event.stop == "S1")
     away = deviation(scan.pose, first)
     assert 0.3 < away < 0.5
-    words = f"{1000 * away:.0f} mm beside its place (300 mm are tolerated)"
+    words = f"{1000 * away:.0f} mm from its stop (300 mm are tolerated)"
     assert len([line for line in said if "Scanned         S1" in line and words in line]) == 2
     assert state.outside == again.outside and "S1" in state.outside
     assert "scanned outside tolerance: S1" in state_line(state)

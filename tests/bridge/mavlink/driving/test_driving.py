@@ -90,7 +90,7 @@ def test_a_mission_without_georeference_is_refused(tmp_path: Path) -> None:
 def test_a_mission_from_another_origin_is_refused(tmp_path: Path) -> None:
     elsewhere = msgspec.structs.replace(SITE, lat=SITE.lat + 5e-6)
     with rover(tmp_path, "ardupilot") as (vehicle, _), gateway(tmp_path, vehicle.url) as station:
-        with pytest.raises(NegativeResult, match=r"origin \(47\.4.*\) lies 0\.56 m from the mission's"):
+        with pytest.raises(NegativeResult, match=r"origin \(47\.4.*\) is 0\.56 m from the mission's"):
             station.push(site_mission(site=elsewhere))
         with pytest.raises(NegativeResult, match="more than a kilometre"):
             station.push(site_mission(site=msgspec.structs.replace(SITE, lat=-SITE.lat)))
@@ -402,6 +402,6 @@ def test_a_scan_during_which_the_estimate_jumps_is_told_as_made_beside_its_stop(
         state = watch_showing(station, heard, Lines(said.append))
         assert station.status().outside == ("s1",)
     (line,) = [line for line in said if "Scanned         s1" in line]
-    away = float(re.findall(r"(\d+) mm beside its place \(50 mm are tolerated\)", line)[0])
+    away = float(re.findall(r"(\d+) mm from its stop \(50 mm are tolerated\)", line)[0])
     assert 85 <= away <= 155 and state.outside == ("s1",)
     assert tell_compared(heard, state, json_=True) == 1

@@ -57,7 +57,7 @@ def test_items_are_asked_for_as_the_profile_asks(make: Make) -> None:
 
 def test_a_lost_item_is_asked_for_again_until_the_vehicle_gives_up(make: Make) -> None:
     bench = make()
-    habits = bench.vehicle.autopilot.habits
+    habits = bench.vehicle.autopilot.behaviour
     bench.count(3)
     bench.pass_time(habits.give_up_s + 1, step_s=0.05)
     assert asked(bench) == [0] * (1 + math.floor(habits.give_up_s / habits.ask_again_s + 0.01))
@@ -93,7 +93,7 @@ def test_kinds_are_kept_apart(make: Make) -> None:
     assert [m.mission_type for m in bench.download(kind=1)] == [1, 1, 1]
     assert (bench.held(), bench.download(kind=2)) == ([], [])
     assert bench.upload(TOUR[:1], kind=1) == d.MAV_MISSION_UNSUPPORTED
-    assert len(bench.download(kind=1)) == 3 or not bench.vehicle.autopilot.habits.atomic
+    assert len(bench.download(kind=1)) == 3 or not bench.vehicle.autopilot.behaviour.atomic
 
 
 def test_an_unknown_kind_is_refused(make: Make) -> None:
@@ -159,7 +159,7 @@ def test_an_item_that_cannot_be_is_refused_and_ends_the_upload(make: Make, item:
     bench.upload(TOUR)
     assert bench.upload([TOUR[0], item, TOUR[1]]) == d.MAV_MISSION_ERROR  # no upload: nobody asked for that
     assert bench.results()[-2] == result
-    assert (bench.held() == bench.kept(TOUR)) == bench.vehicle.autopilot.habits.atomic
+    assert (bench.held() == bench.kept(TOUR)) == bench.vehicle.autopilot.behaviour.atomic
 
 
 def test_not_a_number_is_refused_where_the_autopilot_looks(make: Make) -> None:
@@ -172,7 +172,7 @@ def test_a_second_station_is_sent_away_during_an_upload(make: Make) -> None:
     bench = make()
     bench.count(3)
     bench.count(3, who=OTHER)
-    assert bench.results() == [bench.vehicle.autopilot.habits.other_station]
+    assert bench.results() == [bench.vehicle.autopilot.behaviour.other_station]
     assert bench.last("MISSION_ACK").target_system == OTHER.system
     bench.item(0, TOUR[0], who=OTHER)
     bench.item(0, TOUR[0])
@@ -231,7 +231,7 @@ def test_an_aborted_upload_leaves_a_mix_on_ardupilot_and_the_old_mission_elsewhe
         bench.item(number, new[number])
     bench.pass_time(20.0)
     mixed = [delay(7.0), *TOUR[1:3]]
-    assert bench.held() == bench.kept(TOUR if bench.vehicle.autopilot.habits.atomic else mixed)
+    assert bench.held() == bench.kept(TOUR if bench.vehicle.autopilot.behaviour.atomic else mixed)
 
 
 def test_an_item_that_was_not_asked_for(make: Make) -> None:
@@ -280,7 +280,7 @@ def test_cancelling_an_upload(make: Make) -> None:
     bench.say(d.MAVLink_mission_ack_message(1, 1, d.MAV_MISSION_OPERATION_CANCELLED, 0))
     before = len(asked(bench))
     bench.pass_time(1.25, step_s=0.25)
-    assert (len(asked(bench)) == before) == bench.vehicle.autopilot.habits.cancels
+    assert (len(asked(bench)) == before) == bench.vehicle.autopilot.behaviour.cancels
 
 
 def test_a_new_upload_in_the_middle_of_ones_own(make: Make) -> None:
@@ -289,7 +289,7 @@ def test_a_new_upload_in_the_middle_of_ones_own(make: Make) -> None:
     bench.count(len(listed))
     bench.item(0, listed[0])
     bench.count(len(listed))
-    if bench.vehicle.autopilot.habits.begins_again:
+    if bench.vehicle.autopilot.behaviour.begins_again:
         assert asked(bench) == [0, 1, 0]
     else:
         assert bench.results() == [d.MAV_MISSION_ERROR]
@@ -396,7 +396,7 @@ def test_a_reboot_in_the_middle_of_an_upload(make: Make) -> None:
     bench.upload(TOUR[:4])
     bench.pass_time(2.0)
     held = bench.held()
-    assert held == bench.kept([] if bench.vehicle.autopilot.habits.atomic else TOUR[: 3 - bench.first])
+    assert held == bench.kept([] if bench.vehicle.autopilot.behaviour.atomic else TOUR[: 3 - bench.first])
     assert bench.upload(TOUR) == ACCEPTED
     assert bench.last("MISSION_ACK").target_system == STATION.system
 
@@ -407,5 +407,5 @@ def test_items_marked_as_current(make: Make) -> None:
     bench.count(len(listed))
     for number, item in enumerate(listed):
         bench.say(item_message(number, item, current=int(number == 1 + bench.first)))
-    marked = 0 if bench.vehicle.autopilot.habits.restarts_item else 1
+    marked = 0 if bench.vehicle.autopilot.behaviour.restarts_item else 1
     assert bench.vehicle.auto.current == marked

@@ -66,7 +66,7 @@ def test_a_mission_is_driven_to_its_end(make: Make) -> None:
     assert bench.at() == pytest.approx((4.0, 3.0), abs=CLOSE_M if bench.first else 0.05)
     assert captures(bench) == [(0, 1)]
     assert bench.last("MISSION_CURRENT").mission_state == d.MISSION_STATE_COMPLETE
-    assert bench.vehicle.mode == bench.vehicle.autopilot.habits.done_mode
+    assert bench.vehicle.mode == bench.vehicle.autopilot.behaviour.done_mode
 
 
 def test_a_trigger_fires_when_the_wait_before_it_is_over_and_not_before(make: Make) -> None:
@@ -122,7 +122,9 @@ def test_pause_keeps_the_item_and_resume_goes_on_with_it(make: Make) -> None:
     assert bench.at() == stood
     assert 1.0 < stood[0] < 8.0
     assert bench.last("MISSION_CURRENT").seq == 1 + bench.first
-    paused = d.MISSION_STATE_PAUSED if bench.vehicle.autopilot.habits.pauses else d.MISSION_STATE_NOT_STARTED
+    paused = (
+        d.MISSION_STATE_PAUSED if bench.vehicle.autopilot.behaviour.pauses else d.MISSION_STATE_NOT_STARTED
+    )
     assert bench.last("MISSION_CURRENT").mission_state == paused
     assert bench.mode("auto") == OBEYED
     bench.pass_time(40.0)
@@ -156,7 +158,7 @@ def test_an_armed_vehicle_does_not_reboot(make: Make) -> None:
 def test_a_mission_starts_at_the_item_that_was_set(make: Make) -> None:
     bench = make()
     bench.upload([delay(1.0), delay(2.0), delay(3.0)])
-    if bench.vehicle.autopilot.habits.jumps_by_command:
+    if bench.vehicle.autopilot.behaviour.jumps_by_command:
         assert bench.command(Command.DO_SET_MISSION_CURRENT, 2 + bench.first) == OBEYED
         assert bench.command(Command.DO_SET_MISSION_CURRENT, 77) == d.MAV_RESULT_DENIED
         assert bench.command(Command.DO_SET_MISSION_CURRENT, math.nan) == d.MAV_RESULT_DENIED
@@ -196,7 +198,7 @@ def test_an_upload_while_the_mission_runs(make: Make) -> None:
     bench.start()
     bench.pass_time(7.0)
     bench.upload([delay(50.0), delay(60.0), delay(70.0)])
-    restarts = bench.vehicle.autopilot.habits.restarts_item
+    restarts = bench.vehicle.autopilot.behaviour.restarts_item
     assert bench.vehicle.auto.current == (1 if restarts else 0) + bench.first
     assert bench.vehicle.auto.state == "active"
     bench.pass_time(49.0)

@@ -8,7 +8,13 @@ import pytest
 from stopgo.mission.document import ScannerSpec
 from stopgo.mission.mavlink.following.listed_mission import ListedMission, listed_mission
 from stopgo.mission.mavlink.following.resuming import resume_place
-from stopgo.mission.mavlink.following.steps import Observation, held_by_vehicle, passed_by, steps, taken_over
+from stopgo.mission.mavlink.following.steps import (
+    Observation,
+    after_skipped,
+    run_on_vehicle,
+    steps,
+    taken_over,
+)
 from stopgo.mission.mavlink.translate import translate
 from stopgo.mission.run.events import AnyEvent, Pose
 from stopgo.mission.run.scans import ScanFailed, ScanResult
@@ -90,7 +96,7 @@ def test_a_scan_that_nobody_confirms_is_unconfirmed_once_it_is_in_vain_to_wait()
     mine, items = listed(), listed().stops[1]
     scanning = going(stop_state="SCANNING", leg=2)
     assert after(scanning, mine, seen(items.after, stood=S2_AT))[0] == []
-    words, run = after(scanning, mine, seen(items.after, stood=S2_AT, in_vain=True))
+    words, run = after(scanning, mine, seen(items.after, stood=S2_AT, report_overdue=True))
     assert words == ["Unconfirmed S2"] and run.done == ("S1", "S2")
 
 
@@ -119,9 +125,9 @@ def test_a_scan_under_way_outlives_a_hold_and_nothing_else(mode: str) -> None:
 def test_a_vehicle_that_waits_at_a_stop_that_was_left_out_is_led_past_it() -> None:
     mine, (_, items, last) = listed(), listed().stops
     skipped = going(at=2, skipped=("S2",), leg=1)
-    assert passed_by(skipped, mine, seen(items.at)) is None
-    assert passed_by(skipped, mine, seen(items.scan)) == last.first
-    assert passed_by(going(at=2, done=("S1", "S2")), mine, seen(items.scan)) is None
+    assert after_skipped(skipped, mine, seen(items.at)) is None
+    assert after_skipped(skipped, mine, seen(items.scan)) == last.first
+    assert after_skipped(going(at=2, done=("S1", "S2")), mine, seen(items.scan)) is None
 
 
 @pytest.mark.parametrize(
@@ -183,7 +189,7 @@ def test_a_scanner_that_does_not_see_all_around_must_face_the_right_way() -> Non
 
 def test_a_mission_that_somebody_has_cleared_does_not_lie_ready() -> None:
     ready = Run(state="READY", mission_id="m", revision=1)
-    assert held_by_vehicle(ready, 0) == Run()
+    assert run_on_vehicle(ready, 0) == Run()
     for items in (None, 14):
-        assert held_by_vehicle(ready, items) == ready
-    assert held_by_vehicle(going(), 0) == going()
+        assert run_on_vehicle(ready, items) == ready
+    assert run_on_vehicle(going(), 0) == going()
