@@ -12,8 +12,8 @@ from stopgo.mission.stages import AT_EDGE, IN_HOLE, OTHER_PART, TOO_CLOSE, UNREA
 from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.space.floor_gaps import gap_before
 from stopgo.planner.space.opening_joins import PROBES
-from stopgo.planner.space.place import Place
 from stopgo.planner.space.reach import reach_of
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 LEAST_AREA = 0.01
 """Rooms smaller than this (m²) are not told of."""
@@ -82,13 +82,13 @@ def _why(candidates: Candidates, index: int, reasons: set[int], parts: frozenset
 def _smaller_d_sec(candidates: Candidates, index: int) -> str:
     """The greatest d_sec, in whole centimetres, that leaves a place for a stop, if the robot fits there."""
     space = candidates.space
-    place = Place(space)
-    free = place.rooms[index].difference(place.obstacles)
+    feasibility = StopFeasibility(space)
+    free = feasibility.rooms[index].difference(feasibility.obstacles)
     if free.is_empty:
         return ""
     middle = shapely.get_coordinates(shapely.maximum_inscribed_circle(free, tolerance=1e-3))[:1]
-    d_sec = math.floor(100 * float(place.to_element(middle)[0]) + 1e-6) / 100
-    fits = d_sec >= space.settings.radius and place.to_edge(middle)[0] >= space.settings.edge
+    d_sec = math.floor(100 * float(feasibility.to_element(middle)[0]) + 1e-6) / 100
+    fits = d_sec >= space.settings.radius and feasibility.to_edge(middle)[0] >= space.settings.edge
     return f"; --d-sec {d_sec:g} leaves one" if fits and d_sec < space.settings.d_sec else ""
 
 

@@ -32,8 +32,8 @@ from stopgo.planner.candidates.grid import grid
 from stopgo.planner.candidates.proposals import Proposals, in_order, joined
 from stopgo.planner.candidates.triangulation import triangulation
 from stopgo.planner.geometry.shapes import local_origin
-from stopgo.planner.space.place import Place
 from stopgo.planner.space.reach import Reach, reach_of
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 Strategy = Callable[[NavigableSpace], tuple[FloatArray, IntArray] | tuple[FloatArray, IntArray, IntArray]]
 STRATEGIES: dict[str, Strategy] = {"grid": grid, "triangulation": triangulation}
@@ -45,22 +45,22 @@ def candidates(space: NavigableSpace, *, part: int | None = None) -> Candidates:
     `part` counts from the largest; None takes the part that holds the start, else the largest that
     has candidates and a room.
     """
-    place = Place(space)
-    found = _from_strategy(place)
-    given = [places_to_use(place), found, _for_empty_rooms(place, found), doorways(space)]
-    proposals = in_order(joined(given), place.rooms)
+    feasibility = StopFeasibility(space)
+    found = _from_strategy(feasibility)
+    given = [places_to_use(feasibility), found, _for_empty_rooms(feasibility, found), doorways(space)]
+    proposals = in_order(joined(given), feasibility.rooms)
     return _of_part(space, proposals, part)
 
 
 def judged(space: NavigableSpace, xy: FloatArray, room: IntArray, *, part: int) -> Candidates:
     """Places (n, 2) of one's own as candidates of one part, each with its reason."""
-    reason = Place(space).reasons(xy, room)
+    reason = StopFeasibility(space).reasons(xy, room)
     return _of_part(space, Proposals.of(xy, room, reason), part)
 
 
-def _from_strategy(place: Place) -> Proposals:
-    xy, room, early = _generated(place.space)
-    reason = place.reasons(xy, room)
+def _from_strategy(feasibility: StopFeasibility) -> Proposals:
+    xy, room, early = _generated(feasibility.space)
+    reason = feasibility.reasons(xy, room)
     return Proposals.of(xy, room, reason if early is None else np.where(early == KEPT, reason, early))
 
 
@@ -75,11 +75,11 @@ def _generated(space: NavigableSpace) -> tuple[FloatArray, IntArray, IntArray | 
     return xy, room, method.indices(given[2], "reason", length=len(xy), below=len(DROP_REASONS))
 
 
-def _for_empty_rooms(place: Place, found: Proposals) -> Proposals:
+def _for_empty_rooms(feasibility: StopFeasibility, found: Proposals) -> Proposals:
     """The best point of every room that the strategy left without a candidate."""
     kept = set(found.room[found.reason == KEPT].tolist())
-    empty = [k for k in range(len(place.space.rooms)) if k not in kept]
-    best = [(k, point) for k in empty if (point := best_point(place, k)) is not None]
+    empty = [k for k in range(len(feasibility.space.rooms)) if k not in kept]
+    best = [(k, point) for k in empty if (point := best_point(feasibility, k)) is not None]
     return Proposals.of([point for _, point in best], [k for k, _ in best])
 
 
@@ -141,7 +141,7 @@ def _part_of_start(space: NavigableSpace, reach: Reach, held: set[int]) -> int:
     if found < 0:
         raise InputError(
             f"start = {x:g},{y:g}: the robot (radius {space.settings.radius:g} m) does not fit there; "
-            "choose a place clear of walls and floor edges"
+            "choose a position clear of walls and floor edges"
         )
     if found not in held:
         raise NegativeResult(f"start = {x:g},{y:g}: no scan position can be reached from there")

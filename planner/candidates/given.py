@@ -11,7 +11,7 @@ from stopgo.mission.stages import DROP_REASONS, KEPT, NavigableSpace, OpeningSta
 from stopgo.planner.candidates.proposals import Proposals
 from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.space.opening_joins import widest_clear
-from stopgo.planner.space.place import Place
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 
 def doorways(space: NavigableSpace) -> Proposals:
@@ -33,18 +33,18 @@ def _middle(space: NavigableSpace, state: OpeningState, obstacles: shapely.Geome
     return shapely.get_coordinates(widest)[[0, -1]].mean(axis=0) + origin
 
 
-def places_to_use(place: Place) -> Proposals:
+def places_to_use(feasibility: StopFeasibility) -> Proposals:
     """The user's own stops.
 
     Raises
     ------
     InputError
-        Where no stop may be, naming the place and the reason.
+        Where no stop may be, naming the feasibility and the reason.
     """
-    points = np.array(place.space.settings.use, dtype=np.float64).reshape(-1, 2)
-    rooms = [place.room_at(point) for point in points]
+    points = np.array(feasibility.space.settings.use, dtype=np.float64).reshape(-1, 2)
+    rooms = [feasibility.room_at(point) for point in points]
     for point, room in zip(points, rooms, strict=True):
-        reason = int(place.reasons(point[None], np.array([room]))[0])
+        reason = int(feasibility.reasons(point[None], np.array([room]))[0])
         if reason != KEPT:
             raise InputError(f"use = {point[0]:g},{point[1]:g}: no stop may be there, {DROP_REASONS[reason]}")
     return Proposals.of(points, rooms, must=True)

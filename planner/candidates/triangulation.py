@@ -18,7 +18,7 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import KEPT, SLIVER, TOO_SMALL, NavigableSpace
 from stopgo.planner.geometry.room_grid import main_axes
 from stopgo.planner.geometry.shapes import GRID, one_shape, polygon_parts, roughly_widened, segments_of
-from stopgo.planner.space.place import Place
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 LEAST_ANGLE = float(np.arcsin(1 / 6))
 """alpha_min in radians: sin alpha_min = l_min / (6 l_min) (paper, Eq. 2), 9.594° whatever l_min is."""
@@ -34,10 +34,10 @@ ROUNDS = 4
 
 def triangulation(space: NavigableSpace) -> tuple[FloatArray, IntArray, IntArray]:
     """Candidates of every room: position, room, and the reason for those of bad triangles."""
-    place = Place(space)
-    drawn = DrawnBoundary.of(place)
-    per_room = [room_candidates(place, drawn, room) for room in range(len(space.rooms))]
-    xy = np.concatenate([np.empty((0, 2)), *(points for points, _ in per_room)]) + place.origin
+    feasibility = StopFeasibility(space)
+    drawn = DrawnBoundary.of(feasibility)
+    per_room = [room_candidates(feasibility, drawn, room) for room in range(len(space.rooms))]
+    xy = np.concatenate([np.empty((0, 2)), *(points for points, _ in per_room)]) + feasibility.origin
     reason = np.concatenate([np.empty(0, np.int64), *(early for _, early in per_room)])
     room = np.repeat(np.arange(len(per_room)), [len(points) for points, _ in per_room])
     return xy, room.astype(np.int64), reason
@@ -53,14 +53,14 @@ class DrawnBoundary:
     """Centres of columns or round elements (n, 2)."""
 
     @classmethod
-    def of(cls, place: Place) -> DrawnBoundary:
+    def of(cls, feasibility: StopFeasibility) -> DrawnBoundary:
         """Columns' centres where the floor has no rooms; else the elements' outlines."""
-        floor = place.space.floor
+        floor = feasibility.space.floor
         if not floor.rooms:
             columns = [solid for item in floor.elements if item.kind == "columns" for solid in item.solids]
-            middles = [one_shape(column, place.origin).centroid for column in columns]
+            middles = [one_shape(column, feasibility.origin).centroid for column in columns]
             return cls(shapely.linestrings(np.empty((0, 2, 2))), shapely.get_coordinates(middles))
-        parts = polygon_parts(place.obstacles)
+        parts = polygon_parts(feasibility.obstacles)
         cornered = shapely.MultiPolygon([part for part in parts if not is_round(part)])
         centres = shapely.get_coordinates([part.centroid for part in parts if is_round(part)])
         return cls(shapely.linestrings(segments_of(cornered)), centres)
@@ -73,31 +73,33 @@ def is_round(solid: shapely.Polygon) -> bool:
     return len(corners) >= 8 and float(np.ptp(radius)) < 0.01 * float(radius.max())
 
 
-def room_candidates(place: Place, drawn: DrawnBoundary, room: int) -> tuple[FloatArray, IntArray]:
+def room_candidates(
+    feasibility: StopFeasibility, drawn: DrawnBoundary, room: int
+) -> tuple[FloatArray, IntArray]:
     """Candidates (n, 2) of one room in the local frame, with TOO_SMALL, SLIVER or KEPT for each.
 
     While less than dens_min candidates per m² are left, they become seeds too, as long as that gains.
     """
-    settings, shape = place.space.settings, place.rooms[room]
+    settings, shape = feasibility.space.settings, feasibility.rooms[room]
     seeds = seeds_of(shape, drawn, d_max=settings.d_max)
     best = triangulated(seeds, shape, l_min=settings.l_min)
-    left = _left(place, room, *best)
+    left = _left(feasibility, room, *best)
     for _ in range(ROUNDS):
         if left >= settings.dens_min * shape.area:
             break
         points, early = best
         seeds = np.concatenate([seeds, points[early == KEPT]])
         finer = triangulated(seeds, shape, l_min=settings.l_min)
-        if _left(place, room, *finer) <= left:
+        if _left(feasibility, room, *finer) <= left:
             break
-        best, left = finer, _left(place, room, *finer)
+        best, left = finer, _left(feasibility, room, *finer)
     return best
 
 
-def _left(place: Place, room: int, points: FloatArray, early: IntArray) -> int:
+def _left(feasibility: StopFeasibility, room: int, points: FloatArray, early: IntArray) -> int:
     """How many of the candidates a stop may be at."""
     kept = points[early == KEPT]
-    reason = place.reasons(kept + place.origin, np.full(len(kept), room))
+    reason = feasibility.reasons(kept + feasibility.origin, np.full(len(kept), room))
     return int(np.count_nonzero(reason == KEPT))
 
 

@@ -11,7 +11,7 @@ from stopgo.mission.stages import AT_EDGE, AVOIDED, IN_HOLE, KEPT, OUTSIDE, TOO_
 from stopgo.planner.geometry.shapes import SLACK, boundary_lines, local_origin, to_shape
 
 
-class Place:
+class StopFeasibility:
     """A navigable space, prepared for deciding at which positions a stop is allowed."""
 
     def __init__(self, space: NavigableSpace) -> None:
