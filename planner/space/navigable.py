@@ -14,7 +14,7 @@ from stopgo.planner.geometry.shapes import local_origin, to_polygons
 from stopgo.planner.space.facing import faced_rooms
 from stopgo.planner.space.ground import Ground, drivable
 from stopgo.planner.space.opening_joins import Crossing, barrier
-from stopgo.planner.space.passable import opening_states
+from stopgo.planner.space.opening_states import opening_states
 from stopgo.planner.space.room_spaces import room_spaces
 from stopgo.planner.space.targets import occluders_of, targets_of
 
