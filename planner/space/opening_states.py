@@ -17,7 +17,7 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState
 from stopgo.planner.geometry.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
-from stopgo.planner.space.connected import Parts, parts_of
+from stopgo.planner.space.connected_parts import Parts, parts_of
 from stopgo.planner.space.gaps import Gap, gaps_between
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.opening_joins import Crossing, middle_and_normal

@@ -13,7 +13,7 @@ from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.instance_cache import kept
 from stopgo.planner.geometry.shapes import GRID, boundary_lines, local_origin, segments_of, to_shape
-from stopgo.planner.space.connected import Parts, parts_of
+from stopgo.planner.space.connected_parts import Parts, parts_of
 from stopgo.planner.space.gaps import Site, Walls
 
 INSIDE = 3 * GRID

@@ -20,7 +20,7 @@ from stopgo.mission.stages import KEPT, Candidates, NavigableSpace
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors.dxf import floor_in
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, to_shape
-from stopgo.planner.space.connected import parts_of
+from stopgo.planner.space.connected_parts import parts_of
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility.exact_sight import open_space
 from stopgo.planner.visibility.sight.sight import Scene, scene_of, sight
