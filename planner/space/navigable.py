@@ -11,7 +11,7 @@ from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.shapes import local_origin, to_polygons
-from stopgo.planner.space.facing import faced_rooms
+from stopgo.planner.space.faced_rooms import faced_rooms
 from stopgo.planner.space.ground import Ground, drivable
 from stopgo.planner.space.opening_joins import Crossing, barrier
 from stopgo.planner.space.opening_states import opening_states
