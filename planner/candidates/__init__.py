@@ -27,7 +27,7 @@ from stopgo.mission.stages import (
     NavigableSpace,
 )
 from stopgo.planner.candidates.fallback import best_point
-from stopgo.planner.candidates.given import doorways, places_to_use
+from stopgo.planner.candidates.fixed_positions import doorways, places_to_use
 from stopgo.planner.candidates.grid import grid
 from stopgo.planner.candidates.proposals import Proposals, in_order, joined
 from stopgo.planner.candidates.triangulation import triangulation
