@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
-from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import SLACK, local_origin, polygon_parts, segments_of, to_shape
 from stopgo.planner.space.reach import INSIDE, reach_of
 
@@ -55,7 +55,7 @@ def gap_before(space: NavigableSpace, shape: BaseGeometry, parts: Set[int]) -> s
     return f"a gap of {width.min():.3f} m in the floor at ({x:.2f}, {y:.2f})"
 
 
-@kept
+@instance_cached
 def _gaps_of(space: NavigableSpace) -> FloorGaps:
     """Every gap of a space, measured at each point of its edges."""
     ground = to_shape(space.ground, local_origin(space.floor))

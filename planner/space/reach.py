@@ -11,7 +11,7 @@ import shapely
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
-from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import GRID, boundary_lines, local_origin, segments_of, to_shape
 from stopgo.planner.space.connected_parts import Parts, parts_of
 from stopgo.planner.space.gaps import Site, Walls
@@ -77,7 +77,7 @@ class Reach:
         return no_anchor
 
 
-@kept
+@instance_cached
 def reach_of(space: NavigableSpace) -> Reach:
     """Return the space's reachability, prepared once."""
     return Reach(space)

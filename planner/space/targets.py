@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import FloatArray, frozen, polyline_length
 from stopgo.mission.stages import Targets
-from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import (
     GRID,
     local_origin,
@@ -51,7 +51,7 @@ def occluders_of(floor: FloorPlan, closed: FloatArray) -> BaseGeometry:
     return without_needless_vertices(without_cracks(snapped_union([*_occluding(floor)[1], *doors])), floor)
 
 
-@kept
+@instance_cached
 def _occluding(floor: FloorPlan) -> tuple[list[int], NDArray[np.object_]]:
     """The occluding elements and their solids, on the grid."""
     origin = local_origin(floor)
