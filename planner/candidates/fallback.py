@@ -1,4 +1,4 @@
-"""A candidate for rooms too small for the grid: the best point of them, if any point is allowed."""
+"""Candidate for a room too small for the grid: its best point, if any point is allowed."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Triangulation candidates: middles of Delaunay triangles and Voronoi points of each room (paper, 3.2.2).
 
-Seeds are what the drawing gives: without rooms the floor's contour and the columns' centres, with rooms
-each room's contour, the corners of the elements in it and the centres of round ones.
+Seeds come from the drawing. Without rooms they are the floor's contour and the columns' centres. With rooms
+they are each room's contour, the corners of the elements in it and the centres of round elements.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from stopgo.planner.space.stop_feasibility import StopFeasibility
 LEAST_ANGLE = float(np.arcsin(1 / 6))
 """alpha_min in radians: sin alpha_min = l_min / (6 l_min) (paper, Eq. 2), 9.594° whatever l_min is."""
 STEP = 1e-3
-"""Seeds are rounded to this (m) in the room's own axes: float noise must not turn Delaunay's diagonals."""
+"""Seeds are rounded to this (m) in the room's own axes: float noise must not flip Delaunay's diagonals."""
 SAME = 0.01
 """Seeds and candidates closer than this (m) are one."""
 AT_ROOM = 1e-3
 """Elements this close to a room (m) are the room's own."""
 ROUNDS = 4
-"""How often a room that is not dense enough is triangulated again."""
+"""Maximum number of repeated triangulations of a room that is not dense enough."""
 
 
 def triangulation(space: NavigableSpace) -> tuple[FloatArray, IntArray, IntArray]:
@@ -45,7 +45,7 @@ def triangulation(space: NavigableSpace) -> tuple[FloatArray, IntArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class DrawnBoundary:
-    """What seeds are made of, beside the rooms' contours; local frame."""
+    """Sources of seeds in addition to the rooms' contours; local frame."""
 
     edges: FloatArray
     """Element edges as shapely lines (n,)."""
@@ -67,7 +67,7 @@ class DrawnBoundary:
 
 
 def is_round(solid: shapely.Polygon) -> bool:
-    """Whether a solid's corners lie on a circle, as those of a discretised column do (Eq. 1)."""
+    """True if a solid's corners lie on a circle, like those of a discretised column (Eq. 1)."""
     corners = shapely.get_coordinates(solid)[:-1]
     radius = np.hypot(*(corners - corners.mean(axis=0)).T)
     return len(corners) >= 8 and float(np.ptp(radius)) < 0.01 * float(radius.max())
@@ -78,28 +78,28 @@ def room_candidates(
 ) -> tuple[FloatArray, IntArray]:
     """Candidates (n, 2) of one room in the local frame, with TOO_SMALL, SLIVER or KEPT for each.
 
-    While less than dens_min candidates per m² are left, they become seeds too, as long as that gains.
+    While fewer than dens_min candidates per m² remain, they become seeds too, if this adds candidates.
     """
     settings, shape = feasibility.space.settings, feasibility.rooms[room]
     seeds = seeds_of(shape, drawn, d_max=settings.d_max)
     best = triangulated(seeds, shape, l_min=settings.l_min)
-    left = _left(feasibility, room, *best)
+    allowed = _allowed_count(feasibility, room, *best)
     for _ in range(ROUNDS):
-        if left >= settings.dens_min * shape.area:
+        if allowed >= settings.dens_min * shape.area:
             break
         points, early = best
         seeds = np.concatenate([seeds, points[early == KEPT]])
         finer = triangulated(seeds, shape, l_min=settings.l_min)
-        if _left(feasibility, room, *finer) <= left:
+        if _allowed_count(feasibility, room, *finer) <= allowed:
             break
-        best, left = finer, _left(feasibility, room, *finer)
+        best, allowed = finer, _allowed_count(feasibility, room, *finer)
     return best
 
 
-def _left(feasibility: StopFeasibility, room: int, points: FloatArray, early: IntArray) -> int:
-    """How many of the candidates a stop may be at."""
-    kept = points[early == KEPT]
-    reason = feasibility.reasons(kept + feasibility.origin, np.full(len(kept), room))
+def _allowed_count(feasibility: StopFeasibility, room: int, points: FloatArray, early: IntArray) -> int:
+    """Number of the candidates at which a stop is allowed."""
+    usable = points[early == KEPT]
+    reason = feasibility.reasons(usable + feasibility.origin, np.full(len(usable), room))
     return int(np.count_nonzero(reason == KEPT))
 
 
@@ -114,7 +114,7 @@ def seeds_of(shape: BaseGeometry, drawn: DrawnBoundary, *, d_max: float) -> Floa
 
 
 def triangulated(seeds: FloatArray, shape: BaseGeometry, *, l_min: float) -> tuple[FloatArray, IntArray]:
-    """Middles of all triangles, then the Voronoi points inside, and what is wrong with each triangle.
+    """Middles of all triangles, then the Voronoi points inside, and the reason against each bad triangle.
 
     Points are taken in the room's own axes, rounded and sorted, so that the result depends on neither
     the drawing's angle nor the order of its entities.
@@ -144,7 +144,7 @@ def distinct(points: FloatArray) -> FloatArray:
 
 
 def voronoi_points(points: FloatArray) -> FloatArray:
-    """Corners of the Voronoi cells of `points` (n, 2); none where all lie on a line."""
+    """Corners of the Voronoi cells of `points` (n, 2); none if all lie on a line."""
     from scipy.spatial import Voronoi
 
     found = _by_qhull(Voronoi, points)
@@ -152,7 +152,7 @@ def voronoi_points(points: FloatArray) -> FloatArray:
 
 
 def delaunay(points: FloatArray) -> IntArray:
-    """Corners (t, 3) of the Delaunay triangles of `points` (n, 2); none where all lie on a line."""
+    """Corners (t, 3) of the Delaunay triangles of `points` (n, 2); none if all lie on a line."""
     from scipy.spatial import Delaunay
 
     found = _by_qhull(Delaunay, points)

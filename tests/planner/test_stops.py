@@ -246,7 +246,7 @@ def test_a_strip_between_two_gaps_is_told_with_one_of_them() -> None:
     )
     told = told_of(floor)
     assert told["strip"].startswith(
-        "no place 0.35 m from the floor's edges (a gap of 0.100 m in the floor at"
+        "no position 0.35 m from the floor's edges (a gap of 0.100 m in the floor at"
     )
 
 
