@@ -157,7 +157,7 @@ def test_what_cannot_be_seen_as_asked_is_told_and_strict_refuses_it() -> None:
     made = plan(closet, Settings(views=9)).first
     assert [item.code for item in made.figures.grave] == ["limits_not_met"]
     assert "from 9 stops" in made.figures.grave[0].message
-    assert PlanReport(made, {}, {}).strict_answer == 1
+    assert PlanReport(made, {}, {}).strict_exit_code == 1
     assert made.figures.whole.coverage >= 0.9
 
 
