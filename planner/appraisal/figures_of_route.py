@@ -10,7 +10,7 @@ from stopgo.mission.stages import Candidates, Route, Selection
 from stopgo.mission.stages.coverage_totals import ledger_of
 from stopgo.mission.stages.covered_intervals import seen_units
 from stopgo.mission.stages.figures import Figures, Shares
-from stopgo.planner.appraisal.plausible import near_legs, plausibility_findings
+from stopgo.planner.appraisal.plausibility import near_legs, plausibility_findings
 from stopgo.planner.appraisal.quality import NOT_MET, not_met, quality_of
 from stopgo.planner.appraisal.unreached import unreached
 from stopgo.planner.geometry.shapes import local_origin, to_shape
