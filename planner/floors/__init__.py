@@ -1,4 +1,4 @@
-"""Reads a building floor from a file: one module per kind of file, one entry in `READERS` for each.
+"""Readers of building floors: one module per kind of file, one entry in `READERS` for each.
 
 A reader's module has two functions, `survey(file, options) -> Survey` and `read(file, options) -> FloorPlan`
 (stopgo.planner.floors.reader.ReaderModule). It is found by the file's suffix and by what its bytes look like,
@@ -56,7 +56,7 @@ def _is_zipped_model(data: bytes) -> bool:
 
 
 def read_floor(path: Path, options: FloorOptions | None = None) -> FloorPlan:
-    """The floor in a file, in metres.
+    """Read the floor in a file, in metres.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def read_floor(path: Path, options: FloorOptions | None = None) -> FloorPlan:
 
 
 def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
-    """What is in a floor's file, and what would be read of it with these options.
+    """Return the survey of a floor's file: its contents, and the floor that these options give.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
 
 
 def options_of(settings: Settings) -> FloorOptions:
-    """What a plan's settings tell a reader."""
+    """Return the reader's options from a plan's settings."""
     told = {name: getattr(settings, name) for name in FLOOR_PARAMETERS}
     columns = (entry.partition("=") for entry in told.pop("schedule_columns"))
     schedule = told.pop("schedule")
@@ -100,7 +100,7 @@ def options_of(settings: Settings) -> FloorOptions:
 
 
 def _opened(path: Path, options: FloorOptions | None) -> tuple[FloorFile, Variant[Reader], FloorOptions]:
-    """The file, its reader, and the options, all of which mean something to the reader."""
+    """Return the file, its reader, and the options; refuse options that do not apply to the reader."""
     options = options or FloorOptions()
     file = FloorFile(path, _bytes_of(path))
     reader = _reader_of(file)
@@ -115,7 +115,7 @@ def _opened(path: Path, options: FloorOptions | None) -> tuple[FloorFile, Varian
 
 
 def _reader_of(file: FloorFile) -> Variant[Reader]:
-    """By suffix, unless the bytes are plainly those of another kind."""
+    """Choose the reader by suffix, unless the bytes are clearly those of another kind."""
     suffix = file.path.suffix.lower()
     named = [reader for reader in READERS if suffix in reader.suffixes]
     alike = [reader for reader in READERS if reader.holds(file.data)]
@@ -131,7 +131,7 @@ def _reader_of(file: FloorFile) -> Variant[Reader]:
 
 
 def _option(name: str) -> str:
-    """How the command line calls an option."""
+    """Return the name of an option on the command line."""
     return {"layers": "layer", "layer_map": "layers", "schedule_columns": "schedule-column"}.get(
         name, name.replace("_", "-")
     )

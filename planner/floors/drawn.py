@@ -1,4 +1,4 @@
-"""Sorts the strokes of a layer into closed shapes and open lines, each once, in an order of their own.
+"""Shapes of a layer: its strokes as closed shapes and open lines, each once, in a canonical order.
 
 The order is that of the geometry, so that nothing later depends on the order in which a drawing was made.
 """
@@ -30,14 +30,14 @@ from stopgo.planner.floors.strokes import Stroke
 
 @dataclass(frozen=True)
 class Oddity:
-    """What is odd about a thing that has no id yet."""
+    """An anomaly of an object that has no id yet."""
 
     code: str
     text: str
     at: tuple[float, float] | None = None
 
     def about(self, element: str) -> Finding:
-        """The finding, once the thing is called `element`."""
+        """Return the finding about the element with this id."""
         return Finding(self.code, f"{element}: {self.text}", element=element, at=self.at)
 
 
@@ -48,7 +48,7 @@ class Closed:
     region: Region
     layer: str
     clockwise: bool = False
-    """How the ring was drawn; a hole is drawn against the shape around it."""
+    """Direction of the drawn ring; a hole has the opposite direction to the shape around it."""
     global_id: str | None = None
     fill: bool = False
     """A hatch, which often fills an outline that is drawn as well."""
@@ -68,7 +68,7 @@ class Open:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """All that is drawn on one layer, each thing once."""
+    """All shapes drawn on one layer, each once."""
 
     closed: tuple[Closed, ...] = ()
     open: tuple[Open, ...] = ()
@@ -110,7 +110,7 @@ def _shape(stroke: Stroke, *, gap: float) -> Closed | Open:
 
 
 def _repeats(stroke: Stroke, points: FloatArray) -> tuple[Oddity, ...]:
-    """Repeated points are dropped; more than the usual closing one is worth telling."""
+    """Report dropped points; one repeated closing point is normal and not reported."""
     dropped = len(stroke.points) - len(points)
     if not dropped or len(points) < 2:
         return ()
@@ -131,7 +131,7 @@ def _gap(points: FloatArray) -> tuple[Oddity, ...]:
 
 
 def place(points: FloatArray) -> tuple[float, float]:
-    """Where a finding points to: the lexicographically smallest point."""
+    """Position of a finding: the lexicographically smallest point."""
     x, y = min(map(tuple, points.tolist()))
     return (x, y)
 
@@ -147,7 +147,7 @@ def _closed_key(shape: Closed) -> tuple:
 
 
 def region_key(region: Region) -> tuple:
-    """An order of regions by place and then by every coordinate."""
+    """Sort key of regions: by position and then by every coordinate."""
     rings = [canonical_ring(part.exterior).tolist() for part in shapely.get_parts(region)]
     return (*np.round(region.bounds, 6).tolist(), rings)
 
@@ -157,7 +157,7 @@ def _open_key(line: Open) -> tuple:
 
 
 def _without_fills(shapes: Sequence[Closed]) -> list[Closed]:
-    """Without hatches that fill outlines drawn on the same layer."""
+    """Return the shapes without hatches that fill outlines drawn on the same layer."""
     if not any(shape.fill for shape in shapes):
         return list(shapes)
     drawn_area = shapely.union_all([shape.region for shape in shapes if not shape.fill])
@@ -197,7 +197,7 @@ def _copies(count: int, at: Iterable[float]) -> tuple[Oddity, ...]:
 def hole_indices(
     shapes: Sequence[Closed], above: Sequence[int | None], is_hole: Callable[[Closed, Closed], bool]
 ) -> set[int]:
-    """Which shapes are holes of the one around them; what lies in a hole is solid again."""
+    """Indices of shapes that are holes of the shape around them; a shape in a hole is solid again."""
     holes: set[int] = set()
     for index in sorted(range(len(shapes)), key=lambda item: -shapes[item].region.area):
         parent = above[index]
@@ -209,7 +209,7 @@ def hole_indices(
 def faces_of(
     lines: Sequence[Open], *, merge: bool, gap: float
 ) -> tuple[list[Closed], list[Open], list[Oddity]]:
-    """What open lines enclose together, the lines that enclose nothing, and the gaps that were closed."""
+    """Return areas enclosed by open lines together, lines that enclose nothing, and the gaps closed."""
     enclosed = joined([line.points for line in lines], merge=merge, gap=gap)
     faces = [Closed(face, lines[0].layer) for face in enclosed.faces]
     loose = [lines[index] for index in enclosed.loose]

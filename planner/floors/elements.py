@@ -1,4 +1,4 @@
-"""Makes the elements: filled shapes with their holes, and open lines, one element per thing drawn."""
+"""Elements of a floor: filled shapes with their holes, and open lines, one element per drawn object."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NEAR = 1.0
 _OUTLINES = ("walls", "windows", "railings", "other")
 """Kinds that people also draw as a ring around something that is not solid."""
 _STANDING = 0.35
-"""Half of the width in metres that no wall has and that a person or a robot stands in."""
+"""Half of a width in metres that no wall has and a person or a robot fits in."""
 _ROOM = 1.0
 """Least area in m² of a room that no solid fills."""
 
@@ -41,13 +41,13 @@ class _ElementPart:
 
 @dataclass(frozen=True, eq=False)
 class _Spaces:
-    """The floor and the rooms in it, which no wall fills."""
+    """The floor and its rooms, which no wall fills."""
 
     outline: Region
     rooms: tuple[Region, ...]
 
     def filled_by(self, region: Region) -> bool:
-        """Whether a shape would fill a whole room or more than half of the floor: then it is an outline."""
+        """True if a shape would fill a whole room or more than half of the floor: then it is an outline."""
         area, half = region.area, self._area / 2
         if area > half and region.intersection(self.outline).area > half:
             return True
@@ -68,7 +68,7 @@ class _Spaces:
 def elements_of(
     on: Mapping[str, Drawn], *, outline: Region, rooms: Sequence[Room]
 ) -> tuple[tuple[Element, ...], list[IgnoredLine], list[Finding]]:
-    """Elements kind by kind, in the order of their place, and outlines on unknown layers that are none.
+    """Return elements kind by kind, in the order of their positions, and ignored outlines.
 
     Ids count within a kind.
     """
@@ -118,7 +118,7 @@ def _closed_and_lines(kind: str, drawn: Drawn) -> tuple[list[Closed], list[Open]
 
 
 def _on_the_floor(drawn: Drawn, spaces: _Spaces) -> tuple[Drawn, list[IgnoredLine], list[Finding]]:
-    """Unknown shapes that may stand on the floor; frames around it and things beside it are left out.
+    """Unknown shapes that may be on the floor; frames around it and objects outside it are left out.
 
     A frame's outline is drawn all the same, so it is handed on as a line that is ignored.
     """
@@ -142,7 +142,7 @@ def _on_the_floor(drawn: Drawn, spaces: _Spaces) -> tuple[Drawn, list[IgnoredLin
 
 
 def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_ElementPart]:
-    """Solids without their holes; a ring around rooms becomes a line, and what lies in it its own solid."""
+    """Solids without their holes; a ring around rooms becomes a line, and each shape in it its own solid."""
     above = parents([shape.region for shape in closed])
     holes = hole_indices(closed, above, partial(_is_hole, kind))
     parts: list[_ElementPart] = []
@@ -160,7 +160,7 @@ def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Eleme
 
 
 def _is_hole(kind: str, inner: Closed, outer: Closed) -> bool:
-    """Whether a ring in another is its inside: said by GlobalId or hatch, else by direction and size.
+    """True if a ring in another is its hole: decided by GlobalId or hatch, else by direction and size.
 
     A tread drawn against its flight must not free the stairs; the two faces of a wall around a core are
     often drawn in one direction.

@@ -1,4 +1,4 @@
-"""Closes the joints between slabs: what is as narrow as that is no edge that anything falls from."""
+"""Closing of the joints between slabs: a gap that narrow is not an edge that a robot falls from."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from stopgo.planner.geometry.shapes import SLACK, polygon_parts, segments_of
 JOINT = 0.02
 """The widest gap in a floor, in metres, that is a joint between slabs."""
 _FACING = -0.9
-"""Two edges face each other if the cosine between the ways round their slabs is at most this."""
+"""Two edges face each other if the cosine between their directions is at most this."""
 
 
 def without_joints(floor: Region) -> tuple[Region, list[Finding]]:
-    """The floor with its joints closed, each told; the same floor if it has none.
+    """Return the floor with its joints closed, and a finding for each; the same floor if it has none.
 
     Closed is what lies straight between two edges that face each other, and every hole as narrow.
     """
@@ -50,7 +50,7 @@ def _bridges(floor: Region) -> NDArray[np.object_]:
 def _side(
     lines: NDArray[np.object_], way: FloatArray, one: NDArray[np.int64], other: NDArray[np.int64]
 ) -> NDArray[np.object_]:
-    """Of each edge what is near the other one, and the same a little farther into its slab."""
+    """The part of each edge near the other one, and the same part moved slightly into its slab."""
     near = shapely.intersection(lines[one], shapely.buffer(lines[other], JOINT + SLACK))
     inward = SNAP * np.stack([-way[one][:, 1], way[one][:, 0]], axis=1)
     xy, owner = shapely.get_coordinates(near, return_index=True)
@@ -58,7 +58,7 @@ def _side(
 
 
 def _narrow_holes(floor: Region) -> list[shapely.Polygon]:
-    """Holes as narrow as a joint: where joints cross, or one that was drawn as a hole."""
+    """Holes as narrow as a joint: at crossings of joints, or a joint that was drawn as a hole."""
     holes = [shapely.Polygon(ring) for part in polygons_of(floor) for ring in part.interiors]
     return [hole for hole in holes if hole.buffer(-(JOINT / 2 + SLACK)).is_empty]
 

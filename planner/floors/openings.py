@@ -1,4 +1,4 @@
-"""Makes the openings: each line on DOORS or PASSAGES lies across one."""
+"""Openings of a floor: each line on DOORS or PASSAGES lies across one."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from stopgo.planner.floors.drawn import Closed, Drawn, Oddity, Open, place
 from stopgo.planner.floors.rings import SNAP, canonical_line
 
 Across = tuple[FloatArray, str | None, tuple[Oddity, ...]]
-"""A line (2, 2) across an opening, its GlobalId, and what is odd about it."""
+"""A line (2, 2) across an opening, its GlobalId, and its anomalies."""
 
 
 def openings_of(*, doors: Drawn, passages: Drawn) -> tuple[tuple[Opening, ...], list[Finding]]:
-    """Doors, then passages, in the order of their place; lines without length are dropped."""
+    """Return doors, then passages, in the order of their positions; lines without length are dropped."""
     openings: list[Opening] = []
     findings: list[Finding] = []
     for kind, drawn in (("door", doors), ("passage", passages)):

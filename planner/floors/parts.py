@@ -1,4 +1,4 @@
-"""Makes the parts of a floor of strokes and words: its outline, rooms, openings and elements."""
+"""Parts of a floor from strokes and words: its outline, rooms, openings and elements."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from stopgo.planner.floors.strokes import Stroke, Word
 
 @dataclass(frozen=True, eq=False)
 class FloorParts:
-    """What a floor plan is made of."""
+    """Outline, rooms, openings and elements of a floor plan."""
 
     outline: tuple[Polygon, ...]
     rooms: tuple[Room, ...]
@@ -40,7 +40,7 @@ def parts_of(
     known: frozenset[str] = frozenset(),
     skipped: str = "",
 ) -> FloorParts:
-    """The parts that strokes and words on the known layers draw.
+    """Return the parts that strokes and words on the known layers draw.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def _drawn_by_role(strokes: Iterable[Stroke]) -> defaultdict[str, Drawn]:
 
 
 def outline_of(floor: Drawn) -> tuple[Region, list[Finding]]:
-    """The region on layer FLOOR: rings in rings are holes, parts that overlap or nearly touch are one."""
+    """Return the region on layer FLOOR: rings in rings are holes, touching parts are one."""
     faces, findings = outline_faces(floor.open, layer="FLOOR", merge=True)
     rings = (*floor.closed, *faces)
     findings += [odd.about("FLOOR") for ring in rings for odd in ring.odd]
@@ -126,7 +126,7 @@ def _dropped(on: Mapping[str, Drawn]) -> list[Finding]:
 
 
 def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Sorted, and what is said more than once said once with its count."""
+    """Return the findings sorted; repeated findings become one with its count."""
     said: dict[tuple, list[Finding]] = {}
     for finding in sorted(findings, key=_finding_key):
         said.setdefault((finding.code, finding.element, finding.message), []).append(finding)

@@ -1,4 +1,4 @@
-"""Makes the rooms: each ring on ROOMS is a room, or a hole in the room around it."""
+"""Rooms of a floor: each ring on ROOMS is a room, or a hole in the room around it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class _Room:
 def rooms_of(
     drawn: Drawn, words: Sequence[Word], *, outline: Region
 ) -> tuple[tuple[Room, ...], list[Finding]]:
-    """The rooms, apart from one another, named by the texts in them.
+    """Return the rooms, without overlaps, named by the texts in them.
 
     A ring within another is a hole of it if it has the same GlobalId, or is drawn against it without a text
     or GlobalId of its own; else it is a room within a room. Both are cut out of the outer one.
@@ -115,7 +115,7 @@ def _by_global_id(rooms: Sequence[_Room]) -> list[_Room]:
 
 
 def _apart(rooms: Sequence[_Room]) -> list[_Room]:
-    """Where two rooms overlap, the smaller one keeps the place."""
+    """Remove overlaps of rooms: the smaller room keeps the area."""
     ordered = sorted(rooms, key=lambda room: (room.region.area, region_key(room.region)))
     tree = shapely.STRtree([room.region for room in ordered])
     return [_without_smaller(index, ordered, tree) for index in range(len(ordered))]

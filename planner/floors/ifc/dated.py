@@ -1,4 +1,4 @@
-"""When an IFC file says that its products are built: tasks of both schemas, days and phases in properties."""
+"""Construction dates of an IFC file's products: tasks of both schemas, days and phases in properties."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PHASE_NAMES = re.compile(
 )
 REMOVED_NAMES = re.compile(r"^(phase demolished|abbruchphase|phase de démolition)$", re.IGNORECASE)
 NEVER = ("", "none", "keine", "aucun", "<none>")
-"""What a product says of the phase that removes it when none does."""
+"""Value of a product's demolition phase if no phase removes it."""
 DAY = re.compile(r"^\d{4}-\d{2}-\d{2}")
 
 

@@ -49,7 +49,7 @@ ROLES = {
     "IfcSpace": "spaces",
     "IfcOpeningElement": "openings",
 }
-"""What the classes of a model are to a plan; all others are left out and counted."""
+"""Role of each class of a model in a plan; all other classes are left out and counted."""
 UNSEEN = (
     "IfcSpatialStructureElement",
     "IfcSpatialElement",
@@ -84,7 +84,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _complaints() -> Iterator[str]:
-    """What the library's log holds by now, without its dates: at most a few lines."""
+    """Lines of the library's log so far, without dates: at most a few."""
     log = str(ifcopenshell.get_log())
     lines = [re.sub(r"^(\[[^]]*\]\s*)+", "", line) for line in log.splitlines()]
     yield from [line for line in lines if line][:MOST_COMPLAINTS]
@@ -289,7 +289,7 @@ def _lining(entity: Any, unit: float) -> float | None:
 
 
 def _has_body(entity: Any) -> bool:
-    """Whether a product is drawn as a body and not as a line or symbol alone."""
+    """True if a product has a body, and not only a line or a symbol."""
     kinds = {item.RepresentationIdentifier for item in entity.Representation.Representations}
     return bool(kinds & {"Body", "Facetation", None, ""})
 

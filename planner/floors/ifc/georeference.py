@@ -1,4 +1,4 @@
-"""Where a model stands on earth: by its map conversion, else its site; the implausible is told, not used."""
+"""Georeference of a model: from its map conversion, else its site; implausible values become findings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DEFAULTS = {
 NEAR_DEFAULT = 0.005
 """A site this near to a default is one, degrees."""
 UNITS = {"m": 1.0, "mm": 1e-3, "ft": 0.3048, "cm": 1e-2, "US survey ft": 1200 / 3937}
-"""What eastings may be in, the likelier first."""
+"""Possible units of eastings, the likelier first."""
 FARTHEST_SITE = 10_000.0
 """A site that is placed farther from the model's origin says nothing of it, metres."""
 APART = 1000.0

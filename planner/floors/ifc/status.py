@@ -1,4 +1,4 @@
-"""What of a model is built on a day: from the tasks of its products, or from a schedule beside it."""
+"""Construction status of a model on a day: from the tasks of its products, or from a separate schedule."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Tasks = Mapping[str, tuple[Task, ...]]
 
 @dataclass(frozen=True)
 class Statuses:
-    """What is built on a day, by GlobalId, and what was built already on an earlier day."""
+    """Products built on a day, by GlobalId, and products built before an earlier day."""
 
     day: str
     since: str | None
@@ -69,7 +69,7 @@ def _of_phases(product: Product, schedule: Tasks) -> tuple[Task, ...]:
 
 
 def status_on(day: str, tasks: tuple[Task, ...]) -> Status:
-    """What tasks make of a product at the end of a day; days are YYYY-MM-DD.
+    """Status of a product at the end of a day, from its tasks; days are YYYY-MM-DD.
 
     It is built once its last task is finished, and begun with its first; a removal ends it.
     """
@@ -111,7 +111,7 @@ def _figures(found: Statuses, counts: Counter[str], counted: list[Product]) -> d
 
 
 def _is_on(product: Product, model: Model, level: Level) -> bool:
-    """Whether a product is part of a floor's plan: what stands or hangs there, and the slab itself."""
+    """True if a product is part of a floor's plan: a body above the floor, or the slab itself."""
     body = model.meshes.get(product.global_id)
     if body is None or product.role not in THINGS:
         return False

@@ -27,7 +27,7 @@ from stopgo.planner.floors.rings import Region
 from stopgo.planner.floors.strokes import Stroke, Word
 
 BESIDE = 1.0
-"""What stands farther than this from the floor is not part of its plan, metres."""
+"""A solid farther than this from the floor is not part of its plan, metres."""
 
 
 def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions) -> FloorPlan:
@@ -62,7 +62,7 @@ def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions)
 
 
 def _statuses(model: Model, options: FloorOptions) -> tuple[Statuses | None, str]:
-    """What is built on the day of the options, and the digest of the schedule it is from."""
+    """Construction status on the day of the options, and the digest of the schedule used."""
     if options.date is None:
         return None, ""
     schedule = None

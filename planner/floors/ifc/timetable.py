@@ -23,7 +23,7 @@ KNOWN = {
         *("finishdate", "end", "end date", "enddate", "completion"),
     ),
 }
-"""What columns are called that hold a GlobalId, a task's name and its days; the first one counts."""
+"""Known column names for the GlobalId, a task's name and its days; the first match counts."""
 PARTS = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})(?:[ T].*)?")
 
 
@@ -111,7 +111,7 @@ def _tasks(
 
 
 def _day_first(cells: Iterable[str], path: Path) -> bool:
-    """Whether days are written before months; told by the days that are no months, else by the separator."""
+    """True if days are written before months: shown by days over 12, else by the separator."""
     written = [match for cell in cells if (match := PARTS.fullmatch(cell)) and len(match[1]) < 3]
     if any(int(match[1]) > 12 for match in written):
         return True

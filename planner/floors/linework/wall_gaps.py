@@ -19,7 +19,7 @@ PASSAGE = (0.6, 1.6)
 SYMBOL = (0.5, 6.0)
 """Length in metres of a door's symbol without a swing, such as a sliding door."""
 _BROAD = 0.4
-"""What is drawn broader than this (m), such as the place of an open garage door, is no line across."""
+"""A shape broader than this (m), such as the area of an open garage door, is not a line across."""
 _REACH = 0.3
 """Frames may keep a leaf this far (m) from its jamb."""
 _DRAWN_OPEN = 0.6
@@ -42,7 +42,7 @@ class WallGap:
     """From jamb to jamb in the middle of the wall (2, 2)."""
     depth: float
     held: bool
-    """Whether walls stand at both its ends."""
+    """True if walls are at both its ends."""
 
     @property
     def opening(self) -> shapely.Polygon:
@@ -101,7 +101,7 @@ def without_doors(lines: Sequence[FloatArray]) -> tuple[list[FloatArray], list[F
 
 
 def _runs(line: FloatArray, a: FloatArray, b: FloatArray) -> bool:
-    """Whether a line goes from `a` to `b` or back, within 2 cm."""
+    """True if a line goes from `a` to `b` or back, within 2 cm."""
     return any(np.abs(line - np.array(ends)).max() <= _TOUCH for ends in ((a, b), (b, a)))
 
 
@@ -149,7 +149,7 @@ class _Strokes:
         self._segments = np.concatenate(pieces) if pieces else np.empty((0, 2, 2))
 
     def along(self, a: FloatArray, b: FloatArray) -> bool:
-        """Whether one segment runs along most of the way from `a` to `b`, within 8 cm."""
+        """True if one segment runs along most of the line from `a` to `b`, within 8 cm."""
         way = b - a
         length = float(np.hypot(*way))
         way = way / length
@@ -172,7 +172,7 @@ def _leaf(swing: Swing, leaves: _Strokes, walls: _Near) -> Leaf:
 
 
 def _to_walls(hinge: FloatArray, end: FloatArray, near: Region) -> float:
-    """How far walls are beyond both ends of a shut leaf, at most 0.5 m each; more if it runs in walls."""
+    """Distance of walls beyond both ends of a shut leaf, at most 0.5 m each; more if it runs in walls."""
     way = (end - hinge) / np.hypot(*(end - hinge))
     beyond = [
         shapely.LineString([end - 0.02 * way, end + 0.5 * way]),

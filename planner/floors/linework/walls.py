@@ -1,4 +1,4 @@
-"""Makes solid walls of line work: what lies between two lines of a wall is filled, the rest stays a line."""
+"""Solid walls from line work: the area between two lines of a wall is filled, the rest stays lines."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ THICKEST = 1.0
 """So is one up to this wide that is many times as long."""
 _LONG = 5.0
 _FILLED = 1.6
-"""What is hatched or filled on a wall's layer is a wall up to this thickness in metres."""
+"""A hatched or filled area on a wall's layer is a wall up to this thickness in metres."""
 _BY_WALLS = 0.55
 """A wall's inside is bounded by wall lines along at least this share; an opening is not."""
 _MEETS = 0.05
@@ -53,7 +53,7 @@ class SolidWalls:
         return shapely.union_all([*self.solids, *shapely.buffer(list(self.lines), _ON, cap_style="square")])
 
     def without(self, places: Sequence[shapely.Polygon]) -> SolidWalls:
-        """The walls where nothing stands in `places`."""
+        """Return the walls without the areas in `places`."""
         if not places:
             return self
         gone = shapely.union_all(list(places))
@@ -177,7 +177,7 @@ def _caps(ends: FloatArray, way: FloatArray) -> FloatArray:
 
 
 def _is_inside(faces: NDArray[np.object_], own: Region) -> BoolArray:
-    """Which faces are the inside of a wall: narrow, and wall lines nearly all round."""
+    """True for each face that is the inside of a wall: narrow, and almost surrounded by wall lines."""
     narrow = shapely.is_empty(shapely.buffer(faces, -THICK / 2, quad_segs=2))
     length = shapely.length(faces) / 2
     long = (length > _LONG * THICKEST) & shapely.is_empty(shapely.buffer(faces, -THICKEST / 2, quad_segs=2))
@@ -190,7 +190,7 @@ def _is_inside(faces: NDArray[np.object_], own: Region) -> BoolArray:
 
 
 def _share(faces: NDArray[np.object_], own: Region) -> FloatArray:
-    """The share of each face's outline that is a wall's line (n,)."""
+    """Fraction of each face's outline that is a wall's line (n,)."""
     rings, face = shapely.get_parts(shapely.boundary(faces), return_index=True)
     xy, ring = shapely.get_coordinates(rings, return_index=True)
     inner = ring[:-1] == ring[1:]
