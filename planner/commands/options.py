@@ -39,7 +39,7 @@ def values_of(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _own(parameter: Parameter) -> bool:
-    """Whether it has an option of its own, and does not take another's further values."""
+    """True if the parameter has its own option, and does not take the further values of another."""
     return parameter.name not in {item.further for item in PARAMETERS.values()}
 
 
@@ -62,7 +62,7 @@ def _option(parameter: Parameter) -> inspect.Parameter:
 
 
 def _plain(parameter: Parameter) -> type:
-    """What the command line takes; what has a form of its own is read by the parameter."""
+    """Type on the command line; a parameter with its own form reads a text."""
     return str if parameter.form else parameter.plain
 
 

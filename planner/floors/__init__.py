@@ -86,16 +86,16 @@ def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
 
 def options_of(settings: Settings) -> FloorOptions:
     """Return the reader's options from a plan's settings."""
-    told = {name: getattr(settings, name) for name in FLOOR_PARAMETERS}
-    columns = (entry.partition("=") for entry in told.pop("schedule_columns"))
-    schedule = told.pop("schedule")
-    told["layer_map"] = kinds_by_name(settings.layer_map or ())
+    values = {name: getattr(settings, name) for name in FLOOR_PARAMETERS}
+    columns = (entry.partition("=") for entry in values.pop("schedule_columns"))
+    schedule = values.pop("schedule")
+    values["layer_map"] = kinds_by_name(settings.layer_map or ())
     return FloorOptions(
         d_dis=settings.d_dis,
         layers=settings.layer_roles,
         schedule=None if schedule is None else Path(schedule),
         schedule_columns={what.strip(): column.strip() for what, _, column in columns},
-        **told,
+        **values,
     )
 
 
@@ -105,11 +105,11 @@ def _opened(path: Path, options: FloorOptions | None) -> tuple[FloorFile, Varian
     file = FloorFile(path, _bytes_of(path))
     reader = _reader_of(file)
     takes = reader.what.takes
-    vain = [name for name in options.given if name not in takes]
-    if vain:
+    unknown = [name for name in options.given if name not in takes]
+    if unknown:
         raise InputError(
-            f"{path}: --{_option(vain[0])} means nothing for a {reader.what.kind}; "
-            f"leave it out (known for it: {_listed(takes)})"
+            f"{path}: --{_option(unknown[0])} does not apply to a {reader.what.kind}; "
+            f"remove it (known: {_listed(takes)})"
         )
     return file, reader, options
 

@@ -203,7 +203,7 @@ def given_unit(name: str, extent: FloatArray, *, source: Path) -> tuple[float, l
             f"{source}: --units {legible(name)} makes the drawing {size:.4g} m across; name another unit, "
             "or leave it out and stopgo looks at doors and walls"
         )
-    return factor, [Finding("units_as_told", f"one unit is a {word}, as told")]
+    return factor, [Finding("units_as_told", f"one unit is a {word}, as given")]
 
 
 _NAMED = {

@@ -40,7 +40,7 @@ class DrawingFound:
     """Strokes by role."""
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Its size and contents, in words."""
         x0, y0, x1, y1 = self.box
         doors = f", {self.swings} door swings" if self.swings else ", no door swing"

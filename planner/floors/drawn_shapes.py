@@ -110,9 +110,9 @@ class _OutlineWalk:
         self._met = 0
         self._hidden = {layer.dxf.name.upper(): layer.is_frozen() for layer in _hidden_layers(drawing)}
         self._layers = layers
-        self._as_told: Counter[tuple[str, str]] = Counter()
+        self._given_uses: Counter[tuple[str, str]] = Counter()
         self._used: Counter[str] = Counter()
-        self._odd: Counter[tuple[str, str]] = Counter()
+        self._found: Counter[tuple[str, str]] = Counter()
         self.left_out: Counter[tuple[str, LayerReading]] = Counter()
 
     def through(self, entities: Iterable[DXFEntity], placed: _Placement) -> Iterator[Shape]:
@@ -138,7 +138,7 @@ class _OutlineWalk:
         try:
             return list(disassemble.recursive_decompose([multiline]))
         except BROKEN_INPUT as error:
-            self._odd["bad_coordinates", f"an MLINE is skipped: {legible(str(error))}"] += 1
+            self._found["bad_coordinates", f"an MLINE is skipped: {legible(str(error))}"] += 1
             return []
 
     def _insert(self, insert: Insert, placed: _Placement) -> Iterator[Shape]:
@@ -147,15 +147,15 @@ class _OutlineWalk:
             block, places = insert.block(), _places(insert, placed)
             clipped = XClip(insert).has_clipping_path
         except BROKEN_INPUT as error:
-            self._odd["bad_coordinates", f"block {name} is skipped: {legible(str(error))}"] += 1
+            self._found["bad_coordinates", f"block {name} is skipped: {legible(str(error))}"] += 1
             return
         if block is None or block.block is None or block.block.is_xref:
-            self._odd["missing_block", f"block {name} is not in the file; bind external references"] += 1
+            self._found["missing_block", f"block {name} is not in the file; bind external references"] += 1
         elif name in placed.blocks:
-            self._odd["endless_block", f"block {name} holds itself and is not followed"] += 1
+            self._found["endless_block", f"block {name} holds itself and is not followed"] += 1
         else:
             if clipped:
-                self._odd["clipped_block", f"block {name} is clipped in the drawing and read whole"] += 1
+                self._found["clipped_block", f"block {name} is clipped in the drawing and read whole"] += 1
             yield from self.through(insert.attribs, placed)
             inside = self._inside(insert, placed, name=name)
             for matrix in places:
@@ -189,26 +189,26 @@ class _OutlineWalk:
     def _reading(self, layer: str, blocks: tuple[str, ...]) -> LayerReading:
         """Return the meaning of a layer, and count its use if the user gave it."""
         reading = self._layers.reading(layer, blocks)
-        if layer.upper() in self._layers.told:
-            self._as_told[layer, reading.role] += 1
+        if layer.upper() in self._layers.given:
+            self._given_uses[layer, reading.role] += 1
         return reading
 
     def findings(self) -> list[Finding]:
-        told = [
-            Finding("layer_as_told", f"layer {layer} is taken for {role}, as told: {count} entities")
-            for (layer, role), count in self._as_told.items()
+        given = [
+            Finding("layer_as_told", f"layer {layer} is taken for {role}, as given: {count} entities")
+            for (layer, role), count in self._given_uses.items()
         ]
         hidden = [
             Finding("hidden_layer", f"layer {legible(layer)} is frozen or off; its {count} entities are used")
             for layer, count in self._used.items()
         ]
-        return [*told, *self._absent(), *hidden] + [
-            Finding(code, text) for (code, text), count in self._odd.items() for _ in range(count)
+        return [*given, *self._absent(), *hidden] + [
+            Finding(code, text) for (code, text), count in self._found.items() for _ in range(count)
         ]
 
     def _absent(self) -> list[Finding]:
         """Findings on layers that the user named and the drawing does not have."""
-        absent = set(self._layers.told) - {layer.upper() for layer, _ in self._as_told}
+        absent = set(self._layers.given) - {layer.upper() for layer, _ in self._given_uses}
         return [
             Finding("no_such_layer", f"layer {legible(name)} is not in the drawing")
             for name in sorted(absent)

@@ -87,8 +87,8 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
         return Derived(sheet.strokes, named, []) if large else completed(sheet.strokes, sheet.words)
     if len(sheet.drawings) > 1 and sheet.chosen is None:
         count = len(sheet.drawings)
-        told = drawings_text(sheet.drawings)
-        raise InputError(f"{path}: {count} drawings side by side, choose one with --drawing N{told}")
+        listed = drawings_text(sheet.drawings)
+        raise InputError(f"{path}: {count} drawings side by side, choose one with --drawing N{listed}")
     if size > LARGEST_FLOOR:
         raise InputError(
             f"{path}: the walls are {size:.4g} m across, read in {_unit_name(sheet)}; "
@@ -165,8 +165,8 @@ def survey(file: FloorFile, options: FloorOptions) -> Survey:
         units=_unit(sheet),
         floors=tuple(_choices(sheet, floor)),
         layers=tuple(_layers(drawing, sheet, file.path)),
-        inferred=_told(floor, "inferred_"),
-        ignored=_told(floor, "not_a_wall"),
+        inferred=_messages(floor, "inferred_"),
+        ignored=_messages(floor, "not_a_wall"),
         findings=tuple(
             item for item in (floor or sheet).findings if not item.code.startswith(_REPORTED_ELSEWHERE)
         ),
@@ -192,7 +192,7 @@ _REPORTED_ELSEWHERE = ("inferred_", "layer_", "units_", "drawings_found", "not_a
 """Codes of findings that a survey reports in separate lines."""
 
 
-def _told(floor: FloorPlan | None, code: str) -> tuple[str, ...]:
+def _messages(floor: FloorPlan | None, code: str) -> tuple[str, ...]:
     findings = floor.findings if floor else ()
     return tuple(item.message for item in findings if item.code.startswith(code))
 
@@ -209,9 +209,9 @@ def _choices(sheet: DxfSheet, floor: FloorPlan | None) -> Iterable[FloorChoice]:
     for number, item in enumerate(sheet.drawings, start=1):
         option = f"--drawing {number}" if len(sheet.drawings) > 1 else ""
         if floor is not None and item is sheet.chosen:
-            yield replace(_choice(floor), name=f"drawing {number}", option=option, notes=(item.told,))
+            yield replace(_choice(floor), name=f"drawing {number}", option=option, notes=(item.description,))
         else:
-            yield FloorChoice(f"drawing {number}", option, bounds=item.box, notes=(item.told,))
+            yield FloorChoice(f"drawing {number}", option, bounds=item.box, notes=(item.description,))
 
 
 def _choice(floor: FloorPlan) -> FloorChoice:

@@ -79,7 +79,7 @@ def _by_name(shapes: Sequence[Shape]) -> list[Finding]:
             "layer_by_name", f"layer {layer} is taken for {role}: {why} (--layer {layer}=KIND corrects it)"
         )
         for layer, role, why in sorted(taken)
-        if why not in ("its name", "as told", "by the map")
+        if why not in ("its name", "as given", "by the map")
     ]
 
 
@@ -171,7 +171,7 @@ def _one_drawing(sheet: DxfSheet, options: FloorOptions, source: Path) -> DxfShe
         return replace(sheet, chosen=chosen)
     number = drawings.index(chosen) + 1
     why = (
-        "as told"
+        "as given"
         if options.drawing
         else "the only one with door swings"
         if chosen.swings
@@ -190,4 +190,4 @@ def drawings_text(drawings: Sequence[DrawingFound]) -> str:
     """The drawings by number, each with its size and contents, in words."""
     if not drawings:
         return ""
-    return ": " + "; ".join(f"{k} is {item.told}" for k, item in enumerate(drawings, start=1))
+    return ": " + "; ".join(f"{k} is {item.description}" for k, item in enumerate(drawings, start=1))

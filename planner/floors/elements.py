@@ -12,7 +12,7 @@ import shapely
 from stopgo.mission.floor import Element, Finding, IgnoredLine, Room
 from stopgo.mission.geometry import FloatArray, Polygon, frozen
 from stopgo.mission.settings.element_kinds import KINDS
-from stopgo.planner.floors.drawn import Closed, Drawn, Oddity, Open, faces_of, hole_indices, place
+from stopgo.planner.floors.drawn import Anomaly, Closed, Drawn, Open, faces_of, hole_indices, place
 from stopgo.planner.floors.rings import SNAP, Region, canonical_region, parents, polygons_of, to_shapely
 
 _NEAR = 1.0
@@ -32,7 +32,7 @@ class _ElementPart:
     region: Region | None = None
     lines: tuple[FloatArray, ...] = ()
     global_id: str | None = None
-    odd: tuple[Oddity, ...] = ()
+    anomalies: tuple[Anomaly, ...] = ()
 
     @cached_property
     def solids(self) -> tuple[Polygon, ...]:
@@ -79,13 +79,13 @@ def elements_of(
     for kind in KINDS:
         if kind in on:
             drawn = on[kind]
-            odd: list[Finding] = []
+            anomalies: list[Finding] = []
             if kind == "other":
-                drawn, left_out, odd = _on_the_floor(drawn, spaces)
+                drawn, left_out, anomalies = _on_the_floor(drawn, spaces)
                 ignored += left_out
             made, more = _of_kind(kind, drawn, spaces)
             elements += made
-            findings += [*odd, *more]
+            findings += [*anomalies, *more]
     return tuple(elements), ignored, findings
 
 
@@ -98,12 +98,12 @@ def _of_kind(kind: str, drawn: Drawn, spaces: _Spaces) -> tuple[list[Element], l
     findings: list[Finding] = []
     parts = [
         *_bodies(kind, closed, spaces),
-        *(_ElementPart(None, (line.points,), line.global_id, line.odd) for line in lines),
+        *(_ElementPart(None, (line.points,), line.global_id, line.anomalies) for line in lines),
     ]
     elements: list[Element] = []
     for number, part in enumerate(sorted(parts, key=_place_key), start=1):
         elements.append(_element(f"{kind}-{number:03d}", kind, part))
-        findings += [odd.about(elements[-1].id) for odd in part.odd]
+        findings += [anomaly.about(elements[-1].id) for anomaly in part.anomalies]
     return elements, findings
 
 
@@ -154,8 +154,8 @@ def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Eleme
         if not polygons_of(body) or (kind in _OUTLINES and spaces.filled_by(body)):
             parts += [_body_or_outline(kind, shape, spaces) for shape in (closed[index], *inner)]
         else:
-            odd = tuple(item for shape in (closed[index], *inner) for item in shape.odd)
-            parts.append(_ElementPart(body, (), closed[index].global_id, odd))
+            anomalies = tuple(item for shape in (closed[index], *inner) for item in shape.anomalies)
+            parts.append(_ElementPart(body, (), closed[index].global_id, anomalies))
     return parts
 
 
@@ -178,15 +178,15 @@ def _is_hole(kind: str, inner: Closed, outer: Closed) -> bool:
 
 def _body_or_outline(kind: str, shape: Closed, spaces: _Spaces) -> _ElementPart:
     if not spaces.filled_by(shape.region):
-        return _ElementPart(shape.region, (), shape.global_id, shape.odd)
+        return _ElementPart(shape.region, (), shape.global_id, shape.anomalies)
     lines = tuple(
         frozen(np.vstack((ring, ring[:1])))
         for polygon in canonical_region(shape.region)
         for ring in polygon.rings
     )
     text = f"its ring around {shape.region.area:.3g} m² of floor is read as a line, not as solid {kind}"
-    odd = Oddity("outline_not_solid", text, place(lines[0]))
-    return _ElementPart(None, lines, shape.global_id, (*shape.odd, odd))
+    anomaly = Anomaly("outline_not_solid", text, place(lines[0]))
+    return _ElementPart(None, lines, shape.global_id, (*shape.anomalies, anomaly))
 
 
 def _place_key(part: _ElementPart) -> tuple:

@@ -30,7 +30,9 @@ def without_joints(floor: Region) -> tuple[Region, list[Finding]]:
     closed = shapely.union_all([floor, *bridges])
     if floor.length - closed.length <= SNAP:
         return floor, []
-    return closed, [_told(joint) for joint in polygons_of(shapely.union_all(bridges).difference(floor))]
+    return closed, [
+        _joint_finding(joint) for joint in polygons_of(shapely.union_all(bridges).difference(floor))
+    ]
 
 
 def _bridges(floor: Region) -> NDArray[np.object_]:
@@ -63,7 +65,7 @@ def _narrow_holes(floor: Region) -> list[shapely.Polygon]:
     return [hole for hole in holes if hole.buffer(-(JOINT / 2 + SLACK)).is_empty]
 
 
-def _told(joint: shapely.Polygon) -> Finding:
+def _joint_finding(joint: shapely.Polygon) -> Finding:
     """The width is that of a rectangle of the same area and outline."""
     half = joint.length / 2
     width = (half - math.sqrt(max(0.0, half * half - 4 * joint.area))) / 2

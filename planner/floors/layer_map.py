@@ -37,10 +37,10 @@ def _lines(layers: tuple[LayerUse, ...]) -> Iterator[str]:
     for name in sorted({item.name for item in layers}):
         uses = [item for item in layers if item.name == name]
         kind = uses[0].role
-        why = "; ".join(dict.fromkeys(_told(item) for item in uses))
+        why = "; ".join(dict.fromkeys(_use_text(item) for item in uses))
         mark = "" if len({item.role for item in uses}) == 1 and kind in LAYER_ROLES else "# "
         yield f"{mark}{json.dumps(name, ensure_ascii=False)} = {json.dumps(kind)}  # {why}"
 
 
-def _told(item: LayerUse) -> str:
+def _use_text(item: LayerUse) -> str:
     return f"{item.taken + item.ignored} as {item.role}: {item.why}"

@@ -29,7 +29,7 @@ _NONE: Mapping[str, str] = MappingProxyType({})
 class Layers:
     """Meanings of layers; names are in capitals."""
 
-    told: Mapping[str, str] = field(default_factory=lambda: _NONE)
+    given: Mapping[str, str] = field(default_factory=lambda: _NONE)
     """Given by options of the command."""
     mapped: Mapping[str, str] = field(default_factory=lambda: _NONE)
     """Given by a file that a person may have corrected."""
@@ -39,8 +39,8 @@ class Layers:
     def reading(self, layer: str, blocks: Sequence[str]) -> LayerReading:
         """Return the meaning of a layer and its source; if the name is unknown, by the blocks around it."""
         name = layer.upper()
-        if name in self.told:
-            return LayerReading(self.told[name], "as told")
+        if name in self.given:
+            return LayerReading(self.given[name], "as given")
         if name in self.mapped:
             return LayerReading(self.mapped[name], "by the map")
         if name in ROLES:

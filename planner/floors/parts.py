@@ -75,7 +75,7 @@ def outline_of(floor: Drawn) -> tuple[Region, list[Finding]]:
     """Return the region on layer FLOOR: rings in rings are holes, touching parts are one."""
     faces, findings = outline_faces(floor.open, layer="FLOOR", merge=True)
     rings = (*floor.closed, *faces)
-    findings += [odd.about("FLOOR") for ring in rings for odd in ring.odd]
+    findings += [anomaly.about("FLOOR") for ring in rings for anomaly in ring.anomalies]
     outline, joints = without_joints(even_odd([ring.region for ring in rings]))
     return outline, [*findings, *joints]
 
@@ -118,10 +118,10 @@ def _unknown_layers(other: Drawn, words: Iterable[Word], known: frozenset[str]) 
 
 def _dropped(on: Mapping[str, Drawn]) -> list[Finding]:
     return [
-        Finding(odd.code, f"layer {role.upper()}: {odd.text}", at=odd.at)
+        Finding(anomaly.code, f"layer {role.upper()}: {anomaly.text}", at=anomaly.at)
         for role, drawn_on in on.items()
         if role != "other"
-        for odd in drawn_on.dropped
+        for anomaly in drawn_on.dropped
     ]
 
 

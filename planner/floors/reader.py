@@ -70,10 +70,10 @@ class FloorOptions:
 
     @property
     def given(self) -> tuple[str, ...]:
-        """Names of the options that were given, other than d_dis."""
-        return tuple(item.name for item in fields(self) if item.name != "d_dis" and self._told(item.name))
+        """Names of the options that were given, except d_dis."""
+        return tuple(item.name for item in fields(self) if item.name != "d_dis" and self._is_given(item.name))
 
-    def _told(self, name: str) -> bool:
+    def _is_given(self, name: str) -> bool:
         value = getattr(self, name)
         return bool(value) if isinstance(value, Mapping) else value is not None
 
@@ -103,7 +103,7 @@ class Reader:
     module: str
     """Dotted name of its module, a ReaderModule, which is loaded when it is used."""
     takes: frozenset[str]
-    """Names of the FloorOptions that mean something to it, d_dis aside."""
+    """Names of the FloorOptions that apply to it, except d_dis."""
 
     def load(self) -> ReaderModule:
         """Its module."""

@@ -40,7 +40,7 @@ class LayerUse:
     role: str
     """A role of LAYER_ROLES."""
     why: str
-    """Source of the role, such as `AIA name A-WALL*` or `as told`."""
+    """Source of the role, such as `AIA name A-WALL*` or `as given`."""
     taken: int = 0
     """Entities that were used."""
     ignored: int = 0

@@ -49,10 +49,10 @@ def survey(file: FloorFile, options: FloorOptions) -> Survey:
     """
     model = load(file)
     levels = with_uses(levels_of(model), model)
-    told = options.storey is not None or options.level is not None or len(walked(levels)) == 1
+    is_chosen = options.storey is not None or options.level is not None or len(walked(levels)) == 1
     own = (
         chosen_level(levels, model=model, storey=options.storey, z=options.level, path=file.path)
-        if told
+        if is_chosen
         else None
     )
     shown = levels if own is None or own in levels else (*levels, own)

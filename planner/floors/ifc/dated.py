@@ -54,15 +54,15 @@ def _order(task: Task) -> tuple:
 
 def _of_tasks(model: ifcopenshell.file) -> Iterator[tuple[Any, Task]]:
     for task in model.by_type("IfcTask"):
-        told = _dated_2x3(task) if model.schema == "IFC2X3" else _dated(task)
-        if told is None:
+        dated = _dated_2x3(task) if model.schema == "IFC2X3" else _dated(task)
+        if dated is None:
             continue
         for relation in getattr(task, "OperatesOn", None) or ():
-            yield from ((item, told) for item in relation.RelatedObjects if item.is_a("IfcProduct"))
+            yield from ((item, dated) for item in relation.RelatedObjects if item.is_a("IfcProduct"))
         for relation in getattr(task, "HasAssignments", None) or ():
             product = getattr(relation, "RelatingProduct", None)
             if product is not None and product.is_a("IfcProduct"):
-                yield product, told
+                yield product, dated
 
 
 def _dated(task: Any) -> Task | None:

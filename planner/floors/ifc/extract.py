@@ -160,7 +160,7 @@ def _all_at_once(model: ifcopenshell.file) -> Iterator[Made]:
     if not iterator.initialize():
         return
     while True:
-        _tell(iterator.progress())
+        _show_progress(iterator.progress())
         shape = iterator.get()
         yield shape.id, shape.geometry
         if not iterator.next():
@@ -173,16 +173,16 @@ def _one_by_one(model: ifcopenshell.file, without: frozenset[str], at: Path) -> 
     for number, entity in enumerate(chosen):
         if entity.GlobalId in without:
             continue
-        _tell(100 * number // len(chosen))
+        _show_progress(100 * number // len(chosen))
         at.write_text(entity.GlobalId)
         try:
             made = ifcopenshell.geom.create_shape(_settings(), entity, geometry_library=KERNEL)
         except RuntimeError:
-            continue  # told of as failed
+            continue  # reported as failed
         yield entity.id(), cast(Any, made).geometry
 
 
-def _tell(percent: int) -> None:
+def _show_progress(percent: int) -> None:
     if sys.stderr.isatty():
         sys.stderr.write(f"\r\033[Kmodel {percent} %" if percent < 100 else "\r\033[K")
         sys.stderr.flush()

@@ -156,10 +156,10 @@ def _extracted(data: bytes, path: Path) -> bytes:
 
 def _run(source: Path, out: Path, rest: Sequence[str]) -> int:
     """The other process's exit code; below 0 where a signal ended it."""
-    told = None if sys.stderr.isatty() else subprocess.DEVNULL
+    stderr = None if sys.stderr.isatty() else subprocess.DEVNULL
     command = [sys.executable, "-c", READING, str(source), str(out), *rest]
     code = subprocess.run(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=told, check=False
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=stderr, check=False
     )
     return code.returncode
 

@@ -48,7 +48,7 @@ class Heights:
 
     scan: float = 1.3
     robot: float | None = None
-    """As high as the scanner where it is not told."""
+    """As high as the scanner if it is not given."""
 
     @property
     def top(self) -> float:

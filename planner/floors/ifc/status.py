@@ -86,7 +86,7 @@ def status_on(day: str, tasks: tuple[Task, ...]) -> Status:
 
 
 def on_day(model: Model, found: Statuses, level: Level) -> tuple[Model, list[Finding], dict[str, int]]:
-    """The model as it stands on a day, what is to be told of it, and the count of each class on a floor.
+    """Return the model as built on a day, the findings on it, and the count of each class on a floor.
 
     A slab that is being made bears nobody: only built ones are floor.
 
@@ -100,7 +100,7 @@ def on_day(model: Model, found: Statuses, level: Level) -> tuple[Model, list[Fin
     kept = tuple(item for item in model.described.products if _stands(item, found))
     _check_floor(model, found, level)
     there = Model(replace(model.described, products=kept), model.vertices, model.faces)
-    return there, list(_told(found, counts, counted)), _figures(found, counts, counted)
+    return there, list(_status_findings(found, counts, counted)), _figures(found, counts, counted)
 
 
 def _figures(found: Statuses, counts: Counter[str], counted: list[Product]) -> dict[str, int]:
@@ -147,27 +147,29 @@ def _check_floor(model: Model, found: Statuses, level: Level) -> None:
         )
 
 
-def _told(found: Statuses, counts: Counter[str], counted: list[Product]) -> list[Finding]:
+def _status_findings(found: Statuses, counts: Counter[str], counted: list[Product]) -> list[Finding]:
     words = ", ".join(
         f"{counts[key]} {key.replace('_', ' ')}"
         for key in ("built", "in_progress", "not_started", "removed")
         if counts[key]
     )
     since = f"; {sum(item.global_id in found.standing for item in counted)} were built by {found.since}"
-    told = [Finding("status", f"on {found.day}: {words}{since if found.since else ''}")]
+    findings = [Finding("status", f"on {found.day}: {words}{since if found.since else ''}")]
     if found.unrelated:
         text = f"none of the schedule's {found.unrelated} GlobalIds is in the model: is it another model's?"
-        told.append(Finding("schedule_unrelated", text))
+        findings.append(Finding("schedule_unrelated", text))
     without = sorted(item.global_id for item in counted if item.global_id in found.without_task)
     if without:
         more = f" and {len(without) - MOST_NAMED} more" if len(without) > MOST_NAMED else ""
         named = f"{', '.join(without[:MOST_NAMED])}{more}"
-        told.append(Finding("no_task", f"{len(without)} elements have no task and count as built: {named}"))
+        findings.append(
+            Finding("no_task", f"{len(without)} elements have no task and count as built: {named}")
+        )
     phased = sorted(
         {name for item in counted if item.global_id in found.without_task for name in item.phases if name}
     )
     if phased:
         shown = ", ".join(f"'{legible(name)}'" for name in phased[:MOST_NAMED])
         text = f"phases without a day are not used: {shown}; give each a row of --schedule by its name"
-        told.append(Finding("phases_undated", text))
-    return told
+        findings.append(Finding("phases_undated", text))
+    return findings

@@ -64,15 +64,15 @@ def _delimiter(text: str) -> str:
     return max(",;\t", key=head.count)
 
 
-def _columns(header: Sequence[str], told: Mapping[str, str], path: Path) -> dict[str, int]:
+def _columns(header: Sequence[str], given: Mapping[str, str], path: Path) -> dict[str, int]:
     names = [name.strip().casefold() for name in header]
     found: dict[str, int] = {}
     for what, known in KNOWN.items():
-        wanted = (told[what].strip().casefold(),) if what in told else known
+        wanted = (given[what].strip().casefold(),) if what in given else known
         at = next((names.index(name) for name in wanted if name in names), None)
         if at is not None:
             found[what] = at
-        elif what in told or what == "guid":
+        elif what in given or what == "guid":
             raise _no_column(what, header, path)
     if "start" not in found and "finish" not in found:
         raise _no_column("finish", header, path)

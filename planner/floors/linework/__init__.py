@@ -1,7 +1,7 @@
 """Derivation from line work of elements that no layer shows: solid walls, doors, passages, rooms, floor.
 
 Strokes in, strokes out: what is derived is drawn as if on the layers FLOOR, ROOMS, WALLS, DOORS and PASSAGES,
-and told in findings. Derived geometry is within 0.1 mm of the lines it is made of.
+and reported in findings. Derived geometry is within 0.1 mm of the lines it is made of.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class _Site:
         polygons = canonical_region(shape)
         return [self.stroke(ring, role, layer, closed=True) for part in polygons for ring in part.rings]
 
-    def tell(self, code: str, message: str, at: FloatArray | None = None) -> None:
+    def report(self, code: str, message: str, at: FloatArray | None = None) -> None:
         """Add a finding, at a position in this frame."""
         place = None if at is None else (float(at[0] + self.origin[0]), float(at[1] + self.origin[1]))
         self.findings.append(Finding(code, message, at=place))
@@ -146,7 +146,7 @@ def _walls_and_gaps(site: _Site) -> tuple[SolidWalls, list[WallGap]]:
     gaps = gaps_of(site.lines("doors"), site.lines("openings"), [*site.lines("other"), *leaves], whole)
     walls = whole.without([gap.opening for gap in gaps])
     for area in whole.too_thick:
-        site.tell(
+        site.report(
             "not_a_wall",
             f"a hatch of {area.area:.1f} m² on a layer of walls is no wall",
             area.centroid.coords[0],
@@ -222,12 +222,12 @@ def _parting(gaps: Sequence[WallGap], rooms: Iterable[shapely.Polygon]) -> list[
 def _floor_strokes(site: _Site, spaces: Spaces) -> list[Stroke]:
     if spaces.tiled:
         area = spaces.floor.area
-        site.tell("inferred_floor", f"the floor is what its pattern of tiles covers: {area:.4g} m²")
+        site.report("inferred_floor", f"the floor is what its pattern of tiles covers: {area:.4g} m²")
         return site.rings(spaces.floor, "floor", "FLOOR")
     if spaces.closed_over is None:
         return [item for item in site.strokes if item.role == "floor"]
     area = spaces.floor.area
-    site.tell(
+    site.report(
         "inferred_floor",
         f"no layer shows the floor: {area:.4g} m² within the walls were taken, "
         f"gaps up to {spaces.closed_over:g} m in them closed (draw it on a layer FLOOR to be sure)",
@@ -238,7 +238,7 @@ def _floor_strokes(site: _Site, spaces: Spaces) -> list[Stroke]:
 def _wall_strokes(site: _Site, walls: SolidWalls) -> list[Stroke]:
     layer = next((item.layer for item in site.strokes if item.role == "walls"), "WALLS")
     if walls.joined:
-        site.tell(
+        site.report(
             "inferred_walls",
             f"{walls.joined} ends of wall lines were joined over gaps or across a wall's end",
         )
@@ -255,7 +255,7 @@ def _opening_strokes(site: _Site, gaps: Sequence[WallGap]) -> list[Stroke]:
         if own and kind != "window":
             loose = sum(not gap.held for gap in own)
             doubt = f"; {loose} of them do not reach walls on both sides" if loose else ""
-            site.tell(f"inferred_{role}", f"{len(own)} {role} were found in the line work{doubt}")
+            site.report(f"inferred_{role}", f"{len(own)} {role} were found in the line work{doubt}")
     return [
         site.stroke(gap.line, roles[gap.kind], gap.kind.upper(), closed=False)
         for gap in gaps
@@ -268,7 +268,7 @@ def _room_strokes(site: _Site, rooms: Sequence[shapely.Polygon]) -> list[Stroke]
     if given or len(rooms) < 2:
         return given
     area = sum(room.area for room in rooms)
-    site.tell(
+    site.report(
         "inferred_rooms",
         f"no layer shows rooms: {len(rooms)} were derived from the walls, {area:.4g} m² in all",
     )

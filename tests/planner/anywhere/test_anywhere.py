@@ -98,7 +98,7 @@ def test_no_choice_of_many_places_beats_the_bound(seed: int) -> None:
 
 
 def meets(tried: Visibility, rows: tuple[int, ...], demands: Demands, needed: IntArray) -> bool:
-    """Whether these places see what is needed."""
+    """True if these positions see the required units."""
     got = np.zeros(tried.targets.total, dtype=bool)
     for row in rows:
         got[tried.seen_by(row)] = True

@@ -1,4 +1,4 @@
-"""What a mission claims its stops see, counted anew: a plan's claims hold, and what is more is told."""
+"""Recount of a mission's coverage claims: a plan's claims hold, and excess claims are reported."""
 
 from __future__ import annotations
 

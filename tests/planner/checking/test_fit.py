@@ -1,4 +1,4 @@
-"""Whether a mission fits a floor: what planning makes fits, and what is moved is told with its distance."""
+"""Fit of a mission on a floor: a plan fits, and a moved stop is reported with its distance."""
 
 from __future__ import annotations
 
