@@ -73,6 +73,6 @@ def not_met(selection: Selection) -> Iterator[Finding]:
         more = f" and {len(short) - MOST_NAMED} more" if len(short) > MOST_NAMED else ""
         yield Finding(
             NOT_MET,
-            f"seen {', '.join(limits.values())} can be, of what is in sight, only: "
+            f"seen {', '.join(limits.values())} can be, of the visible targets, only: "
             f"{', '.join(short[:MOST_NAMED])}{more}; lower --grid or --d-sec, or ask for less",
         )

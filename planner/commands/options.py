@@ -50,14 +50,17 @@ def _key(parameter: Parameter) -> str:
 def _option(parameter: Parameter) -> inspect.Parameter:
     kind = list[str] if parameter.repeatable or parameter.further else _plain(parameter)
     name = "--" + _key(parameter).replace("_", "-")
-    told = typer.Option(
+    option = typer.Option(
         *([f"{name}/--no-{name[2:]}"] if parameter.default is None and kind is bool else [name]),
         metavar=parameter.form.upper() or "|".join(parameter.choices) or None,
         help=f"{_help(parameter)}  [default: {_default(parameter)}]",
         show_default=False,
     )
     return inspect.Parameter(
-        _key(parameter), inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, told]
+        _key(parameter),
+        inspect.Parameter.KEYWORD_ONLY,
+        default=None,
+        annotation=Annotated[kind | None, option],
     )
 
 

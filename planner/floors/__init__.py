@@ -61,8 +61,8 @@ def read_floor(path: Path, options: FloorOptions | None = None) -> FloorPlan:
     Raises
     ------
     InputError
-        One line naming the file, what is wrong with it, and the way out; also for an option that means
-        nothing to such a file.
+        One line with the file, the problem and the remedy; also for an option that does not apply to
+        such a file.
     """
     file, reader, options = _opened(path, options)
     with reader.blamed():

@@ -110,7 +110,7 @@ def _cells(strokes: Sequence[Stroke]) -> tuple[FloatArray, np.ndarray]:
     sampled = [_sampled(item.points) for item in strokes]
     number = np.repeat(np.arange(len(strokes)), [len(points) for points in sampled])
     cells, place = np.unique(np.floor(np.concatenate(sampled)), axis=0, return_inverse=True)
-    # A stroke hangs together itself: its cells are linked by their distance alone, being 1 m apart at most.
+    # A stroke is connected itself: its cells are linked by their distance alone, being 1 m apart at most.
     return cells, np.stack([number, place.reshape(-1)], axis=1)
 
 

@@ -129,7 +129,7 @@ def _no_walls(sheet: DxfSheet) -> str:
         f"no closed outline on layer FLOOR, and no layer that shows walls; layers present: {_listed(layers)}"
     )
     if len(layers) < 2:
-        return f"{why} (nothing tells walls from other lines; ask for an export with layers)"
+        return f"{why} (walls cannot be distinguished from other lines; ask for an export with layers)"
     return f"{why} (say which one holds the walls, such as --layer {layers[0]}=walls)"
 
 

@@ -129,7 +129,7 @@ def _on_the_floor(drawn: Drawn, spaces: _Spaces) -> tuple[Drawn, list[IgnoredLin
         at = place(shapely.get_coordinates(shape.region))
         if shape.region.distance(spaces.outline) > _NEAR:
             findings.append(
-                Finding("off_floor", f"layer {shape.layer}: a shape beside the floor is ignored", at=at)
+                Finding("off_floor", f"layer {shape.layer}: a shape outside the floor is ignored", at=at)
             )
         elif spaces.filled_by(shape.region):
             text = f"layer {shape.layer}: a ring around rooms ({shape.region.area:.3g} m²) is ignored"

@@ -40,21 +40,21 @@ def _bridges(floor: Region) -> NDArray[np.object_]:
     edges = segments_of(shapely.orient_polygons(shapely.MultiPolygon(polygon_parts(floor))))
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
     edges, length = edges[length > 0], length[length > 0]
-    way = (edges[:, 1] - edges[:, 0]) / length[:, None]
+    direction = (edges[:, 1] - edges[:, 0]) / length[:, None]
     lines = shapely.linestrings(edges)
     one, other = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=JOINT + SLACK)
-    facing = (one < other) & (np.einsum("ij,ij->i", way[one], way[other]) <= _FACING)
+    facing = (one < other) & (np.einsum("ij,ij->i", direction[one], direction[other]) <= _FACING)
     one, other = one[facing], other[facing]
-    sides = [_side(lines, way, one, other), _side(lines, way, other, one)]
+    sides = [_side(lines, direction, one, other), _side(lines, direction, other, one)]
     return shapely.convex_hull(shapely.union(*sides))
 
 
 def _side(
-    lines: NDArray[np.object_], way: FloatArray, one: NDArray[np.int64], other: NDArray[np.int64]
+    lines: NDArray[np.object_], direction: FloatArray, one: NDArray[np.int64], other: NDArray[np.int64]
 ) -> NDArray[np.object_]:
     """The part of each edge near the other one, and the same part moved slightly into its slab."""
     near = shapely.intersection(lines[one], shapely.buffer(lines[other], JOINT + SLACK))
-    inward = SNAP * np.stack([-way[one][:, 1], way[one][:, 0]], axis=1)
+    inward = SNAP * np.stack([-direction[one][:, 1], direction[one][:, 0]], axis=1)
     xy, owner = shapely.get_coordinates(near, return_index=True)
     return shapely.union(near, shapely.set_coordinates(near.copy(), xy + inward[owner]))
 

@@ -54,17 +54,17 @@ class FloorOptions:
     level: float | None = None
     """Level of the floor in metres, where the model names no storey there."""
     scan_height: float | None = None
-    """Height of the scanner above the floor in metres: what is cut there occludes and is a target."""
+    """Height of the scanner above the floor in metres: a solid cut there occludes and is a target."""
     robot_height: float | None = None
-    """Height of the robot in metres: what is lower than this stands in its way."""
+    """Height of the robot in metres: a solid lower than this is an obstacle."""
     date: str | None = None
     """The day whose construction status is read, as YYYY-MM-DD."""
     since: str | None = None
-    """Only what was finished after this day, as YYYY-MM-DD, is to be scanned."""
+    """Only elements finished after this day, as YYYY-MM-DD, is to be scanned."""
     schedule: Path | None = None
     """CSV of GlobalIds with the start and finish of their tasks."""
     schedule_columns: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    """Which column of the CSV is what: guid, task, start, finish."""
+    """Name of the CSV column for each of guid, task, start, finish."""
     in_progress: Literal["obstacle", "target"] | None = None
     """Treatment of elements under construction on the day: obstacle only, or target too."""
 
@@ -81,7 +81,7 @@ class FloorOptions:
 class ReaderModule(Protocol):
     """The module of a reader: two functions of one signature.
 
-    Both raise InputError, one line with the file, what is wrong with it, and the way out.
+    Both raise InputError, one line with the file, the problem and the remedy.
     """
 
     def survey(self, file: FloorFile, options: FloorOptions) -> Survey:

@@ -88,7 +88,7 @@ def _host(product: Product, model: Model, walls: dict[str, Region]) -> Region | 
 
 
 def _faces_of_wall(box: FloatArray, frame: FloatArray, wall: Region | None) -> tuple[float, float]:
-    """The y of the wall's faces beside the opening; of the opening itself without a wall."""
+    """The y of the wall's faces at the opening; of the opening itself if there is no wall."""
     if wall is not None:
         local = (shapely.get_coordinates(wall) - frame[0]) @ frame[1:].T
         x, y = local.T

@@ -1,6 +1,6 @@
 """IFC file -> model, in a process of its own, with the arguments MODEL and OUT.
 
-The geometry kernel is compiled code that may crash on a bad solid; here it takes nobody with it. Progress
+The geometry kernel is compiled code that may crash on a bad solid: a crash ends only this process. Progress
 goes to stderr where that is a terminal. What it was working on last is in the file OUT.at.
 """
 

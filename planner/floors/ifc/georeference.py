@@ -18,7 +18,7 @@ DEFAULTS = {
     "London, as Archicad sets it": (51.50015, -0.12624),
     "0, 0": (0.0, 0.0),
 }
-"""Sites that programs write where nobody has said one."""
+"""Default sites that programs write if the user gave none."""
 NEAR_DEFAULT = 0.005
 """A site this near to a default is one, degrees."""
 UNITS = {"m": 1.0, "mm": 1e-3, "ft": 0.3048, "cm": 1e-2, "US survey ft": 1200 / 3937}

@@ -171,7 +171,7 @@ def standing_at(model: Model) -> str:
 
 
 def with_uses(levels: tuple[Level, ...], model: Model) -> tuple[Level, ...]:
-    """The same floors; those that nobody walks on are marked: crawl spaces, foundations and open roofs."""
+    """The same floors; those not for walking are marked: crawl spaces, foundations and open roofs."""
     if not levels:
         return ()
     lively = [_lively(level, model) for level in levels]

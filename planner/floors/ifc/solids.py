@@ -17,9 +17,9 @@ OFF_LEVEL = 1.37e-3
 KERB = 0.1
 """A solid lower than this above the floor is driven over, or is the floor's own edge, metres."""
 LAID = 0.01
-"""A beam that hangs less than this below the next floor lies in it, metres."""
+"""A beam less than this below the next floor lies in it, metres."""
 TREADS = (0.15, 2.0)
-"""Heights above the floor between which a stair is in the way."""
+"""Heights above the floor between which a stair is an obstacle."""
 FRAME = 0.1
 """Gaps up to this width between the parts of a window are closed, metres."""
 LEAST = 4e-4

@@ -88,7 +88,7 @@ def status_on(day: str, tasks: tuple[Task, ...]) -> Status:
 def on_day(model: Model, found: Statuses, level: Level) -> tuple[Model, list[Finding], dict[str, int]]:
     """Return the model as built on a day, the findings on it, and the count of each class on a floor.
 
-    A slab that is being made bears nobody: only built ones are floor.
+    A slab under construction does not carry the robot: only built ones are floor.
 
     Raises
     ------

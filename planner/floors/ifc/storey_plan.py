@@ -119,7 +119,7 @@ def drawn_on(
     if not rooms:
         rooms = derived_rooms(floor, solids, doors)
         findings.append(
-            Finding("rooms_derived", f"the model has no spaces there; {len(rooms)} rooms are worked out")
+            Finding("rooms_derived", f"the model has no spaces there; {len(rooms)} rooms are inferred")
         )
     solids, odd_solids = _near_the_floor(solids, floor)
     findings += [*odd_solids, *_unknown(solids)]
@@ -134,18 +134,18 @@ def drawn_on(
 
 
 def _unknown(solids: list[Solid]) -> list[Finding]:
-    """Products without a class of their own: nobody knows what the laser makes of them."""
+    """Products without a class of their own: their effect on the laser is unknown."""
     count = sum(item.kind == "other" for item in solids)
-    text = f"{count} IfcBuildingElementProxy stand in the robot's way, hide nothing and are not scanned"
+    text = f"{count} IfcBuildingElementProxy are obstacles, hide nothing and are not scanned"
     return [Finding("proxies", text)] if count else []
 
 
 def _near_the_floor(solids: list[Solid], floor: Region) -> tuple[list[Solid], list[Finding]]:
-    """Without what stands beside the floor, such as on the roof of a lower wing."""
+    """Return the solids without those outside the floor, such as on the roof of a lower wing."""
     near = [item for item in solids if item.region.distance(floor) <= BESIDE]
     if len(near) == len(solids):
         return near, []
-    text = f"{len(solids) - len(near)} elements more than {BESIDE:g} m beside the floor are left out"
+    text = f"{len(solids) - len(near)} elements more than {BESIDE:g} m outside the floor are left out"
     return near, [Finding("beside_floor", text)]
 
 

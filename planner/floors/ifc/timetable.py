@@ -1,4 +1,4 @@
-"""A schedule kept beside the model: a CSV of GlobalIds with the start and the finish of their tasks."""
+"""A separate schedule of the model: a CSV of GlobalIds with the start and the finish of their tasks."""
 
 from __future__ import annotations
 

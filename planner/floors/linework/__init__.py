@@ -85,7 +85,7 @@ class _Site:
         return Stroke(frozen(np.round(points, 4) + self.origin), layer, role, closed=closed)
 
     def rings(self, shape: Region, role: str, layer: str) -> list[Stroke]:
-        """The rings of a region: holes go round the other way."""
+        """The rings of a region: holes have the opposite direction."""
         polygons = canonical_region(shape)
         return [self.stroke(ring, role, layer, closed=True) for part in polygons for ring in part.rings]
 

@@ -61,8 +61,8 @@ def _cut(
 
 def _halves(part: shapely.Polygon, cut: FloatArray) -> list[shapely.Polygon]:
     """Parts on both sides of a cut; a cut may run along walls' faces, so it has a width."""
-    way = (cut[1] - cut[0]) / np.hypot(*(cut[1] - cut[0]))
-    line = shapely.LineString([cut[0] - 3 * _DETAIL * way, cut[1] + 3 * _DETAIL * way])
+    direction = (cut[1] - cut[0]) / np.hypot(*(cut[1] - cut[0]))
+    line = shapely.LineString([cut[0] - 3 * _DETAIL * direction, cut[1] + 3 * _DETAIL * direction])
     pieces = polygons_of(part.difference(line.buffer(_KERF / 2, cap_style="flat")))
     halves = [piece for piece in pieces if piece.area >= _LEAST]
     if len(halves) != 2:
@@ -112,7 +112,7 @@ def _edges(ring: FloatArray) -> FloatArray:
 
 def _feet(points: FloatArray, edges: FloatArray) -> FloatArray:
     """For each point the nearest point (n, m, 2) of each edge."""
-    way = edges[:, 1] - edges[:, 0]
-    size = np.maximum(np.einsum("ij,ij->i", way, way), 1e-12)
-    t = np.einsum("nij,ij->ni", points[:, None, :] - edges[None, :, 0], way) / size
-    return np.asarray(edges[None, :, 0] + np.clip(t, 0.0, 1.0)[..., None] * way[None])
+    direction = edges[:, 1] - edges[:, 0]
+    size = np.maximum(np.einsum("ij,ij->i", direction, direction), 1e-12)
+    t = np.einsum("nij,ij->ni", points[:, None, :] - edges[None, :, 0], direction) / size
+    return np.asarray(edges[None, :, 0] + np.clip(t, 0.0, 1.0)[..., None] * direction[None])

@@ -121,23 +121,23 @@ def _segments(lines: Sequence[FloatArray]) -> FloatArray:
 
 def _bridges(drawn: FloatArray) -> FloatArray:
     """Segments (n, 2, 2) from free ends to what they nearly meet, and across open ends of double lines."""
-    ends, way = _free_ends(drawn)
+    ends, direction = _free_ends(drawn)
     if not len(ends):
         return np.empty((0, 2, 2))
     met, near = _to_lines(ends, drawn)
-    caps = _caps(ends[~met], way[~met])
+    caps = _caps(ends[~met], direction[~met])
     return np.concatenate([near, caps])
 
 
 def _free_ends(drawn: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Ends (n, 2) that touch no other segment, and the directions (n, 2) in which their lines end there."""
     ends = np.concatenate([drawn[:, 1], drawn[:, 0]])
-    way = np.concatenate([drawn[:, 1] - drawn[:, 0], drawn[:, 0] - drawn[:, 1]])
-    way = way / np.hypot(*way.T)[:, None]
+    direction = np.concatenate([drawn[:, 1] - drawn[:, 0], drawn[:, 0] - drawn[:, 1]])
+    direction = direction / np.hypot(*direction.T)[:, None]
     tree = shapely.STRtree(shapely.linestrings(drawn))
     point, _ = tree.query(shapely.points(ends), predicate="dwithin", distance=_GRID)
     free = np.bincount(point, minlength=len(ends)) <= 1
-    return ends[free], way[free]
+    return ends[free], direction[free]
 
 
 def _to_lines(ends: FloatArray, drawn: FloatArray) -> tuple[BoolArray, FloatArray]:
@@ -155,7 +155,7 @@ def _to_lines(ends: FloatArray, drawn: FloatArray) -> tuple[BoolArray, FloatArra
     return met, shapely.get_coordinates(across).reshape(-1, 2, 2)
 
 
-def _caps(ends: FloatArray, way: FloatArray) -> FloatArray:
+def _caps(ends: FloatArray, direction: FloatArray) -> FloatArray:
     """Segments that close double lines which simply end, side by side, such as at a door."""
     if len(ends) < 2:
         return np.empty((0, 2, 2))
@@ -165,8 +165,8 @@ def _caps(ends: FloatArray, way: FloatArray) -> FloatArray:
     one, other = pairs.T
     across = ends[other] - ends[one]
     width = np.hypot(*across.T)
-    along = np.abs(np.einsum("ij,ij->i", across, way[one])) / width
-    alike = np.einsum("ij,ij->i", way[one], way[other]) > 0.99
+    along = np.abs(np.einsum("ij,ij->i", across, direction[one])) / width
+    alike = np.einsum("ij,ij->i", direction[one], direction[other]) > 0.99
     good = alike & (along < 0.1) & (width > 0.03)
     best: dict[int, int] = {}
     for k in np.flatnonzero(good)[np.argsort(width[good], kind="stable")].tolist():
@@ -217,8 +217,8 @@ def caps_of(shape: Region) -> tuple[FloatArray, FloatArray, FloatArray]:
     found = [_caps_of_ring(ring) for part in polygons_of(shape) for ring in _rings(part)]
     if not found:
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0)
-    middles, ways, widths = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return middles, ways, widths
+    middles, directions, widths = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return middles, directions, widths
 
 
 def _rings(part: shapely.Polygon) -> list[FloatArray]:
@@ -229,13 +229,13 @@ def _rings(part: shapely.Polygon) -> list[FloatArray]:
 def _caps_of_ring(ring: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     edge = np.roll(ring, -1, axis=0) - ring
     length = np.hypot(*edge.T)
-    way = edge / length[:, None]
-    before, after = np.roll(way, 1, axis=0), np.roll(way, -1, axis=0)
+    direction = edge / length[:, None]
+    before, after = np.roll(direction, 1, axis=0), np.roll(direction, -1, axis=0)
     # Solid lies to the left: an end turns left on both sides.
-    left = (_cross(before, way) > 0.7) & (_cross(way, after) > 0.7)
+    left = (_cross(before, direction) > 0.7) & (_cross(direction, after) > 0.7)
     end = left & (length > 0.03) & (length <= THICKEST)
     middles = ring[end] + edge[end] / 2
-    return middles, np.stack([way[end][:, 1], -way[end][:, 0]], axis=1), length[end]
+    return middles, np.stack([direction[end][:, 1], -direction[end][:, 0]], axis=1), length[end]
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -1,6 +1,6 @@
 """Reader of robots' maps: a ROS map.yaml with its picture becomes a floor in the map's own frame.
 
-Occupied cells become walls, or obstacles where they are too small for one; what nobody knows is not floor.
+Occupied cells become walls, or obstacles where they are too small for one; unknown cells are not floor.
 The coordinates are those of the map, so that stops are where the robot takes them to be.
 """
 
@@ -117,7 +117,7 @@ def _opened(file: FloorFile) -> tuple[MapDescription, bytes]:
         return description, path.read_bytes()
     except (OSError, ValueError):
         raise InputError(
-            f"{file.path}: its image {description.image} cannot be read; put it beside the file, "
+            f"{file.path}: its image {description.image} cannot be read; put it in the same folder, "
             "or write where it is"
         ) from None
 
@@ -150,8 +150,8 @@ def _largest_floors(cells: NDArray[np.uint8], description: MapDescription, path:
             "check image, negate, mode and the thresholds"
         )
     standing, _ = ndimage.label((cells == OCCUPIED) | kept, _EIGHT)
-    beside = np.unique(standing[kept])
-    return kept | (np.isin(standing, beside) & (cells == OCCUPIED))
+    adjacent = np.unique(standing[kept])
+    return kept | (np.isin(standing, adjacent) & (cells == OCCUPIED))
 
 
 def _small(occupied: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:

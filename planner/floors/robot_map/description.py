@@ -34,7 +34,7 @@ class MapDescription:
     def cells(self, picture: GreyPicture) -> NDArray[np.uint8]:
         """FREE, UNKNOWN or OCCUPIED for each pixel (rows, columns), the first row at the bottom.
 
-        What `scale` and `raw` call more or less occupied is unknown: nobody drives there, nobody measures it.
+        Values between free and occupied of `scale` and `raw` are unknown: not drivable and not a target.
         """
         grey = picture.grey.astype(np.float64)
         known = picture.opaque
