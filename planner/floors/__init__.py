@@ -16,9 +16,9 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import FLOOR_PARAMETERS, Settings
 from stopgo.mission.settings.layer_kinds import kinds_by_name
-from stopgo.planner.floors.foreign import foreign_readers, sound
 from stopgo.planner.floors.reader import FloorFile, FloorOptions, Reader
 from stopgo.planner.floors.survey import Survey
+from stopgo.planner.floors.third_party_readers import foreign_readers, sound
 
 READERS: tuple[Reader, ...] = (
     Reader(
