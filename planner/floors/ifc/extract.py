@@ -20,7 +20,7 @@ import ifcopenshell.util.placement
 import ifcopenshell.util.unit
 import numpy as np
 
-from stopgo.planner.floors.ifc.dated import phases_of, tasks_by_product
+from stopgo.planner.floors.ifc.construction_dates import phases_of, tasks_by_product
 from stopgo.planner.floors.ifc.model import Described, Model, Placement, Product, Storey, packed
 from stopgo.planner.floors.ifc.placed import place_of
 
