@@ -21,8 +21,8 @@ import ifcopenshell.util.unit
 import numpy as np
 
 from stopgo.planner.floors.ifc.construction_dates import phases_of, tasks_by_product
+from stopgo.planner.floors.ifc.earth_placement import place_of
 from stopgo.planner.floors.ifc.model import Described, Model, Placement, Product, Storey, packed
-from stopgo.planner.floors.ifc.placed import place_of
 
 KERNEL: Final = "hybrid-cgal-simple-opencascade"
 ROLES = {
