@@ -87,7 +87,7 @@ def plan(
 
     Raises
     ------
-    AnswerIsNo
+    NegativeResult
         No target, no candidate, nothing in sight, or the coverage asked for cannot be reached.
     InputError
         A file, parameter or place that does not fit.
@@ -137,7 +137,7 @@ def export(mission: Mission, path: str | Path, *, to: str | None = None) -> None
     ------
     InputError
         No such format, or it needs a georeference that the mission has not.
-    AnswerIsNo
+    NegativeResult
         The format cannot hold what the mission depends on.
     """
     from stopgo.mission.files.atomic import write_atomic
@@ -167,7 +167,7 @@ def push(mission: Mission, station: Station) -> None:
 
     Raises
     ------
-    AnswerIsNo
+    NegativeResult
         The robot rejects it, with its reason.
     OutcomeUnknown
         No answer came: it may or may not be stored.
@@ -201,7 +201,7 @@ def replay(
     ------
     InputError
         When it cannot be read, nothing tells how its frame lies, or it is of another mission.
-    AnswerIsNo
+    NegativeResult
         When its halts fit the stops in no way, or in several.
     """
     from stopgo.mission.frames.transform import Transform

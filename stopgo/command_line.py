@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from typer.exceptions import TyperException
     from typer.models import CommandInfo
 
-COMMANDS = ("plan_commands", "bridge_commands", "recording_commands", "document_commands")
+COMMANDS = (
+    "plan_command", "floor_commands", "prove_command", "demo_command",
+    "bridge_commands", "recording_commands", "document_commands",
+)  # fmt: skip
 """The modules of `stopgo.commands`, in the order of the help; each has
 `add_commands(app)` and imports slow libraries where used."""
 

@@ -1,1 +1,1 @@
-"""What a plan amounts to: its figures, what it leaves out, and what is doubtful."""
+"""Appraisal of a plan: its figures, the floor it leaves out, and its doubtful points."""

@@ -1,4 +1,4 @@
-"""Route -> figures: what the stops see of every room and kind, what is left out, and what is doubtful."""
+"""Route -> figures: coverage of every room and kind, floor left out, and doubtful points."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from stopgo.mission.stages import Candidates, Route, Selection
 from stopgo.mission.stages.coverage_totals import ledger_of
 from stopgo.mission.stages.covered_intervals import seen_units
 from stopgo.mission.stages.figures import Figures, Shares
-from stopgo.planner.appraisal.plausible import doubts_of, near_legs
+from stopgo.planner.appraisal.plausibility import near_legs, plausibility_findings
 from stopgo.planner.appraisal.quality import NOT_MET, not_met, quality_of
 from stopgo.planner.appraisal.unreached import unreached
 from stopgo.planner.geometry.shapes import local_origin, to_shape
@@ -19,14 +19,14 @@ from stopgo.planner.space.reach import reach_of
 
 
 def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figures:
-    """What a plan amounts to; `planned` are the parts of the floor that some plan of it enters."""
+    """Return the figures of a plan; `planned` are the parts of the floor that any plan enters."""
     selection = route.selection
     candidates = selection.visibility.candidates
     space, settings = candidates.space, candidates.space.settings
     parts = planned or frozenset([candidates.chosen_part])
     left_out = unreached(candidates, parts)
     reached = _reached_m2(candidates, parts)
-    doubts = (*doubts_of(route, reached_m2=reached), *not_met(selection), *scans_apart(route))
+    doubts = (*plausibility_findings(route, reached_m2=reached), *not_met(selection), *scans_apart(route))
     findings = (*space.findings, *doubts)
     shares = shares_of(selection, why={item.room: item.why for item in left_out})
     return Figures(
@@ -43,10 +43,10 @@ def figures_of(route: Route, *, planned: frozenset[int] | None = None) -> Figure
 
 
 def figures_of_share(route: Route, whole: Figures) -> Figures:
-    """What one of several missions sees of its own; what is asked for is asked of all of them together."""
+    """Return the figures of one of several missions; the required coverage applies to all together."""
     shares = shares_of(route.selection, why={item.room: item.why for item in whole.unreached})
     space = route.selection.visibility.candidates.space
-    doubts = doubts_of(route, reached_m2=whole.reached_m2)
+    doubts = plausibility_findings(route, reached_m2=whole.reached_m2)
     of_all = (item for item in whole.findings if item.code in (NOT_MET, *SCANS_APART))
     findings = (*space.findings, *doubts, *of_all)
     return replace(
@@ -60,14 +60,14 @@ def figures_of_share(route: Route, whole: Figures) -> Figures:
 
 
 def shares_of(selection: Selection, *, why: Mapping[str, str] | None = None) -> Shares:
-    """What the stops see of the whole, of every room and of every kind, the least seen first."""
+    """Return the coverage of the whole, of every room and of every kind, the lowest first."""
     return ledger_of(selection.visibility, why).shares(seen_units(selection))
 
 
 def ranked(findings: tuple[Finding, ...], near: set[int]) -> tuple[Finding, ...]:
-    """Findings that bear on the plan most first: those beside a leg, then by rank, then as they were.
+    """Sort findings by importance: those near a leg first, then by rank, then in their order.
 
-    `near` are the places in `findings` of those beside a leg; notes are never among them.
+    `near` are the indices in `findings` of those near a leg; notes do not count as near.
     """
 
     def key(k: int) -> tuple[bool, int]:
@@ -77,7 +77,7 @@ def ranked(findings: tuple[Finding, ...], near: set[int]) -> tuple[Finding, ...]
 
 
 def _reached_m2(candidates: Candidates, parts: frozenset[int]) -> float:
-    """Area of rooms, each by the share of where the robot may drive in it that belongs to these parts."""
+    """Reached area of rooms: each room's area times the fraction of its drive area in these parts."""
     space = candidates.space
     origin = local_origin(space.floor)
     found = reach_of(space).parts

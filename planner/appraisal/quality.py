@@ -1,4 +1,4 @@
-"""How well a plan's targets are to be seen: what that costs in stops, and where it cannot be had."""
+"""Quality limits on a plan's views: their cost in stops, and the rooms that cannot meet them."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ MOST_NAMED = 5
 
 
 def quality_of(selection: Selection) -> Quality | None:
-    """What the limits on views cost, each switched off alone; None where there are none.
+    """Return the cost of the limits on views, each switched off alone; None if there are no limits.
 
-    Plans for that are made quickly from what is known to be in sight, so they are about right.
+    The plans without a limit use a fast selection on the known visibility, so the cost is approximate.
     """
     seen = selection.visibility
     settings = seen.candidates.space.settings
-    told = limits_in_words(limits_spec_of(settings))
-    if not told:
+    limits = limits_in_words(limits_spec_of(settings))
+    if not limits:
         return None
     in_sight = _in_sight(seen)
     stops, costs = len(selection.chosen), []
-    for key, words in told.items():
+    for key, words in limits.items():
         fewer, bound = quick(_under(in_sight, without(settings, key)))
         costs.append(LimitCost(key, words, stops=stops, without=fewer, bound=bound))
     ledger = ledger_of(seen)
@@ -48,23 +48,23 @@ def _in_sight(seen: Visibility) -> Visibility:
 
 
 def _under(in_sight: Visibility, settings: Settings) -> Visibility:
-    """What is seen well enough by other settings."""
+    """Visibility within the limits of other settings."""
     candidates = in_sight.candidates
     space = replace(candidates.space, settings=settings)
     return seen_well(replace(in_sight, candidates=replace(candidates, space=space)))
 
 
 def _possible(seen: Visibility) -> BoolArray:
-    """Whether as many candidates see each unit well enough as stops are asked for."""
-    asked = seen.candidates.space.settings.least_views
-    return frozen(seen.visible & (seen.asked >= asked), np.bool_)
+    """True for each unit that enough candidates see within the limits."""
+    required = seen.candidates.space.settings.least_views
+    return frozen(seen.visible & (seen.asked >= required), np.bool_)
 
 
 def not_met(selection: Selection) -> Iterator[Finding]:
-    """Where so little can be seen well enough that the shares asked for are out of reach of any stops."""
+    """A finding if no stops can reach the required coverage within the limits."""
     seen = selection.visibility
-    told = limits_in_words(limits_spec_of(seen.candidates.space.settings))
-    if not told:
+    limits = limits_in_words(limits_spec_of(seen.candidates.space.settings))
+    if not limits:
         return
     ledger = replace(ledger_of(seen), visible=_in_sight(seen).visible)
     shares = ledger.shares(_possible(seen))
@@ -73,6 +73,6 @@ def not_met(selection: Selection) -> Iterator[Finding]:
         more = f" and {len(short) - MOST_NAMED} more" if len(short) > MOST_NAMED else ""
         yield Finding(
             NOT_MET,
-            f"seen {', '.join(told.values())} can be, of what is in sight, only: "
+            f"seen {', '.join(limits.values())} can be, of the visible targets, only: "
             f"{', '.join(short[:MOST_NAMED])}{more}; lower --grid or --d-sec, or ask for less",
         )

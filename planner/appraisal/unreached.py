@@ -1,4 +1,4 @@
-"""Floor that a plan does not enter, room by room and piece by piece, each with the reason."""
+"""Floor that a plan does not enter: rooms, and areas of other rooms, each with the reason."""
 
 from __future__ import annotations
 
@@ -12,40 +12,40 @@ from stopgo.mission.stages import AT_EDGE, IN_HOLE, OTHER_PART, TOO_CLOSE, UNREA
 from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.space.floor_gaps import gap_before
 from stopgo.planner.space.opening_joins import PROBES
-from stopgo.planner.space.place import Place
 from stopgo.planner.space.reach import reach_of
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 LEAST_AREA = 0.01
-"""Rooms smaller than this (m²) are not told of."""
-LEAST_PIECE = 1.0
-"""Pieces of a room where the robot's centre could drive on less than this (m²) are not told of."""
+"""Rooms smaller than this (m²) are not reported."""
+LEAST_CUT_OFF = 1.0
+"""Cut-off areas of a room with a drive area smaller than this (m²) are not reported."""
 
 
 def unreached(candidates: Candidates, planned: frozenset[int] | None = None) -> tuple[Unreached, ...]:
-    """Every room without a reachable candidate, and every piece of the other rooms that is cut off.
+    """Every room without a reachable candidate, and every cut-off area of the other rooms.
 
-    `planned` are the parts of the floor that some plan enters; by default the one of these candidates.
+    `planned` are the parts of the floor that any plan enters; by default the part of these candidates.
     """
     parts = planned or frozenset([candidates.chosen_part])
-    told: list[Unreached] = []
+    found: list[Unreached] = []
     for index, room in enumerate(candidates.space.rooms):
         here = candidates.room == index
         area = sum(polygon.area for polygon in room.area)
         if np.isin(candidates.part[here], sorted(parts)).any():
-            told += _cut_off(candidates, index, parts)
+            found += _cut_off(candidates, index, parts)
         elif area > LEAST_AREA:
             reasons = set(candidates.reason[here].tolist())
-            told.append(Unreached(room.name, _why(candidates, index, reasons, parts), area))
-    return tuple(told)
+            found.append(Unreached(room.name, _why(candidates, index, reasons, parts), area))
+    return tuple(found)
 
 
 def _cut_off(candidates: Candidates, index: int, parts: frozenset[int]) -> Iterator[Unreached]:
-    """Pieces of an entered room where the robot could drive but does not get to."""
+    """Areas of an entered room where the robot could drive but that it cannot reach."""
     space = candidates.space
     found = reach_of(space).parts
     shape = to_shape(space.rooms[index].area, local_origin(space.floor))
     for part, area in sorted(found.area_by_part(shape).items()):
-        if part not in parts and area >= LEAST_PIECE:
+        if part not in parts and area >= LEAST_CUT_OFF:
             x, y = _middle(candidates, part, shape)
             gap = gap_before(space, shape, parts)
             beyond = f" ({gap})" if gap else ""
@@ -67,39 +67,39 @@ def _why(candidates: Candidates, index: int, reasons: set[int], parts: frozenset
     settings = candidates.space.settings
     closed = _barriers(candidates, index, parts)
     if OTHER_PART in reasons:
-        told = f"in another part of the floor ({closed})" if closed else "in another part of the floor"
-        return f"{told}; --all-parts plans it too"
+        where = f"in another part of the floor ({closed})" if closed else "in another part of the floor"
+        return f"{where}; --all-parts plans it too"
     if UNREACHABLE in reasons:
         return f"the robot does not fit in ({closed or 'too narrow'})"
-    if AT_EDGE in reasons:  # of places far enough from elements
+    if AT_EDGE in reasons:  # of positions far enough from elements
         gap = _gap(candidates, index, parts)
-        return f"no place {settings.edge:g} m from the floor's edges{f' ({gap})' if gap else ''}"
+        return f"no position {settings.edge:g} m from the floor's edges{f' ({gap})' if gap else ''}"
     if TOO_CLOSE in reasons:
-        return f"no place {settings.d_sec:g} m from every element{_smaller_d_sec(candidates, index)}"
-    return "no floor in it" if IN_HOLE in reasons else "no place for a stop"
+        return f"no position {settings.d_sec:g} m from every element{_smaller_d_sec(candidates, index)}"
+    return "no floor in it" if IN_HOLE in reasons else "no position for a stop"
 
 
 def _smaller_d_sec(candidates: Candidates, index: int) -> str:
-    """The greatest d_sec, in whole centimetres, that leaves a place for a stop, if the robot fits there."""
+    """The greatest d_sec, in whole centimetres, that leaves a stop position, if the robot fits there."""
     space = candidates.space
-    place = Place(space)
-    free = place.rooms[index].difference(place.obstacles)
+    feasibility = StopFeasibility(space)
+    free = feasibility.rooms[index].difference(feasibility.obstacles)
     if free.is_empty:
         return ""
     middle = shapely.get_coordinates(shapely.maximum_inscribed_circle(free, tolerance=1e-3))[:1]
-    d_sec = math.floor(100 * float(place.to_element(middle)[0]) + 1e-6) / 100
-    fits = d_sec >= space.settings.radius and place.to_edge(middle)[0] >= space.settings.edge
+    d_sec = math.floor(100 * float(feasibility.to_element(middle)[0]) + 1e-6) / 100
+    fits = d_sec >= space.settings.radius and feasibility.to_edge(middle)[0] >= space.settings.edge
     return f"; --d-sec {d_sec:g} leaves one" if fits and d_sec < space.settings.d_sec else ""
 
 
 def _barriers(candidates: Candidates, index: int, parts: frozenset[int]) -> str:
     """The openings of a room that are not passable, and the gap in the floor before it, in words."""
-    told = (_closed_openings(candidates, index), _gap(candidates, index, parts))
-    return "; ".join(item for item in told if item)
+    barriers = (_closed_openings(candidates, index), _gap(candidates, index, parts))
+    return "; ".join(item for item in barriers if item)
 
 
 def _gap(candidates: Candidates, index: int, parts: frozenset[int]) -> str:
-    """The gap in the floor between a room and what is planned, in words."""
+    """The gap in the floor between a room and the planned parts, in words."""
     space = candidates.space
     shape = to_shape(space.rooms[index].area, local_origin(space.floor))
     return gap_before(space, shape, parts)

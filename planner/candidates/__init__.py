@@ -1,4 +1,4 @@
-"""Navigable space -> candidates: possible scan positions, each dropped one with its reason.
+"""Navigable space -> candidates: possible scan positions, with a reason for each that was dropped.
 
 A strategy is a function `(space) -> (xy, room)`: positions (n, 2) in the drawing's metres and the index
 of each one's room in `space.rooms`; or `(xy, room, reason)` where it drops some for reasons of its own.
@@ -27,13 +27,13 @@ from stopgo.mission.stages import (
     NavigableSpace,
 )
 from stopgo.planner.candidates.fallback import best_point
-from stopgo.planner.candidates.given import doorways, places_to_use
+from stopgo.planner.candidates.fixed_positions import doorways, required_stops
 from stopgo.planner.candidates.grid import grid
 from stopgo.planner.candidates.proposals import Proposals, in_order, joined
 from stopgo.planner.candidates.triangulation import triangulation
 from stopgo.planner.geometry.shapes import local_origin
-from stopgo.planner.space.place import Place
 from stopgo.planner.space.reach import Reach, reach_of
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 Strategy = Callable[[NavigableSpace], tuple[FloatArray, IntArray] | tuple[FloatArray, IntArray, IntArray]]
 STRATEGIES: dict[str, Strategy] = {"grid": grid, "triangulation": triangulation}
@@ -45,41 +45,41 @@ def candidates(space: NavigableSpace, *, part: int | None = None) -> Candidates:
     `part` counts from the largest; None takes the part that holds the start, else the largest that
     has candidates and a room.
     """
-    place = Place(space)
-    found = _from_strategy(place)
-    given = [places_to_use(place), found, _for_empty_rooms(place, found), doorways(space)]
-    proposals = in_order(joined(given), place.rooms)
+    feasibility = StopFeasibility(space)
+    found = _from_strategy(feasibility)
+    proposed = [required_stops(feasibility), found, _for_empty_rooms(feasibility, found), doorways(space)]
+    proposals = in_order(joined(proposed), feasibility.rooms)
     return _of_part(space, proposals, part)
 
 
 def judged(space: NavigableSpace, xy: FloatArray, room: IntArray, *, part: int) -> Candidates:
-    """Places (n, 2) of one's own as candidates of one part, each with its reason."""
-    reason = Place(space).reasons(xy, room)
+    """Return given positions (n, 2) as candidates of one part, with a reason for each that was dropped."""
+    reason = StopFeasibility(space).reasons(xy, room)
     return _of_part(space, Proposals.of(xy, room, reason), part)
 
 
-def _from_strategy(place: Place) -> Proposals:
-    xy, room, early = _generated(place.space)
-    reason = place.reasons(xy, room)
+def _from_strategy(feasibility: StopFeasibility) -> Proposals:
+    xy, room, early = _generated(feasibility.space)
+    reason = feasibility.reasons(xy, room)
     return Proposals.of(xy, room, reason if early is None else np.where(early == KEPT, reason, early))
 
 
 def _generated(space: NavigableSpace) -> tuple[FloatArray, IntArray, IntArray | None]:
-    """What the strategy of the settings gives, if these are positions in rooms."""
+    """Return the result of the strategy in the settings, checked: positions and their rooms."""
     method = variant("candidates", space.settings.candidates, STRATEGIES)
-    given = method.several(method.called(space), "xy, room", most=3)
-    xy = method.array(given[0], "xy", (None, 2))
-    room = method.indices(given[1], "room", length=len(xy), below=len(space.rooms))
-    if len(given) == 2:
+    result = method.several(method.called(space), "xy, room", most=3)
+    xy = method.array(result[0], "xy", (None, 2))
+    room = method.indices(result[1], "room", length=len(xy), below=len(space.rooms))
+    if len(result) == 2:
         return xy, room, None
-    return xy, room, method.indices(given[2], "reason", length=len(xy), below=len(DROP_REASONS))
+    return xy, room, method.indices(result[2], "reason", length=len(xy), below=len(DROP_REASONS))
 
 
-def _for_empty_rooms(place: Place, found: Proposals) -> Proposals:
-    """The best point of every room that the strategy left without a candidate."""
+def _for_empty_rooms(feasibility: StopFeasibility, found: Proposals) -> Proposals:
+    """Propose the best point of every room for which the strategy found no candidate."""
     kept = set(found.room[found.reason == KEPT].tolist())
-    empty = [k for k in range(len(place.space.rooms)) if k not in kept]
-    best = [(k, point) for k in empty if (point := best_point(place, k)) is not None]
+    empty = [k for k in range(len(feasibility.space.rooms)) if k not in kept]
+    best = [(k, point) for k in empty if (point := best_point(feasibility, k)) is not None]
     return Proposals.of([point for _, point in best], [k for k, _ in best])
 
 
@@ -93,7 +93,7 @@ def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> C
     if part is None and not np.any(at >= 0):
         raise NegativeResult(_no_candidate(space, reason))
     chosen = _chosen_part(space, proposals, reach, at) if part is None else part
-    _check_used(space, proposals, at, chosen)
+    _check_required(space, proposals, at, chosen)
     reason = np.where((reason == KEPT) & (at != chosen), OTHER_PART, reason)
     return Candidates(
         space=space,
@@ -111,45 +111,47 @@ def _of_part(space: NavigableSpace, proposals: Proposals, part: int | None) -> C
 
 
 def _for_overlap_only(space: NavigableSpace, proposals: Proposals) -> BoolArray:
-    """Doorways that nobody asked for: they may join scans, and do not count for what is visible."""
+    """Doorways that the settings do not require: they may connect scans, and do not count as visibility."""
     settings = space.settings
-    asked = settings.door_scan or settings.door_candidates
-    return frozen([] if asked or not proposals.doorway.any() else proposals.doorway, np.bool_)
+    required = settings.door_scan or settings.door_candidates
+    return frozen([] if required or not proposals.doorway.any() else proposals.doorway, np.bool_)
 
 
-def _check_used(space: NavigableSpace, proposals: Proposals, at: IntArray, chosen: int) -> None:
-    """Refuse stops asked for that the robot of this plan does not get to."""
+def _check_required(space: NavigableSpace, proposals: Proposals, at: IntArray, chosen: int) -> None:
+    """Refuse required stops that the robot cannot reach."""
     for x, y in proposals.xy[proposals.must & (at != chosen)]:
         raise InputError(
-            f"use = {x:g},{y:g}: the robot does not get there from the planned part of the floor"
+            f"use = {x:g},{y:g}: not reachable from the planned part of the floor; choose another position"
         )
 
 
 def _chosen_part(space: NavigableSpace, proposals: Proposals, reach: Reach, at: IntArray) -> int:
-    """The start's part, else the largest that has candidates in rooms: floor beyond them comes last."""
-    held = set(at[at >= 0].tolist())
+    """Number of the start's part, else of the largest with candidates in rooms; unnamed floor comes last."""
+    parts = set(at[at >= 0].tolist())
     if space.settings.start is not None:
-        return _part_of_start(space, reach, held)
+        return _part_of_start(space, reach, parts)
     in_room = np.array([space.rooms[k].room is not None for k in proposals.room])
-    return min(set(at[(at >= 0) & in_room].tolist()) or held)
+    return min(set(at[(at >= 0) & in_room].tolist()) or parts)
 
 
-def _part_of_start(space: NavigableSpace, reach: Reach, held: set[int]) -> int:
+def _part_of_start(space: NavigableSpace, reach: Reach, parts: set[int]) -> int:
     assert space.settings.start is not None
     x, y, _ = space.settings.start
     found = int(reach.part_at(np.array([[x, y]]) - local_origin(space.floor))[0])
     if found < 0:
         raise InputError(
             f"start = {x:g},{y:g}: the robot (radius {space.settings.radius:g} m) does not fit there; "
-            "choose a place clear of walls and floor edges"
+            "choose a position clear of walls and floor edges"
         )
-    if found not in held:
-        raise NegativeResult(f"start = {x:g},{y:g}: no scan position can be reached from there")
+    if found not in parts:
+        raise NegativeResult(
+            f"start = {x:g},{y:g}: no scan position is reachable from there; choose another start"
+        )
     return found
 
 
 def _no_candidate(space: NavigableSpace, reason: IntArray) -> str:
-    """Why no candidate is left, most frequent reason first, and what to change."""
+    """Message on why no candidate is left: most frequent reason first, and the options to change."""
     settings = space.settings
     keep = f"d_sec {settings.d_sec:g} m" if settings.d_sec >= settings.radius else "the robot's radius"
     causes = [
@@ -163,9 +165,9 @@ def _no_candidate(space: NavigableSpace, reason: IntArray) -> str:
     counted = sorted(
         ((int(np.sum(reason == code)), why, option) for code, why, option in causes), key=lambda c: -c[0]
     )
-    told = ", ".join(f"{n} {why}" for n, why, _ in counted if n) or "none was made"
+    reasons = ", ".join(f"{n} {why}" for n, why, _ in counted if n) or "none was generated"
     options = list(dict.fromkeys(option for n, _, option in counted if n)) or ["--grid"]
-    return f"{space.floor.name}: no candidate is left ({told}); change {' or '.join(options[:2])}"
+    return f"{space.floor.name}: no candidate is left ({reasons}); change {' or '.join(options[:2])}"
 
 
 __all__ = ["STRATEGIES", "Strategy", "candidates", "judged"]

@@ -1,4 +1,4 @@
-"""A candidate for rooms too small for the grid: the best point of them, if any point is allowed."""
+"""Candidate for a room too small for the grid: its best point, if any point is allowed."""
 
 from __future__ import annotations
 
@@ -8,30 +8,34 @@ import shapely
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.stages import KEPT
 from stopgo.planner.geometry.shapes import polygon_parts, roughly_widened
-from stopgo.planner.space.place import Place
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 HAIR = 1e-6
 """Clearances are shortened by this to find strips that are allowed but have no width."""
 
 
-def best_point(place: Place, room: int) -> FloatArray | None:
+def best_point(feasibility: StopFeasibility, room: int) -> FloatArray | None:
     """The allowed point of a room farthest from elements and floor edges, or None if none is allowed."""
-    settings = place.space.settings
-    allowed = place.rooms[room].difference(
-        roughly_widened(place.obstacles, place.element_clearance - HAIR, quad_segs=64)
+    settings = feasibility.space.settings
+    allowed = feasibility.rooms[room].difference(
+        roughly_widened(feasibility.obstacles, feasibility.element_clearance - HAIR, quad_segs=64)
     )
-    edges = roughly_widened(shapely.boundary(place.outline), max(settings.edge - HAIR, 0.0), quad_segs=64)
-    pieces = polygon_parts(allowed.intersection(place.outline).difference(edges))
+    edges = roughly_widened(
+        shapely.boundary(feasibility.outline), max(settings.edge - HAIR, 0.0), quad_segs=64
+    )
+    pieces = polygon_parts(allowed.intersection(feasibility.outline).difference(edges))
     points = [xy for piece in pieces for xy in _middles(piece)]
     if not points:
         return None
     local = np.array(points)
-    ok = place.reasons(local + place.origin, np.full(len(local), room)) == KEPT
+    ok = feasibility.reasons(local + feasibility.origin, np.full(len(local), room)) == KEPT
     if not ok.any():
         return None
-    margin = np.minimum(place.to_element(local) - settings.d_sec, place.to_edge(local) - settings.edge)
+    margin = np.minimum(
+        feasibility.to_element(local) - settings.d_sec, feasibility.to_edge(local) - settings.edge
+    )
     order = np.lexsort((local[:, 1], local[:, 0], -np.round(np.where(ok, margin, -np.inf), 9)))
-    return local[order[0]] + place.origin
+    return local[order[0]] + feasibility.origin
 
 
 def _middles(piece: shapely.Polygon) -> list[FloatArray]:

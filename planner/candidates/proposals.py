@@ -1,4 +1,4 @@
-"""Proposed scan positions before it is known which of them can be reached."""
+"""Proposed scan positions, before the check of their reachability."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from stopgo.mission.stages import KEPT
 
 @dataclass(frozen=True, eq=False)
 class Proposals:
-    """Positions (n, 2) in the drawing's metres, each with its room and what is known of it."""
+    """Positions (n, 2) in the drawing's metres, each with its room, reason and kind."""
 
     xy: FloatArray
-    """As a mission holds them, so that what is decided of a position is true of the stop there."""
+    """Rounded as in a mission, so that a decision on a position is true of the stop there."""
     room: IntArray
     reason: IntArray
     doorway: BoolArray
     must: BoolArray
-    """Positions where a stop must be."""
+    """True for positions where a stop is required."""
 
     @classmethod
     def of(

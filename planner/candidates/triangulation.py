@@ -1,7 +1,7 @@
 """Triangulation candidates: middles of Delaunay triangles and Voronoi points of each room (paper, 3.2.2).
 
-Seeds are what the drawing gives: without rooms the floor's contour and the columns' centres, with rooms
-each room's contour, the corners of the elements in it and the centres of round ones.
+Seeds come from the drawing. Without rooms they are the floor's contour and the columns' centres. With rooms
+they are each room's contour, the corners of the elements in it and the centres of round elements.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.stages import KEPT, SLIVER, TOO_SMALL, NavigableSpace
 from stopgo.planner.geometry.room_grid import main_axes
 from stopgo.planner.geometry.shapes import GRID, one_shape, polygon_parts, roughly_widened, segments_of
-from stopgo.planner.space.place import Place
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 LEAST_ANGLE = float(np.arcsin(1 / 6))
 """alpha_min in radians: sin alpha_min = l_min / (6 l_min) (paper, Eq. 2), 9.594° whatever l_min is."""
 STEP = 1e-3
-"""Seeds are rounded to this (m) in the room's own axes: float noise must not turn Delaunay's diagonals."""
+"""Seeds are rounded to this (m) in the room's own axes: float noise must not flip Delaunay's diagonals."""
 SAME = 0.01
 """Seeds and candidates closer than this (m) are one."""
 AT_ROOM = 1e-3
 """Elements this close to a room (m) are the room's own."""
 ROUNDS = 4
-"""How often a room that is not dense enough is triangulated again."""
+"""Maximum number of repeated triangulations of a room that is not dense enough."""
 
 
 def triangulation(space: NavigableSpace) -> tuple[FloatArray, IntArray, IntArray]:
     """Candidates of every room: position, room, and the reason for those of bad triangles."""
-    place = Place(space)
-    drawn = DrawnBoundary.of(place)
-    per_room = [room_candidates(place, drawn, room) for room in range(len(space.rooms))]
-    xy = np.concatenate([np.empty((0, 2)), *(points for points, _ in per_room)]) + place.origin
+    feasibility = StopFeasibility(space)
+    drawn = DrawnBoundary.of(feasibility)
+    per_room = [room_candidates(feasibility, drawn, room) for room in range(len(space.rooms))]
+    xy = np.concatenate([np.empty((0, 2)), *(points for points, _ in per_room)]) + feasibility.origin
     reason = np.concatenate([np.empty(0, np.int64), *(early for _, early in per_room)])
     room = np.repeat(np.arange(len(per_room)), [len(points) for points, _ in per_room])
     return xy, room.astype(np.int64), reason
@@ -45,7 +45,7 @@ def triangulation(space: NavigableSpace) -> tuple[FloatArray, IntArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class DrawnBoundary:
-    """What seeds are made of, beside the rooms' contours; local frame."""
+    """Sources of seeds in addition to the rooms' contours; local frame."""
 
     edges: FloatArray
     """Element edges as shapely lines (n,)."""
@@ -53,51 +53,53 @@ class DrawnBoundary:
     """Centres of columns or round elements (n, 2)."""
 
     @classmethod
-    def of(cls, place: Place) -> DrawnBoundary:
+    def of(cls, feasibility: StopFeasibility) -> DrawnBoundary:
         """Columns' centres where the floor has no rooms; else the elements' outlines."""
-        floor = place.space.floor
+        floor = feasibility.space.floor
         if not floor.rooms:
             columns = [solid for item in floor.elements if item.kind == "columns" for solid in item.solids]
-            middles = [one_shape(column, place.origin).centroid for column in columns]
+            middles = [one_shape(column, feasibility.origin).centroid for column in columns]
             return cls(shapely.linestrings(np.empty((0, 2, 2))), shapely.get_coordinates(middles))
-        parts = polygon_parts(place.obstacles)
+        parts = polygon_parts(feasibility.obstacles)
         cornered = shapely.MultiPolygon([part for part in parts if not is_round(part)])
         centres = shapely.get_coordinates([part.centroid for part in parts if is_round(part)])
         return cls(shapely.linestrings(segments_of(cornered)), centres)
 
 
 def is_round(solid: shapely.Polygon) -> bool:
-    """Whether a solid's corners lie on a circle, as those of a discretised column do (Eq. 1)."""
+    """True if a solid's corners lie on a circle, like those of a discretised column (Eq. 1)."""
     corners = shapely.get_coordinates(solid)[:-1]
     radius = np.hypot(*(corners - corners.mean(axis=0)).T)
     return len(corners) >= 8 and float(np.ptp(radius)) < 0.01 * float(radius.max())
 
 
-def room_candidates(place: Place, drawn: DrawnBoundary, room: int) -> tuple[FloatArray, IntArray]:
+def room_candidates(
+    feasibility: StopFeasibility, drawn: DrawnBoundary, room: int
+) -> tuple[FloatArray, IntArray]:
     """Candidates (n, 2) of one room in the local frame, with TOO_SMALL, SLIVER or KEPT for each.
 
-    While less than dens_min candidates per m² are left, they become seeds too, as long as that gains.
+    While fewer than dens_min candidates per m² remain, they become seeds too, if this adds candidates.
     """
-    settings, shape = place.space.settings, place.rooms[room]
+    settings, shape = feasibility.space.settings, feasibility.rooms[room]
     seeds = seeds_of(shape, drawn, d_max=settings.d_max)
     best = triangulated(seeds, shape, l_min=settings.l_min)
-    left = _left(place, room, *best)
+    allowed = _allowed_count(feasibility, room, *best)
     for _ in range(ROUNDS):
-        if left >= settings.dens_min * shape.area:
+        if allowed >= settings.dens_min * shape.area:
             break
         points, early = best
         seeds = np.concatenate([seeds, points[early == KEPT]])
         finer = triangulated(seeds, shape, l_min=settings.l_min)
-        if _left(place, room, *finer) <= left:
+        if _allowed_count(feasibility, room, *finer) <= allowed:
             break
-        best, left = finer, _left(place, room, *finer)
+        best, allowed = finer, _allowed_count(feasibility, room, *finer)
     return best
 
 
-def _left(place: Place, room: int, points: FloatArray, early: IntArray) -> int:
-    """How many of the candidates a stop may be at."""
-    kept = points[early == KEPT]
-    reason = place.reasons(kept + place.origin, np.full(len(kept), room))
+def _allowed_count(feasibility: StopFeasibility, room: int, points: FloatArray, early: IntArray) -> int:
+    """Number of the candidates at which a stop is allowed."""
+    usable = points[early == KEPT]
+    reason = feasibility.reasons(usable + feasibility.origin, np.full(len(usable), room))
     return int(np.count_nonzero(reason == KEPT))
 
 
@@ -112,7 +114,7 @@ def seeds_of(shape: BaseGeometry, drawn: DrawnBoundary, *, d_max: float) -> Floa
 
 
 def triangulated(seeds: FloatArray, shape: BaseGeometry, *, l_min: float) -> tuple[FloatArray, IntArray]:
-    """Middles of all triangles, then the Voronoi points inside, and what is wrong with each triangle.
+    """Middles of all triangles, then the Voronoi points inside, and the reason against each bad triangle.
 
     Points are taken in the room's own axes, rounded and sorted, so that the result depends on neither
     the drawing's angle nor the order of its entities.
@@ -142,7 +144,7 @@ def distinct(points: FloatArray) -> FloatArray:
 
 
 def voronoi_points(points: FloatArray) -> FloatArray:
-    """Corners of the Voronoi cells of `points` (n, 2); none where all lie on a line."""
+    """Corners of the Voronoi cells of `points` (n, 2); none if all lie on a line."""
     from scipy.spatial import Voronoi
 
     found = _by_qhull(Voronoi, points)
@@ -150,7 +152,7 @@ def voronoi_points(points: FloatArray) -> FloatArray:
 
 
 def delaunay(points: FloatArray) -> IntArray:
-    """Corners (t, 3) of the Delaunay triangles of `points` (n, 2); none where all lie on a line."""
+    """Corners (t, 3) of the Delaunay triangles of `points` (n, 2); none if all lie on a line."""
     from scipy.spatial import Delaunay
 
     found = _by_qhull(Delaunay, points)

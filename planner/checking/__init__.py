@@ -1,1 +1,1 @@
-"""Mission against floor: every clearance and every claim, measured anew."""
+"""Mission against floor: every clearance and every claim, measured again."""

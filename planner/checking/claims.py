@@ -1,7 +1,7 @@
-"""Mission + navigable space -> what it claims its stops see and they do not: counted anew, line by line.
+"""Mission + navigable space -> coverage claims that a recount, line by line, does not confirm.
 
-The stops look from where the mission has them, and every sight line is held against every wall: nothing
-of what made the plan's own figures is used but the floor's faces and their units.
+The recount uses the stops of the mission, and tests every line of sight against every wall. Of the data
+behind the plan's own figures it uses only the floor's faces and their units.
 """
 
 from __future__ import annotations
@@ -32,119 +32,123 @@ from stopgo.planner.visibility.sight.sightlines import SightLines
 from stopgo.planner.visibility.unit_ranges import visibility_of
 
 ROUNDED = 10.0**-DIGITS
-"""Shares in coverage.json are of lengths that are rounded themselves."""
+"""Tolerance of fractions in coverage.json, which come from rounded lengths."""
 NOISE = 1e-12
-"""Shares that differ by less are the same: quotients of whole numbers."""
+"""Fractions that differ by less are equal: they are quotients of whole numbers."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recount:
-    """What the stops see, and what can be seen at all from where stops may be."""
+    """Recounted visibility: units seen by the stops, and units visible from the candidates."""
 
     space: NavigableSpace
     by_stop: tuple[IntArray, ...]
-    """Units each stop sees, ascending."""
-    could: IntArray | None
-    """How many candidates see each unit, up to as many as are asked for; None where that is not known."""
+    """Units that each stop sees, ascending."""
+    candidate_views: IntArray | None
+    """Number of candidates that see each unit, up to the required views; None if unknown."""
     why_not: str = ""
-    """Why it is not known."""
+    """Reason why it is unknown."""
 
     @cached_property
     def visible(self) -> BoolArray | None:
-        """Whether each unit can be seen by a candidate."""
-        return None if self.could is None else frozen(self.could > 0, np.bool_)
+        """True for each unit that is visible from a candidate; None if unknown."""
+        return None if self.candidate_views is None else frozen(self.candidate_views > 0, np.bool_)
 
     @cached_property
     def seen(self) -> BoolArray:
-        """Whether as many stops see each unit as it asks for; any stop, where that is not known."""
+        """True for each unit that enough stops see; if the required number is unknown, any stop."""
         views = np.zeros(self.space.targets.total, dtype=np.int64)
         for units in self.by_stop:
             views[units] += 1
-        return frozen(views >= (1 if self.could is None else np.maximum(1, self.could)), np.bool_)
+        return frozen(
+            views >= (1 if self.candidate_views is None else np.maximum(1, self.candidate_views)), np.bool_
+        )
 
     @property
     def share(self) -> float | None:
-        """Share of what can be seen that the stops see, by the plan's rule."""
+        """Fraction of the visible units that the stops see, by the plan's rule."""
         if self.visible is None or not self.visible.any():
             return None
         weight = weights_of(self.space.targets, self.space.settings)
         return float(weight[self.seen & self.visible].sum() / weight[self.visible].sum())
 
     def in_words(self) -> str:
-        """One line."""
+        """Return one line for a person."""
         seen = int(self.seen.sum())
         if self.visible is None:
-            return f"{seen} units, counted line by line; of how many is not known: {self.why_not}"
+            return f"{seen} units, counted line by line; total unknown: {self.why_not}"
         share = "nothing" if self.share is None else percent(self.share, digits=3)
         seen = int((self.seen & self.visible).sum())
         return f"{share} ({seen} of {self.visible.sum()} units), counted line by line"
 
     def as_json(self) -> dict[str, Any]:
-        """What `--json` prints; null where it is not known."""
+        """Return the object for `--json`; null where a value is unknown."""
         visible = None if self.visible is None else int(self.visible.sum())
         seen = self.seen if self.visible is None else self.seen & self.visible
         return {"seen": int(seen.sum()), "visible": visible, "share": self.share}
 
 
 def recount(mission: Mission, space: NavigableSpace) -> Recount:
-    """Count what the mission's stops see of the floor, and what can be seen of it at all."""
+    """Count the units that the mission's stops see, and the units visible from any candidate."""
     lines = SightLines(space)
     by_stop = tuple(_seen_from(stop, space, lines) for stop in mission.stops)
     try:
-        could = _could_see(_candidates(mission, space), lines)
+        views = _candidate_views(_candidates(mission, space), lines)
     except (NegativeResult, InputError) as error:
         return Recount(space, by_stop, None, str(error))
-    return Recount(space, by_stop, could)
+    return Recount(space, by_stop, views)
 
 
 def _seen_from(stop: Stop, space: NavigableSpace, lines: SightLines) -> IntArray:
     """Units that a stop sees along its heading."""
     xy = np.array([stop.x, stop.y])
     closed_door = stop.doorway and space.settings.doors == "closed" and bool(space.openings)
-    places = sides_of_door(space, xy) if closed_door else xy[None]
-    units = np.unique(np.concatenate([lines.seen_from(place, scanner=xy) for place in places]))
+    eyes = sides_of_door(space, xy) if closed_door else xy[None]
+    units = np.unique(np.concatenate([lines.seen_from(eye, scanner=xy) for eye in eyes]))
     if space.settings.fov >= 360:
         return units
-    way = space.targets.unit_xy[units] - xy
-    return units[in_view(way, stop.heading, fov=math.radians(space.settings.fov))]
+    direction = space.targets.unit_xy[units] - xy
+    return units[in_view(direction, stop.heading, fov=math.radians(space.settings.fov))]
 
 
 def _candidates(mission: Mission, space: NavigableSpace) -> Candidates:
-    """All places where a stop might have been, in the part of the floor that the mission is of."""
+    """All candidates in the mission's part of the floor."""
     if space.settings.candidates not in STRATEGIES:
-        raise InputError(f"candidates = {space.settings.candidates} are another program's")
-    places = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)
-    parts = reach_of(space).part_at(places - local_origin(space.floor))
+        raise InputError(
+            f"candidates = {space.settings.candidates} come from a plugin, which the check does not run"
+        )
+    positions = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)
+    parts = reach_of(space).part_at(positions - local_origin(space.floor))
     counts = Counter(parts[parts >= 0].tolist())
     if not counts:
-        raise InputError("no stop is where the robot gets to")
+        raise InputError("the robot can reach no stop")
     return candidates(space, part=counts.most_common(1)[0][0])
 
 
-def _could_see(found: Candidates, lines: SightLines) -> IntArray:
-    """How many candidates see each unit, up to as many as are asked for.
+def _candidate_views(found: Candidates, lines: SightLines) -> IntArray:
+    """Number of candidates that see each unit, up to the required views.
 
-    Places that do not count are none.
+    Candidates that count for overlap only are left out.
     """
-    places, row = viewpoints_of(found)
-    stands = found.xy[found.kept]
+    eyes, row = viewpoints_of(found)
+    scanners = found.xy[found.kept]
 
     def seen_by(k: int, among: BoolArray | None = None) -> IntArray:
-        views = [lines.seen_from(place, among, scanner=stands[k]) for place in places[row == k]]
+        views = [lines.seen_from(eye, among, scanner=scanners[k]) for eye in eyes[row == k]]
         return np.unique(np.concatenate(views))
 
     if found.space.settings.fov < 360 and (len(found.must_rows) or len(found.doorway_rows)):
-        alone = (seen_by(k) for k in range(len(stands)))
+        alone = (seen_by(k) for k in range(len(scanners)))
         seen = with_headings(visibility_of(found, alone, method="line by line"))
         return frozen(seen.visible, np.int64)
-    could = np.zeros(found.space.targets.total, dtype=np.int64)
-    for k in np.setdiff1d(np.arange(len(stands)), found.extra_rows).tolist():
-        could[seen_by(k, could < found.space.settings.least_views)] += 1
-    return frozen(could, np.int64)
+    views = np.zeros(found.space.targets.total, dtype=np.int64)
+    for k in np.setdiff1d(np.arange(len(scanners)), found.extra_rows).tolist():
+        views[seen_by(k, views < found.space.settings.least_views)] += 1
+    return frozen(views, np.int64)
 
 
 def overclaims(mission: Mission, counted: Recount, coverage: Coverage | None) -> Iterator[Problem]:
-    """Every figure of the mission, and of its coverage.json, above what was counted."""
+    """Every figure of the mission, and of its coverage.json, that exceeds the recount."""
     for index, (stop, units) in enumerate(zip(mission.stops, counted.by_stop, strict=True)):
         if len(units) < stop.sees.units:
             yield _less(f"$.stops[{index}].sees.units", stop.sees.units, len(units), f"{stop.id} sees")
@@ -152,7 +156,7 @@ def overclaims(mission: Mission, counted: Recount, coverage: Coverage | None) ->
     if seen < claimed:
         yield _less("$.stops[*].sees.new_units", claimed, seen, "all stops see")
     least, share = counted.space.settings.coverage, counted.share
-    alone = mission.share is UNSET  # else the others see the rest of what was asked for
+    alone = mission.share is UNSET  # else the other missions cover the rest
     if alone and claimed and share is not None and share < least - NOISE:
         yield Problem("$.origin.parameters.coverage", f"is {least:g}, but the stops see {counted.in_words()}")
     if coverage is not None:
@@ -164,7 +168,7 @@ def _less(path: str, claimed: int, counted: int, who: str) -> Problem:
 
 
 def _coverage_overclaims(coverage: Coverage, counted: Recount) -> Iterator[Problem]:
-    """What coverage.json says of the whole and of each element, above what was counted."""
+    """Every figure of coverage.json, total and by element, that exceeds the recount."""
     targets, elements = counted.space.targets, counted.space.floor.elements
     wanted = [k for k, element in enumerate(elements) if element.target]
     if [elements[k].id for k in wanted] != [element.id for element in coverage.elements]:

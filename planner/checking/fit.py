@@ -1,4 +1,4 @@
-"""Mission + floor -> what does not fit: every clearance that planning keeps, measured anew.
+"""Mission + floor -> stops and legs that do not fit: every clearance of planning is measured again.
 
 A mission may have been edited, or made elsewhere, or the drawing may have changed since it was planned.
 """
@@ -21,14 +21,14 @@ from stopgo.mission.document.specs import limits_spec_of
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
-from stopgo.planner.appraisal.plausible import over_ignored
+from stopgo.planner.appraisal.plausibility import over_ignored
 from stopgo.planner.geometry.shapes import HAIRLINE, SLACK, holds, segments_of
 from stopgo.planner.space.gaps import CLEAR_SLACK, Walls
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.targets import solid_of
 
 ALLOWED = SLACK + CLEAR_SLACK
-"""What a clearance may fall short by, in metres: as in planning, and rounded as in missions."""
+"""Tolerance of clearances in metres: that of planning, and the rounding of missions."""
 
 
 def misfits_on(floor: FloorPlan, mission: Mission, settings: Settings) -> Iterator[Problem]:
@@ -44,7 +44,7 @@ def misfits_on(floor: FloorPlan, mission: Mission, settings: Settings) -> Iterat
 
 
 def other_machine(mission: Mission, settings: Settings) -> Iterator[Problem]:
-    """What the robot is sent of itself, where the plan was made with something else."""
+    """Robot and scanner values in the mission that differ from those of the plan."""
     pairs = (
         ("$.robot.radius", mission.robot.radius, "robot_radius", settings.radius),
         ("$.scanner.range", mission.scanner.range, "range", settings.range),
@@ -59,7 +59,7 @@ def other_machine(mission: Mission, settings: Settings) -> Iterator[Problem]:
 
 @dataclass(frozen=True)
 class _Fault:
-    """Where a place or a way comes too near something."""
+    """A stop or leg too near a wall: the wall, the point on it, and the distances."""
 
     wall: int
     at: Point
@@ -68,7 +68,7 @@ class _Fault:
 
 
 class _Fit:
-    """A floor, prepared for asking whether stops and legs keep their distances."""
+    """A floor, prepared for checking the clearances of stops and legs."""
 
     def __init__(self, floor: FloorPlan, settings: Settings) -> None:
         self.floor, self.settings = floor, settings
@@ -79,32 +79,32 @@ class _Fit:
         self._doorways = [item.clear for item in self.ground.crossings if not item.closed_because]
 
     def stop(self, path: str, stop: Stop) -> Iterator[Problem]:
-        """A stop's distance from elements and floor edges; the legs tell of stops in doorways."""
-        place = shapely.Point(np.array([stop.x, stop.y]) - self.ground.origin)
-        doorway = stop.doorway and any(place.distance(line) <= ALLOWED for line in self._doorways)
-        what = f"{stop.id} at {_told((stop.x, stop.y))}"
-        if (off := self._off(place)) is not None:
-            yield Problem(path, f"{what} {off}")
-        elif not doorway and (fault := self._worst(place, self.stops)) is not None:
-            yield Problem(path, f"{what} is {self._said(fault, self.stops)}")
+        """A stop's distance from elements and floor edges; for stops in doorways the legs are checked."""
+        point = shapely.Point(np.array([stop.x, stop.y]) - self.ground.origin)
+        doorway = stop.doorway and any(point.distance(line) <= ALLOWED for line in self._doorways)
+        name = f"{stop.id} at {_point_text((stop.x, stop.y))}"
+        if (off := self._off(point)) is not None:
+            yield Problem(path, f"{name} {off}")
+        elif not doorway and (fault := self._worst(point, self.stops)) is not None:
+            yield Problem(path, f"{name} is {self._shortfall_text(fault, self.stops)}")
         for x, y, radius in self.settings.avoid:
             if math.dist((x, y), (stop.x, stop.y)) < radius - ALLOWED:
-                yield Problem(path, f"{stop.id} is in the circle to avoid at {_told((x, y))}")
+                yield Problem(path, f"{stop.id} is in the circle to avoid at {_point_text((x, y))}")
 
     def leg(self, path: str, leg: tuple[Point, ...]) -> Iterator[Problem]:
-        """Every straight piece of a leg, told at the point where it ends."""
+        """Every straight segment of a leg, reported at the point where it ends."""
         for index, (a, b) in enumerate(pairwise(leg if len(leg) > 1 else leg * 2), start=1):
             ends = np.array([a, b]) - self.ground.origin
-            way = shapely.LineString(ends) if a != b else shapely.Point(ends[0])
-            what = f"the way from {_told(a)} to {_told(b)}"
-            place = f"{path}[{min(index, len(leg) - 1)}]"
-            if (off := self._off(way)) is not None:
-                yield Problem(place, f"{what} {off}")
-            elif (fault := self._worst(way, self.legs)) is not None:
-                yield Problem(place, f"{what} is {self._said(fault, self.legs)}")
+            line = shapely.LineString(ends) if a != b else shapely.Point(ends[0])
+            name = f"the segment from {_point_text(a)} to {_point_text(b)}"
+            where = f"{path}[{min(index, len(leg) - 1)}]"
+            if (off := self._off(line)) is not None:
+                yield Problem(where, f"{name} {off}")
+            elif (fault := self._worst(line, self.legs)) is not None:
+                yield Problem(where, f"{name} is {self._shortfall_text(fault, self.legs)}")
 
     def over_ignored(self, mission: Mission) -> Iterator[Problem]:
-        """Legs over lines of the drawing that nobody has read."""
+        """Legs over lines of the drawing that were not read."""
         legs = [stop.approach for stop in mission.stops] + ([mission.return_] if mission.return_ else [])
         shapes = [shapely.LineString(self._local(leg)) for leg in legs]
         radius = self.settings.radius
@@ -116,18 +116,18 @@ class _Fit:
         return np.array(leg if len(leg) > 1 else leg * 2) - self.ground.origin
 
     def _off(self, shape: BaseGeometry) -> str | None:
-        """Whether a place or way leaves the floor or lies within an element, in words."""
+        """Problem text if a point or line leaves the floor or lies within an element; else None."""
         if not holds(self.ground.outline, shape, slack=ALLOWED):
             out = shapely.get_coordinates(shape.difference(self.ground.outline))
             far = out[np.argmax(shapely.distance(shapely.points(out), self.ground.outline))]
             away = self.ground.outline.distance(shapely.Point(far))
-            return f"is off the floor: {self._at(far)} lies {away:.3f} m beside it"
+            return f"is off the floor: {self._at(far)} lies {away:.3f} m outside it"
         if self.ground.obstacles.contains(shape):
             return f"lies within {self._element(shape).id}"
         return None
 
     def _worst(self, shape: BaseGeometry, walls: Walls) -> _Fault | None:
-        """Where the clearance falls short by most."""
+        """The largest shortfall of a clearance; None if every clearance is kept."""
         if not len(walls.segments):
             return None
         tree = self._trees[walls]
@@ -141,15 +141,15 @@ class _Fit:
         at = shapely.get_coordinates(shapely.shortest_line(tree.geometries[wall], shape))[0]
         return _Fault(wall, tuple(at.tolist()), float(distance[worst]), float(walls.clearance[wall]))
 
-    def _said(self, fault: _Fault, walls: Walls) -> str:
-        """A distance, to what, where, and what it must be."""
+    def _shortfall_text(self, fault: _Fault, walls: Walls) -> str:
+        """Text of a distance: to which wall, at which point, and the required distance."""
         return (
             f"{fault.distance:.3f} m from {self._name(fault, walls)} at {self._at(np.array(fault.at))}, "
             f"less than {fault.clearance:.3f} m"
         )
 
     def _name(self, fault: _Fault, walls: Walls) -> str:
-        """What a wall is of: an element, a closed opening, or the floor's edge."""
+        """Name of a wall: an element, a closed opening, or the floor's edge."""
         solid = len(segments_of(self.ground.obstacles))
         if fault.wall < solid:
             return self._element(shapely.Point(fault.at)).id
@@ -160,7 +160,7 @@ class _Fit:
         return "the floor's edge"
 
     def _element(self, shape: BaseGeometry) -> Element:
-        """The obstacle nearest a place or way."""
+        """The obstacle nearest to a point or line."""
         items, solids = self._obstacles
         return items[int(np.argmin(shapely.distance(solids, shape)))]
 
@@ -170,8 +170,8 @@ class _Fit:
         return items, [solid_of(item, self.ground.origin, HAIRLINE) for item in items]
 
     def _at(self, local: FloatArray) -> str:
-        return _told(tuple((local + self.ground.origin).tolist()))
+        return _point_text(tuple((local + self.ground.origin).tolist()))
 
 
-def _told(point: tuple[float, ...]) -> str:
+def _point_text(point: tuple[float, ...]) -> str:
     return f"({point[0]:.3f}, {point[1]:.3f})"

@@ -1,6 +1,6 @@
-"""Mission + navigable space -> pairs of its network that do not register, counted line by line.
+"""Mission + navigable space -> network pairs that do not register, by a recount line by line.
 
-Every sight line to the boundary is held against every wall, as in `stopgo.planner.checking.claims`.
+Every line of sight to the boundary is tested against every wall, as in `stopgo.planner.checking.claims`.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from stopgo.planner.visibility.exact_sight import sides_of_door
 from stopgo.planner.visibility.sight.sightlines import Midpoints, sees
 
 ROUNDED = 1e-5
-"""Figures of a pair are sums of rounded lengths."""
+"""Tolerance of a pair's figures, which are sums of rounded lengths."""
 LEAST = {"common_m": LEAST_COMMON_M, "hold_m": LEAST_HOLD_M}
 
 
 def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Problem]:
-    """Every pair of the mission's network that holds less firmly than it says, or not firmly enough."""
+    """Every pair of the mission's network with a weaker registration than claimed or required."""
     if isinstance(mission.network, msgspec.UnsetType) or not mission.network:
         return
     overlaps = _overlaps(mission, space)
@@ -40,25 +40,25 @@ def network_overclaims(mission: Mission, space: NavigableSpace) -> Iterator[Prob
         for key, needed in least.items():
             counted = float(getattr(pairs, key)[at[0]]) if len(at) else 0.0
             path, claimed = f"$.network[{index}].{key}", getattr(pair, key)
-            told = f"{pair.a} and {pair.b} have {counted:g}, counted line by line"
+            counted_text = f"{pair.a} and {pair.b} have {counted:g}, counted line by line"
             if counted < claimed - ROUNDED:
-                yield Problem(path, f"is {claimed:g}, but {told}")
+                yield Problem(path, f"is {claimed:g}, but {counted_text}")
             elif counted < needed - ROUNDED:
-                yield Problem(path, f"is {claimed:g}: {told}; a pair that registers has {needed:g}")
+                yield Problem(path, f"is {claimed:g}: {counted_text}; a pair that registers has {needed:g}")
 
 
 def _overlaps(mission: Mission, space: NavigableSpace) -> Overlaps:
-    """What each two stops see in common, rows in the order of the stops."""
+    """Overlap of each two stops; rows in the order of the stops."""
     boundary, origin = boundary_of(space), local_origin(space.floor)
     xy = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2) - origin
     heading = np.array([stop.heading for stop in mission.stops])
-    looking = _Looking(boundary, space)
-    pieces = (looking.seen_by(stop) for stop in mission.stops)
+    visible = _BoundaryVisibility(boundary, space)
+    pieces = (visible.seen_by(stop) for stop in mission.stops)
     return Overlaps(shown_by(boundary, xy, pieces, heading, space.settings))
 
 
-class _Looking:
-    """A boundary, prepared for telling line by line what of it stops see."""
+class _BoundaryVisibility:
+    """A boundary, prepared for computing line by line the pieces that stops see."""
 
     def __init__(self, boundary: Boundary, space: NavigableSpace) -> None:
         a, b = to_grid(boundary.a), to_grid(boundary.b)
@@ -73,18 +73,18 @@ class _Looking:
         self._lines = shapely.STRtree(shapely.linestrings(self._edges * GRID))
 
     def seen_by(self, stop: Stop) -> IntArray:
-        """Pieces that a stop sees, looking all round; from both sides of a closed door that it stands in."""
+        """Pieces that a stop sees in all directions; from both sides of a closed door if it is in one."""
         space, xy = self._space, np.array([stop.x, stop.y])
         closed_door = stop.doorway and space.settings.doors == "closed" and bool(space.openings)
-        places = sides_of_door(space, xy) if closed_door else xy[None]
-        views = [self._seen_from(to_grid(place - local_origin(space.floor))) for place in places]
+        eyes = sides_of_door(space, xy) if closed_door else xy[None]
+        views = [self._seen_from(to_grid(eye - local_origin(space.floor))) for eye in eyes]
         return np.unique(np.concatenate(views))
 
-    def _seen_from(self, place: IntArray) -> IntArray:
-        points, lines = (self._near(tree, place) for tree in (self._points, self._lines))
+    def _seen_from(self, eye: IntArray) -> IntArray:
+        points, lines = (self._near(tree, eye) for tree in (self._points, self._lines))
         reach = round(self._reach / GRID)
-        return points[sees(place, self._midpoints.among(points), self._edges[lines], reach=reach)]
+        return points[sees(eye, self._midpoints.among(points), self._edges[lines], reach=reach)]
 
-    def _near(self, tree: shapely.STRtree, place: IntArray) -> IntArray:
-        near = tree.query(shapely.Point(place * GRID), predicate="dwithin", distance=self._reach + 4 * GRID)
+    def _near(self, tree: shapely.STRtree, eye: IntArray) -> IntArray:
+        near = tree.query(shapely.Point(eye * GRID), predicate="dwithin", distance=self._reach + 4 * GRID)
         return np.sort(near)

@@ -1,4 +1,4 @@
-"""Mission + floor's file -> what is wrong with it there: what does not fit, and what it does not see."""
+"""Mission + floor's file -> verdict: clearances that are too small, and claims that are not met."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from stopgo.planner.space.navigable import navigable
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What is wrong with a mission on a floor, and what its stops were counted to see there."""
+    """Problems of a mission on a floor, and the recount of the units that its stops see there."""
 
     problems: tuple[Problem, ...]
     counted: Recount | None = None
 
 
 def verdict(mission: Mission, path: Path, coverage: Coverage | None) -> Verdict:
-    """Hold a mission, and its coverage.json if given, against the floor in a file.
+    """Compare a mission, and its coverage.json if given, with the floor in a file.
 
     Raises
     ------

@@ -39,7 +39,7 @@ def values_of(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _own(parameter: Parameter) -> bool:
-    """True if it has an option of its own, and does not hold more values of another's."""
+    """True if the parameter has its own option, and does not take the further values of another."""
     return parameter.name not in {item.further for item in PARAMETERS.values()}
 
 
@@ -65,7 +65,7 @@ def _option(parameter: Parameter) -> inspect.Parameter:
 
 
 def _plain(parameter: Parameter) -> type:
-    """The type that the command line reads; a parameter with a form reads its text itself."""
+    """Type on the command line; a parameter with its own form reads a text."""
     return str if parameter.form else parameter.plain
 
 

@@ -1,4 +1,4 @@
-"""A plan's files in their folder: how they are named, and what becomes of those that an earlier plan left."""
+"""Names of a plan's files in their folder, and renaming of the files that an earlier plan left there."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ NAMES = {
 
 
 def names(folder: Path, number: int) -> dict[str, Path]:
-    """Where the plan of a part is written: the first part's as in NAMES, then with -2, -3 …"""
+    """Return the paths of a part's files: the first part's as in NAMES, then with -2, -3 …"""
     suffix = "" if number == 0 else f"-{number + 1}"
     paths = {key: folder / name for key, name in NAMES.items()}
     return {key: path.with_name(f"{path.stem}{suffix}{path.suffix}") for key, path in paths.items()}
 
 
 def set_aside(folder: Path, parts: int, source: FloorSource, settings: Settings) -> list[Path]:
-    """Rename what other plans left of further parts, so that nobody takes it for one of this plan.
+    """Rename the files of other plans, so that nobody takes them for parts of this plan.
 
-    `parts` have just been planned of the floor from this source. A further part's mission stays if the
-    same floor and settings would give it again; otherwise it and the files beside it get `.old` behind
-    their names. Gives their new names. What cannot be read as a mission is somebody else's, and stays.
+    This plan has `parts` parts. A mission with a higher number stays if the same floor and settings would
+    give it again. Otherwise it and its companion files get the suffix `.old`. A file that is not a mission
+    stays. Returns the new names.
     """
     moved = []
-    for number in _further(folder, parts):
+    for number in _other_parts(folder, parts):
         files = names(folder, number)
         if _is_other(files["mission"], mission_id(source, settings, __version__, number)):
             moved += [_renamed(path) for path in files.values() if path.exists()]
@@ -46,12 +46,12 @@ def set_aside(folder: Path, parts: int, source: FloorSource, settings: Settings)
 
 
 def set_aside_file(path: Path) -> Path | None:
-    """Rename a file of an earlier plan that the plan that was made has none of; its new name."""
+    """Rename a file of an earlier plan that the new plan does not have; returns its new name."""
     return _renamed(path) if path.exists() else None
 
 
-def _further(folder: Path, parts: int) -> list[int]:
-    """Numbers of the parts beyond `parts` of which there are missions."""
+def _other_parts(folder: Path, parts: int) -> list[int]:
+    """Numbers of the parts beyond `parts` for which the folder has a mission."""
     found = (re.fullmatch(r"mission-([1-9]\d*)\.json", path.name) for path in folder.iterdir())
     return sorted(int(match[1]) - 1 for match in found if match and int(match[1]) > max(parts, 1))
 

@@ -1,4 +1,4 @@
-"""What `stopgo plan` tells of a plan: one object for machines, a few lines for a person."""
+"""Report of a plan that `stopgo plan` prints: one JSON object, or a few lines for a person."""
 
 from __future__ import annotations
 
@@ -37,44 +37,58 @@ class PlanReport:
 
     @property
     def network(self) -> Network | None:
-        """How the scans hang together; None where nobody asked for it."""
+        """The overlaps that connect the scans; None if the plan has no overlap requirement."""
         return network_of(self.mission)
 
     @property
-    def answer(self) -> int:
-        """Exit code of a plan: 1 where the robot would drive over lines that nobody has read."""
+    def exit_code(self) -> int:
+        """Exit code of the plan: 1 if the robot would drive over lines that were not read."""
         return 1 if self.figures.crosses_ignored else 0
 
     @property
-    def strict_answer(self) -> int:
-        """Exit code where nothing may be left out or doubtful."""
-        return 1 if self.figures.unreached or self.figures.grave else self.answer
+    def strict_exit_code(self) -> int:
+        """Exit code with `--strict`: also 1 if the plan leaves floor out or is doubtful."""
+        return 1 if self.figures.unreached or self.figures.grave else self.exit_code
 
     def as_json(self) -> dict[str, Any]:
-        """The object that `--json` prints."""
-        selection = self.part.selection
-        visibility = selection.visibility
-        candidates = visibility.candidates
-        space, targets = candidates.space, visibility.targets
-        times = schedule(self.mission)
+        """Return the object that `--json` prints."""
+        route = self.part.route
         return {
             "floor": self._floor(),
-            "mission": {
-                "id": self.mission.id,
-                "revision": self.mission.revision,
-                "digest": self.mission.digest,
+            "mission": _attributes(self.mission, "id", "revision", "digest"),
+            **self._stage_results(),
+            **network_table(self.network),
+            "coverage": coverage_table(self.figures),
+            **quality_table(self.figures),
+            "route": {
+                "length_m": route.length,
+                "bound_m": route.bound,
+                "method": route.method,
+                "tour": route.tour,
+                "start": route.start_reason,
             },
+            "schedule": _attributes(
+                schedule(self.mission), "drive_s", "turn_s", "settle_s", "scan_s", "total_s"
+            ),
+            **time_table(route),
+            "unreached": [_attributes(item, "room", "why", "area_m2") for item in self.figures.unreached],
+            "times_s": {key: round(value, 4) for key, value in self.times_s.items()},
+            "files": {key: str(path) for key, path in self.files.items()},
+        }
+
+    def _stage_results(self) -> dict[str, Any]:
+        """Counts of targets, candidates, visible units and stops, for JSON."""
+        selection, visibility = self.part.selection, self.part.visibility
+        targets = visibility.targets
+        by_kind = targets.by_kind(self.part.floor.elements)
+        return {
             "targets": {
                 "total": targets.total,
-                "raw": sum(targets.raw.get(kind, 0) for kind in targets.by_kind(space.floor.elements)),
-                "by_kind": targets.by_kind(space.floor.elements),
+                "raw": sum(targets.raw.get(kind, 0) for kind in by_kind),
+                "by_kind": by_kind,
                 "raw_by_kind": targets.raw,
             },
-            "candidates": {
-                "generated": candidates.generated,
-                "reachable": candidates.reachable,
-                "strategy": candidates.strategy,
-            },
+            "candidates": _attributes(self.part.candidates, "generated", "reachable", "strategy"),
             "visibility": {"visible": int(visibility.visible.sum()), "method": visibility.method},
             "selection": {
                 "stops": len(selection.chosen),
@@ -83,30 +97,6 @@ class PlanReport:
                 "bound_over": selection.among,
                 "method": selection.method,
             },
-            **network_table(self.network),
-            "coverage": coverage_table(self.figures),
-            **quality_told(self.figures),
-            "route": {
-                "length_m": self.part.route.length,
-                "bound_m": self.part.route.bound,
-                "method": self.part.route.method,
-                "tour": self.part.route.tour,
-                "start": self.part.route.start_reason,
-            },
-            "schedule": {
-                "drive_s": times.drive_s,
-                "turn_s": times.turn_s,
-                "settle_s": times.settle_s,
-                "scan_s": times.scan_s,
-                "total_s": times.total_s,
-            },
-            **time_told(self.part.route),
-            "unreached": [
-                {"room": item.room, "why": item.why, "area_m2": item.area_m2}
-                for item in self.figures.unreached
-            ],
-            "times_s": {key: round(value, 4) for key, value in self.times_s.items()},
-            "files": {key: str(path) for key, path in self.files.items()},
         }
 
     def _floor(self) -> dict[str, Any]:
@@ -126,17 +116,17 @@ class PlanReport:
         }
 
     def as_text(self) -> str:
-        """What a person reads: the plan, what it sees, what it leaves out, and what is doubtful."""
-        told, figures = self.as_json(), self.figures
-        floor, times, chosen = told["floor"], told["schedule"], told["selection"]
+        """Return the lines for a person: the plan, its coverage, the floor left out, and the findings."""
+        result, figures = self.as_json(), self.figures
+        floor, times, chosen = result["floor"], result["schedule"], result["selection"]
         lines = [
             f"{printable(floor['name'])}: {floor['area_m2']:.0f} m², {floor['rooms']} rooms, "
             f"{floor['openings']} openings; {floor['reached_m2']:.0f} of {figures.rooms_m2:.0f} m² reached",
-            f"  targets     {told['targets']['total']} units, "
-            f"{told['visibility']['visible']} visible from {told['candidates']['reachable']} candidates",
+            f"  targets     {result['targets']['total']} units, "
+            f"{result['visibility']['visible']} visible from {result['candidates']['reachable']} candidates",
             f"  stops       {chosen['stops']} "
             f"(of {chosen['bound_over']} at least {chosen['bound']} are needed)",
-            *self._way_lines(told["route"]),
+            *self._route_lines(result["route"]),
             f"  time        {times['total_s'] / 60:.0f} min: drive {times['drive_s']:.0f} s, "
             f"turn {times['turn_s']:.0f} s, settle {times['settle_s']:.0f} s, scan {times['scan_s']:.0f} s",
             *self._time_lines(),
@@ -151,7 +141,7 @@ class PlanReport:
         lines += finding_lines(figures.findings)
         return "\n".join([*lines, *self._file_lines()])
 
-    def _way_lines(self, route: dict[str, Any]) -> list[str]:
+    def _route_lines(self, route: dict[str, Any]) -> list[str]:
         return [
             f"  route       {route['length_m']:.1f} m {route['tour']} "
             f"(no route is below {route['bound_m']:.1f} m), from {route['start']}"
@@ -164,8 +154,8 @@ class PlanReport:
         return [f"  {key:<11} {path}" for key, path in self.files.items()]
 
 
-def time_told(route: Route) -> dict[str, Any]:
-    """What was saved and what can be, for JSON; nothing where stops were to be fewest."""
+def time_table(route: Route) -> dict[str, Any]:
+    """Time saved and the lower bound of the time, for JSON; empty if the plan minimises stops."""
     time = route.time
     if time is None:
         return {}
@@ -182,7 +172,7 @@ def time_told(route: Route) -> dict[str, Any]:
 
 
 def time_lines(route: Route, whose: str = "") -> list[str]:
-    """What was saved against fewest stops and then the shortest way, and what no plan is below."""
+    """Lines on the time saved against the fewest stops with the shortest route, and on its lower bound."""
     time = route.time
     if time is None:
         return []
@@ -194,8 +184,8 @@ def time_lines(route: Route, whose: str = "") -> list[str]:
     ]
 
 
-def quality_told(figures: Figures) -> dict[str, Any]:
-    """How well targets are to be seen, for JSON; nothing where any view counts."""
+def quality_table(figures: Figures) -> dict[str, Any]:
+    """Limits on views and their cost in stops, for JSON; empty if every view counts."""
     quality = figures.quality
     if quality is None:
         return {}
@@ -207,7 +197,7 @@ def quality_told(figures: Figures) -> dict[str, Any]:
 
 
 def quality_lines(figures: Figures) -> list[str]:
-    """How well targets are to be seen, and about how many stops each limit costs."""
+    """Lines on the limits on views, and on the approximate cost of each limit in stops."""
     quality = figures.quality
     if quality is None:
         return []
@@ -231,8 +221,12 @@ def coverage_table(figures: Figures) -> dict[str, Any]:
 
 
 def _row(share: Share) -> dict[str, Any]:
-    keys = ("name", "total", "visible", "seen", "coverage", "required", "why")
-    return {key: getattr(share, key) for key in keys}
+    return _attributes(share, "name", "total", "visible", "seen", "coverage", "required", "why")
+
+
+def _attributes(source: object, *names: str) -> dict[str, Any]:
+    """Return attributes of an object by their names, for JSON."""
+    return {name: getattr(source, name) for name in names}
 
 
 def coverage_lines(figures: Figures) -> list[str]:
@@ -252,19 +246,19 @@ def coverage_lines(figures: Figures) -> list[str]:
     return lines
 
 
-def _line(what: str, share: Share, unit: str) -> str:
+def _line(group: str, share: Share, unit: str) -> str:
     seen = f"{share.seen:.1f} of {share.visible:.1f} of {share.total:.1f} {unit}"
-    return f"    {what:<9} {printable(share.name):<24} {percent(share.coverage):>7}  {seen}"
+    return f"    {group:<9} {printable(share.name):<24} {percent(share.coverage):>7}  {seen}"
 
 
 def finding_lines(findings: Sequence[Finding]) -> list[str]:
-    """The findings that bear on the plan most, and how many more there are of what."""
+    """Lines of the most important findings, and the number of the others by code."""
     shown = [item for item in findings if item.rank != Rank.NOTE][:MOST_FINDINGS]
     lines = [f"  {_word(item):<11} {printable(item.message)}" for item in shown]
     rest = Counter(item.code for item in findings if item not in shown)
     if rest:
-        told = ", ".join(f"{count} {code}" for code, count in sorted(rest.items()))
-        lines.append(f"  finding     {rest.total()} more: {told} (--json lists them)")
+        counts = ", ".join(f"{count} {code}" for code, count in sorted(rest.items()))
+        lines.append(f"  finding     {rest.total()} more: {counts} (--json lists them)")
     return lines
 
 

@@ -1,4 +1,4 @@
-"""What `stopgo plan` tells of a plan whose stops are shared out: the floor once, then every mission."""
+"""Report of a plan whose stops are divided among robots or tours: the floor once, then every mission."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from stopgo.planner.commands.plan_report import PlanReport, time_lines
 
 
 def shared_report(divided: DividedPlan, reports: Sequence[PlanReport]) -> SharedReport:
-    """The report of all missions, whose own reports tell their files."""
+    """Return the report of all missions; the mission reports name their files."""
     first = reports[0]
     return SharedReport(
         part=divided.whole, files=first.files, times_s=reports[-1].times_s, divided=divided,
@@ -26,7 +26,7 @@ def shared_report(divided: DividedPlan, reports: Sequence[PlanReport]) -> Shared
 
 @dataclass(frozen=True, eq=False)
 class SharedReport(PlanReport):
-    """A finished plan of several missions that together see a floor."""
+    """A finished plan of several missions that together cover a floor."""
 
     divided: DividedPlan
     reports: tuple[PlanReport, ...]
@@ -39,7 +39,7 @@ class SharedReport(PlanReport):
 
     @property
     def network(self) -> Network | None:
-        """Of the scans of all missions: stop s03 of the first is 1:s03."""
+        """The network of the scans of all missions; stop s03 of the first mission is 1:s03."""
         whole = self.divided.whole
         name = {
             row: f"{number}:{stop.id}"
@@ -51,15 +51,15 @@ class SharedReport(PlanReport):
         return None if joined is None else joined.renamed(named)
 
     @property
-    def answer(self) -> int:
-        return max(report.answer for report in self.reports)
+    def exit_code(self) -> int:
+        return max(report.exit_code for report in self.reports)
 
     @property
-    def strict_answer(self) -> int:
-        return max(report.strict_answer for report in self.reports)
+    def strict_exit_code(self) -> int:
+        return max(report.strict_exit_code for report in self.reports)
 
     def as_json(self) -> dict[str, Any]:
-        """The object that `--json` prints: route and schedule are those of all missions together."""
+        """Return the object that `--json` prints; route and schedule are those of all missions together."""
         each = [report.as_json() for report in self.reports]
         sums = {key: sum(its["schedule"][key] for its in each) for key in each[0]["schedule"]}
         whole = {key: value for key, value in super().as_json().items() if key not in ("mission", "files")}
@@ -94,7 +94,7 @@ class SharedReport(PlanReport):
             ],
         }
 
-    def _way_lines(self, route: dict[str, Any]) -> list[str]:
+    def _route_lines(self, route: dict[str, Any]) -> list[str]:
         divided = self.divided
         count = len(self.reports)
         if divided.limit_s is None:
@@ -130,6 +130,6 @@ class SharedReport(PlanReport):
 
 
 def _rows(part: PartPlan) -> list[int]:
-    """The candidates that a plan stops at, in the order of driving."""
+    """Candidate numbers of the stops, in the order of driving."""
     rows: list[int] = part.selection.chosen[part.route.order].tolist()
     return rows

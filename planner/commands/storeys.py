@@ -1,4 +1,4 @@
-"""Plans every storey of a model, each into a folder of its own, two at a time, and sums them up."""
+"""Plans of every storey of a model: each in its own folder, two at a time, with a summary table."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ from stopgo.planner.floors import options_of, survey_floor
 from stopgo.planner.floors.survey import FloorChoice
 
 Planned = tuple[int, str, list[dict[str, Any]]]
-"""Exit code, what a person reads, and what `--json` tells of each part."""
+"""Exit code, text for a person, and the JSON object of each part."""
 PlanOne = Callable[[Path, Path, Settings], Planned]
 AT_ONCE = 2
 
 
 def plan_storeys(floor: Path, out: Path, settings: Settings, plan_one: PlanOne, *, as_json: bool) -> int:
-    """Plan all storeys that people walk on; the exit code is the worst of theirs.
+    """Plan all storeys that people walk on; returns the worst exit code of the storeys.
 
     Raises
     ------
     InputError
-        When a storey is named as well, or the file has none.
+        When the settings name a storey, or the file has none.
     """
     if settings.storey is not None or settings.level is not None:
-        raise InputError("--all-storeys and a storey are both given; leave one of them out")
+        raise InputError("--all-storeys and a storey are both given; remove one of them")
     found = survey_floor(floor, options_of(settings))
     storeys = [item for item in found.floors if not item.aside and item.option]
     if not storeys:
-        raise InputError(f"{floor}: has no storeys to plan one by one; leave --all-storeys out")
+        raise InputError(f"{floor}: contains no storeys; remove --all-storeys")
     names = [item.name for item in storeys]
     folders = [out / name for name in folder_names(names)]
     each = [_of_storey(settings, item, unique=names.count(item.name) == 1) for item in storeys]
     with ProcessPoolExecutor(AT_ONCE, mp_context=get_context("spawn")) as pool:
         planned = list(pool.map(plan_one, [floor] * len(storeys), folders, each))
-    _say(list(zip(storeys, folders, planned, strict=True)), as_json=as_json)
+    _print_storeys(list(zip(storeys, folders, planned, strict=True)), as_json=as_json)
     return max(code for code, _, _ in planned)
 
 
@@ -55,7 +55,7 @@ def _of_storey(settings: Settings, storey: FloorChoice, *, unique: bool) -> Sett
 
 
 def folder_names(storeys: Sequence[str]) -> list[str]:
-    """A folder's name for each storey: what any file system takes, and no name twice."""
+    """Return a folder name for each storey: valid on every file system, and unique."""
     names: list[str] = []
     for number, storey in enumerate(storeys, 1):
         plain = re.sub(r"[^\w+-]+", "-", storey).strip("-")[:60] or f"storey-{number}"
@@ -64,14 +64,14 @@ def folder_names(storeys: Sequence[str]) -> list[str]:
     return names
 
 
-def _say(done: list[tuple[FloorChoice, Path, Planned]], *, as_json: bool) -> None:
+def _print_storeys(done: list[tuple[FloorChoice, Path, Planned]], *, as_json: bool) -> None:
     if as_json:
-        told = [
+        storeys = [
             {"storey": storey.name, "folder": str(folder), "exit_code": code, "parts": parts}
             | ({} if parts else {"error": text})
             for storey, folder, (code, text, parts) in done
         ]
-        typer.echo(json.dumps({"storeys": told}, ensure_ascii=False))
+        typer.echo(json.dumps({"storeys": storeys}, ensure_ascii=False))
         return
     for _, _, (_, text, _) in done:
         typer.echo(printable_lines(text))

@@ -1,4 +1,4 @@
-"""Reads a building floor from a file: one module per kind of file, one entry in `READERS` for each.
+"""Readers of building floors: one module per kind of file, one entry in `READERS` for each.
 
 A reader's module has two functions, `survey(file, options) -> Survey` and `read(file, options) -> FloorPlan`
 (stopgo.planner.floors.reader.ReaderModule). It is found by the file's suffix and by what its bytes look like,
@@ -16,9 +16,9 @@ from stopgo.mission.errors import InputError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.settings import FLOOR_PARAMETERS, Settings
 from stopgo.mission.settings.layer_kinds import kinds_by_name
-from stopgo.planner.floors.foreign import foreign_readers, sound
 from stopgo.planner.floors.reader import FloorFile, FloorOptions, Reader
 from stopgo.planner.floors.survey import Survey
+from stopgo.planner.floors.third_party_readers import foreign_readers, sound
 
 READERS: tuple[Reader, ...] = (
     Reader(
@@ -56,13 +56,13 @@ def _is_zipped_model(data: bytes) -> bool:
 
 
 def read_floor(path: Path, options: FloorOptions | None = None) -> FloorPlan:
-    """The floor in a file, in metres.
+    """Read the floor in a file, in metres.
 
     Raises
     ------
     InputError
-        One line naming the file, what is wrong with it, and the way out; also for an option that means
-        nothing to such a file.
+        One line with the file, the problem and the remedy; also for an option that does not apply to
+        such a file.
     """
     file, reader, options = _opened(path, options)
     with reader.named_errors():
@@ -71,7 +71,7 @@ def read_floor(path: Path, options: FloorOptions | None = None) -> FloorPlan:
 
 
 def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
-    """What is in a floor's file, and what would be read of it with these options.
+    """Return the survey of a floor's file: its contents, and the floor that these options give.
 
     Raises
     ------
@@ -85,37 +85,37 @@ def survey_floor(path: Path, options: FloorOptions | None = None) -> Survey:
 
 
 def options_of(settings: Settings) -> FloorOptions:
-    """What a plan's settings tell a reader."""
-    told = {name: getattr(settings, name) for name in FLOOR_PARAMETERS}
-    columns = (entry.partition("=") for entry in told.pop("schedule_columns"))
-    schedule = told.pop("schedule")
-    told["layer_map"] = kinds_by_name(settings.layer_map or ())
+    """Return the reader's options from a plan's settings."""
+    values = {name: getattr(settings, name) for name in FLOOR_PARAMETERS}
+    columns = (entry.partition("=") for entry in values.pop("schedule_columns"))
+    schedule = values.pop("schedule")
+    values["layer_map"] = kinds_by_name(settings.layer_map or ())
     return FloorOptions(
         d_dis=settings.d_dis,
         layers=settings.layer_roles,
         schedule=None if schedule is None else Path(schedule),
         schedule_columns={what.strip(): column.strip() for what, _, column in columns},
-        **told,
+        **values,
     )
 
 
 def _opened(path: Path, options: FloorOptions | None) -> tuple[FloorFile, Variant[Reader], FloorOptions]:
-    """The file, its reader, and the options, all of which mean something to the reader."""
+    """Return the file, its reader, and the options; refuse options that do not apply to the reader."""
     options = options or FloorOptions()
     file = FloorFile(path, _bytes_of(path))
     reader = _reader_of(file)
     takes = reader.what.takes
-    vain = [name for name in options.given if name not in takes]
-    if vain:
+    unknown = [name for name in options.given if name not in takes]
+    if unknown:
         raise InputError(
-            f"{path}: --{_option(vain[0])} means nothing for a {reader.what.kind}; "
-            f"leave it out (known for it: {_listed(takes)})"
+            f"{path}: --{_option(unknown[0])} does not apply to a {reader.what.kind}; "
+            f"remove it (known: {_listed(takes)})"
         )
     return file, reader, options
 
 
 def _reader_of(file: FloorFile) -> Variant[Reader]:
-    """By suffix, unless the bytes are plainly those of another kind."""
+    """Choose the reader by suffix, unless the bytes are clearly those of another kind."""
     suffix = file.path.suffix.lower()
     named = [reader for reader in READERS if suffix in reader.suffixes]
     alike = [reader for reader in READERS if reader.holds(file.data)]
@@ -131,7 +131,7 @@ def _reader_of(file: FloorFile) -> Variant[Reader]:
 
 
 def _option(name: str) -> str:
-    """How the command line calls an option."""
+    """Return the name of an option on the command line."""
     return {"layers": "layer", "layer_map": "layers", "schedule_columns": "schedule-column"}.get(
         name, name.replace("_", "-")
     )

@@ -1,4 +1,4 @@
-"""Turns one DXF entity into polylines, in its own block's coordinates and units.
+"""Conversion of one DXF entity to polylines, in its own block's coordinates and units.
 
 Arcs are cut into chords no longer than `chord` and no farther than `sagitta` from the arc. A circle that
 `outside` asks for is circumscribed, so that no clearance from it is overestimated.
@@ -25,7 +25,7 @@ _MOST_CHORDS = 100_000
 
 @dataclass(frozen=True)
 class Fineness:
-    """How finely curves are cut, in drawing units."""
+    """Resolution of chords along curves, in drawing units."""
 
     chord: float
     sagitta: float
@@ -59,7 +59,7 @@ class Curve:
 
 
 def curves_of(entity: DXFEntity, fineness: Fineness) -> list[Curve]:
-    """The curves an entity draws; none for one that draws no line or area.
+    """Return the curves of an entity; none for an entity without a line or area.
 
     Raises
     ------
@@ -235,11 +235,11 @@ CURVES: dict[str, Callable[[Any, Fineness], Iterator[Curve]]] = {
     "HATCH": _hatch,
     "MPOLYGON": _hatch,
 }
-"""How each kind of entity is cut; any other goes through ezdxf's own paths."""
+"""The function that converts each kind of entity; any other kind uses ezdxf's own paths."""
 
 
 def _check(points: Iterable[Vec3]) -> None:
-    """Flattening halves a curve until it is flat, which numbers that are none never become."""
+    """Refuse coordinates that are not finite: flattening halves a curve until it is flat, without end."""
     array = _array(list(points))
     if not (np.isfinite(array).all() and (np.abs(array) <= LARGEST).all()):
         raise ValueError("a coordinate is not a number or beyond any building")

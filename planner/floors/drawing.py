@@ -1,4 +1,4 @@
-"""Opens the bytes of a DXF, text or binary, whole or damaged, and decides how long its unit is."""
+"""Opening of a DXF, text or binary, whole or damaged, and the length of its unit."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ BROKEN_INPUT = (
     ValueError,
     struct.error,
 )
-"""What ezdxf raises on damaged input: it trusts types and links, so nearly anything may come out of it."""
+"""Exceptions that ezdxf raises on damaged input: it does not check types and links."""
 
 _BINARY = b"AutoCAD Binary DXF\r\n\x1a\x00"
 
@@ -65,7 +65,7 @@ _LEAF_WIDTH = (0.5, 1.7)
 
 
 def open_drawing(data: bytes, *, source: Path) -> tuple[Drawing, list[Finding]]:
-    """The drawing in `data`, and findings when it had to be repaired.
+    """Return the drawing in `data`, and findings if it had to be repaired.
 
     Raises
     ------
@@ -91,12 +91,12 @@ def open_drawing(data: bytes, *, source: Path) -> tuple[Drawing, list[Finding]]:
 
 
 def _looks_like_dxf(data: bytes) -> bool:
-    """A DXF is binary with its own mark, or text whose tags open a section."""
+    """True for a binary DXF with its signature, or text whose tags open a section."""
     return data.startswith(_BINARY) or (b"\0" not in data[:1024] and b"SECTION" in data)
 
 
 def _holds_all_entities(data: bytes) -> bool:
-    """What follows ENTITIES is no geometry; a file cut before that may lack walls and must not be planned."""
+    """True if the ENTITIES section is complete; a file cut off in it may lack walls."""
     start = data.rfind(b"ENTITIES")
     return start >= 0 and data.find(b"ENDSEC", start) >= 0
 
@@ -109,7 +109,7 @@ def _without_end(data: bytes) -> list[Finding]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """ezdxf logs each repair; they reach the user as findings, not as noise on stderr."""
+    """Silence ezdxf's log of repairs: the user gets them as findings, not on stderr."""
     logger = logging.getLogger("ezdxf")
     before = logger.level
     logger.setLevel(logging.CRITICAL)
@@ -147,7 +147,7 @@ def _one_line(error: BaseException) -> str:
 
 
 def legible(text: str, *, most: int = 120) -> str:
-    """Text from a file as one line that any terminal and any file takes."""
+    """Return text from a file as one line that every terminal and file accepts."""
     sound = text.encode("utf-8", errors="replace").decode("utf-8")
     line = " ".join(sound.split())
     return "".join(letter if letter.isprintable() else "?" for letter in line)[:most]
@@ -165,7 +165,7 @@ def metres_per_unit(
     doors
         Lengths of the lines across openings in drawing units.
     leaves
-        Whether these are the widths of single leaves, which say more.
+        True if these are the widths of single leaves, which are more reliable.
     """
     widths = _LEAF_WIDTH if leaves else _DOOR_WIDTH
     extent = float(np.ptp(floor, axis=0).max()) if len(floor) else 0.0
@@ -185,13 +185,13 @@ def metres_per_unit(
     return _as_measured(named, fitting[0], code=code, extent=extent)
 
 
-def told_unit(name: str, extent: FloatArray, *, source: Path) -> tuple[float, list[Finding]]:
-    """Length of a unit that a person names, such as `mm`.
+def given_unit(name: str, extent: FloatArray, *, source: Path) -> tuple[float, list[Finding]]:
+    """Return the length in metres of a unit given by name, such as `mm`.
 
     Raises
     ------
     InputError
-        When there is no such unit, or it makes no building of what is drawn.
+        When there is no such unit, or the drawing would not have the size of a building.
     """
     code = _NAMED.get(name.strip().lower())
     if code is None:
@@ -203,14 +203,14 @@ def told_unit(name: str, extent: FloatArray, *, source: Path) -> tuple[float, li
             f"{source}: --units {legible(name)} makes the drawing {size:.4g} m across; name another unit, "
             "or leave it out and stopgo looks at doors and walls"
         )
-    return factor, [Finding("units_as_told", f"one unit is a {word}, as told")]
+    return factor, [Finding("units_as_told", f"one unit is a {word}, as given")]
 
 
 _NAMED = {
     **{"mm": 4, "cm": 5, "dm": 14, "m": 6, "km": 7, "in": 1, "ft": 2, "yd": 10},
     **{name: code for code, (name, _) in METRES.items()},
 }
-"""How a unit may be named, and its $INSUNITS code."""
+"""Accepted names of units, with their $INSUNITS codes."""
 
 
 def _header_integer(drawing: Drawing, name: str, default: int = 0) -> int:
@@ -224,7 +224,7 @@ def _fits(extent: float, door: float | None, widths: Limits, limits: Limits = _F
 
 
 def _fits_header(extent: float, door: float | None, widths: Limits) -> bool:
-    """The header is believed for a rather small or large floor too, if doors of usual width bear it out."""
+    """True if the header's unit fits; for a very small or large floor, only if door widths confirm it."""
     return _fits(extent, door, widths) or (door is not None and _fits(extent, door, widths, _HEADER_EXTENT))
 
 

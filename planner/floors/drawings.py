@@ -1,4 +1,4 @@
-"""Tells the drawings in one model space apart: plans, elevations and sections that lie side by side."""
+"""Separation of the drawings in one model space: plans, elevations and sections side by side."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DrawingBox = tuple[float, float, float, float]
 APART = 2.0
 """Drawings lie at least this far apart, in metres."""
 _SMALLEST = 3.0
-"""What is smaller than this, in metres, is no storey."""
+"""A drawing smaller than this, in metres, is not a storey."""
 _MUCH = 5.0
 """A drawing with this many times as much wall as any other is the plan; the others are details."""
 _NOT_BUILT = ("ignore", "names", "other")
@@ -40,15 +40,15 @@ class DrawingFound:
     """Strokes by role."""
 
     @property
-    def told(self) -> str:
-        """Its size and what is in it, in words."""
+    def description(self) -> str:
+        """Its size and contents, in words."""
         x0, y0, x1, y1 = self.box
         doors = f", {self.swings} door swings" if self.swings else ", no door swing"
         return f"{x1 - x0:.1f} x {y1 - y0:.1f} m, {self.walls_m:.0f} m of wall lines{doors}"
 
 
 def drawings_in(strokes: Sequence[Stroke]) -> list[DrawingFound]:
-    """The drawings that hold walls, from left to right and bottom to top."""
+    """Return the drawings that contain walls, from left to right and bottom to top."""
     built = [item for item in strokes if item.role not in _NOT_BUILT]
     groups = _groups(built)
     found = [_drawing([built[k] for k in group]) for group in groups]
@@ -57,7 +57,7 @@ def drawings_in(strokes: Sequence[Stroke]) -> list[DrawingFound]:
 
 
 def chosen_of(drawings: Sequence[DrawingFound]) -> DrawingFound | None:
-    """The drawing that is plainly the plan; None where a person has to say."""
+    """Return the drawing that is clearly the plan; None if the user has to choose."""
     if len(drawings) < 2:
         return drawings[0] if drawings else None
     swinging = [item for item in drawings if item.swings]
@@ -70,7 +70,7 @@ def chosen_of(drawings: Sequence[DrawingFound]) -> DrawingFound | None:
 
 
 def is_in(points: FloatArray, box: DrawingBox, *, margin: float = 0.0) -> bool:
-    """Whether the middle of what is drawn lies in a box, or this near to it."""
+    """True if the middle of the points lies in a box, or at most `margin` metres from it."""
     x, y = (points.min(axis=0) + points.max(axis=0)) / 2
     return bool(box[0] - margin <= x <= box[2] + margin and box[1] - margin <= y <= box[3] + margin)
 
@@ -93,7 +93,7 @@ def _drawing(strokes: Sequence[Stroke]) -> DrawingFound:
 
 
 def _groups(strokes: Sequence[Stroke]) -> list[list[int]]:
-    """Indices of the strokes that hang together over gaps below APART, or whose boxes overlap."""
+    """Indices of strokes that are connected over gaps below APART, or whose boxes overlap, by group."""
     if not strokes:
         return []
     cells, owner = _cells(strokes)
@@ -110,7 +110,7 @@ def _cells(strokes: Sequence[Stroke]) -> tuple[FloatArray, np.ndarray]:
     sampled = [_sampled(item.points) for item in strokes]
     number = np.repeat(np.arange(len(strokes)), [len(points) for points in sampled])
     cells, place = np.unique(np.floor(np.concatenate(sampled)), axis=0, return_inverse=True)
-    # A stroke hangs together itself: its cells are linked by their distance alone, being 1 m apart at most.
+    # A stroke is connected itself: its cells are linked by their distance alone, being 1 m apart at most.
     return cells, np.stack([number, place.reshape(-1)], axis=1)
 
 

@@ -1,4 +1,4 @@
-"""Sorts the strokes of a layer into closed shapes and open lines, each once, in an order of their own.
+"""Shapes of a layer: its strokes as closed shapes and open lines, each once, in a canonical order.
 
 The order is that of the geometry, so that nothing later depends on the order in which a drawing was made.
 """
@@ -29,15 +29,15 @@ from stopgo.planner.floors.strokes import Stroke
 
 
 @dataclass(frozen=True)
-class Oddity:
-    """What is odd about a thing that has no id yet."""
+class Anomaly:
+    """An anomaly of an object that has no id yet."""
 
     code: str
     text: str
     at: tuple[float, float] | None = None
 
     def about(self, element: str) -> Finding:
-        """The finding, once the thing is called `element`."""
+        """Return the finding about the element with this id."""
         return Finding(self.code, f"{element}: {self.text}", element=element, at=self.at)
 
 
@@ -48,11 +48,11 @@ class Closed:
     region: Region
     layer: str
     clockwise: bool = False
-    """How the ring was drawn; a hole is drawn against the shape around it."""
+    """Direction of the drawn ring; a hole has the opposite direction to the shape around it."""
     global_id: str | None = None
     fill: bool = False
     """A hatch, which often fills an outline that is drawn as well."""
-    odd: tuple[Oddity, ...] = ()
+    anomalies: tuple[Anomaly, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,16 +63,16 @@ class Open:
     layer: str
     curved: bool = False
     global_id: str | None = None
-    odd: tuple[Oddity, ...] = ()
+    anomalies: tuple[Anomaly, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """All that is drawn on one layer, each thing once."""
+    """All shapes drawn on one layer, each once."""
 
     closed: tuple[Closed, ...] = ()
     open: tuple[Open, ...] = ()
-    dropped: tuple[Oddity, ...] = ()
+    dropped: tuple[Anomaly, ...] = ()
     """Lines without length."""
 
 
@@ -86,52 +86,52 @@ def drawn(strokes: Iterable[Stroke], *, gap: float = SNAP) -> Drawn:
         closed=_each_closed_once(_without_fills(closed)),
         open=_each_line_once([line for line in lines if line not in points]),
         dropped=tuple(
-            Oddity("no_length", "a line shorter than 1 mm is ignored", place(line.points)) for line in points
+            Anomaly("no_length", "a line shorter than 1 mm is ignored", place(line.points)) for line in points
         ),
     )
 
 
 def _shape(stroke: Stroke, *, gap: float) -> Closed | Open:
     points = without_repeats(stroke.points)
-    odd = _repeats(stroke, points)
+    anomalies = _repeats(stroke, points)
     ring = closed_ring(points, closed=stroke.closed, gap=gap)
     if ring is None:
-        return Open(canonical_line(points), stroke.layer, stroke.curved, stroke.global_id, odd)
+        return Open(canonical_line(points), stroke.layer, stroke.curved, stroke.global_id, anomalies)
     polygons, changed = repaired(ring)
     if not polygons:
-        flat = Oddity("no_area", "is closed but encloses nothing; kept as a line", place(ring))
-        return Open(canonical_line(ring), stroke.layer, stroke.curved, stroke.global_id, (*odd, flat))
+        flat = Anomaly("no_area", "is closed but encloses nothing; kept as a line", place(ring))
+        return Open(canonical_line(ring), stroke.layer, stroke.curved, stroke.global_id, (*anomalies, flat))
     if changed:
-        odd = (*odd, _split(polygons, ring))
+        anomalies = (*anomalies, _split(polygons, ring))
     if not stroke.closed:
-        odd = (*odd, *_gap(points))
+        anomalies = (*anomalies, *_gap(points))
     region = polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
-    return Closed(region, stroke.layer, ring_area(ring) < 0, stroke.global_id, stroke.fill, odd)
+    return Closed(region, stroke.layer, ring_area(ring) < 0, stroke.global_id, stroke.fill, anomalies)
 
 
-def _repeats(stroke: Stroke, points: FloatArray) -> tuple[Oddity, ...]:
-    """Repeated points are dropped; more than the usual closing one is worth telling."""
+def _repeats(stroke: Stroke, points: FloatArray) -> tuple[Anomaly, ...]:
+    """Report dropped points; one repeated closing point is normal and not reported."""
     dropped = len(stroke.points) - len(points)
     if not dropped or len(points) < 2:
         return ()
-    return (Oddity("repeated_points", f"{dropped} repeated points were dropped", place(points)),)
+    return (Anomaly("repeated_points", f"{dropped} repeated points were dropped", place(points)),)
 
 
-def _split(polygons: Sequence[shapely.Polygon], ring: FloatArray) -> Oddity:
+def _split(polygons: Sequence[shapely.Polygon], ring: FloatArray) -> Anomaly:
     area = sum(polygon.area for polygon in polygons)
     text = f"its ring crosses or touches itself; repaired to {len(polygons)} polygons of {area:.3g} m²"
-    return Oddity("repaired", text, place(ring))
+    return Anomaly("repaired", text, place(ring))
 
 
-def _gap(points: FloatArray) -> tuple[Oddity, ...]:
+def _gap(points: FloatArray) -> tuple[Anomaly, ...]:
     width = float(np.hypot(*(points[-1] - points[0])))
     if width <= SNAP:
         return ()
-    return (Oddity("gap_closed", f"a gap of {width * 100:.1f} cm in its ring was closed", place(points)),)
+    return (Anomaly("gap_closed", f"a gap of {width * 100:.1f} cm in its ring was closed", place(points)),)
 
 
 def place(points: FloatArray) -> tuple[float, float]:
-    """Where a finding points to: the lexicographically smallest point."""
+    """Position of a finding: the lexicographically smallest point."""
     x, y = min(map(tuple, points.tolist()))
     return (x, y)
 
@@ -147,7 +147,7 @@ def _closed_key(shape: Closed) -> tuple:
 
 
 def region_key(region: Region) -> tuple:
-    """An order of regions by place and then by every coordinate."""
+    """Sort key of regions: by position and then by every coordinate."""
     rings = [canonical_ring(part.exterior).tolist() for part in shapely.get_parts(region)]
     return (*np.round(region.bounds, 6).tolist(), rings)
 
@@ -157,7 +157,7 @@ def _open_key(line: Open) -> tuple:
 
 
 def _without_fills(shapes: Sequence[Closed]) -> list[Closed]:
-    """Without hatches that fill outlines drawn on the same layer."""
+    """Return the shapes without hatches that fill outlines drawn on the same layer."""
     if not any(shape.fill for shape in shapes):
         return list(shapes)
     drawn_area = shapely.union_all([shape.region for shape in shapes if not shape.fill])
@@ -171,7 +171,7 @@ def _without_fills(shapes: Sequence[Closed]) -> list[Closed]:
 def _each_closed_once(shapes: Sequence[Closed]) -> tuple[Closed, ...]:
     first = distinct([shape.region for shape in shapes])
     return tuple(
-        replace(shape, odd=(*shape.odd, *_copies(first.count(index), shape.region.bounds[:2])))
+        replace(shape, anomalies=(*shape.anomalies, *_copies(first.count(index), shape.region.bounds[:2])))
         for index, shape in enumerate(shapes)
         if first[index] == index
     )
@@ -182,22 +182,22 @@ def _each_line_once(lines: Sequence[Open]) -> tuple[Open, ...]:
     for line in lines:
         copies.setdefault(tuple(map(tuple, np.round(line.points, 6).tolist())), []).append(line)
     return tuple(
-        replace(same[0], odd=(*same[0].odd, *_copies(len(same), same[0].points[0])))
+        replace(same[0], anomalies=(*same[0].anomalies, *_copies(len(same), same[0].points[0])))
         for same in copies.values()
     )
 
 
-def _copies(count: int, at: Iterable[float]) -> tuple[Oddity, ...]:
+def _copies(count: int, at: Iterable[float]) -> tuple[Anomaly, ...]:
     if count == 1:
         return ()
     x, y = at
-    return (Oddity("duplicate", f"is drawn {count} times; kept once", (float(x), float(y))),)
+    return (Anomaly("duplicate", f"is drawn {count} times; kept once", (float(x), float(y))),)
 
 
 def hole_indices(
     shapes: Sequence[Closed], above: Sequence[int | None], is_hole: Callable[[Closed, Closed], bool]
 ) -> set[int]:
-    """Which shapes are holes of the one around them; what lies in a hole is solid again."""
+    """Indices of shapes that are holes of the shape around them; a shape in a hole is solid again."""
     holes: set[int] = set()
     for index in sorted(range(len(shapes)), key=lambda item: -shapes[item].region.area):
         parent = above[index]
@@ -208,13 +208,13 @@ def hole_indices(
 
 def faces_of(
     lines: Sequence[Open], *, merge: bool, gap: float
-) -> tuple[list[Closed], list[Open], list[Oddity]]:
-    """What open lines enclose together, the lines that enclose nothing, and the gaps that were closed."""
+) -> tuple[list[Closed], list[Open], list[Anomaly]]:
+    """Return areas enclosed by open lines together, lines that enclose nothing, and the gaps closed."""
     enclosed = joined([line.points for line in lines], merge=merge, gap=gap)
     faces = [Closed(face, lines[0].layer) for face in enclosed.faces]
     loose = [lines[index] for index in enclosed.loose]
     gaps = [
-        Oddity("gap_closed", f"a gap of {width * 100:.1f} cm between lines was closed", at)
+        Anomaly("gap_closed", f"a gap of {width * 100:.1f} cm between lines was closed", at)
         for width, at in enclosed.gaps
     ]
     return faces, loose, gaps
@@ -222,9 +222,9 @@ def faces_of(
 
 def outline_faces(lines: Sequence[Open], *, layer: str, merge: bool) -> tuple[list[Closed], list[Finding]]:
     """Faces on a layer where only areas count, with findings for closed gaps and for loose lines."""
-    faces, loose, odd = faces_of(lines, merge=merge, gap=GAP)
+    faces, loose, anomalies = faces_of(lines, merge=merge, gap=GAP)
     if loose:
         length = sum(polyline_length(line.points) for line in loose)
         text = f"{len(loose)} open lines ({length:.3g} m) enclose nothing and are ignored"
-        odd = [*odd, Oddity("open_outline", text, place(loose[0].points))]
-    return faces, [item.about(layer) for item in odd]
+        anomalies = [*anomalies, Anomaly("open_outline", text, place(loose[0].points))]
+    return faces, [item.about(layer) for item in anomalies]

@@ -1,4 +1,4 @@
-"""Walks a drawing's model space, blocks and all, to the shapes on each layer and where they are placed."""
+"""Shapes of a drawing's model space and its blocks, each with its layer and placement."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Shape:
     matrix: Matrix44 | None = None
     global_id: str | None = None
     why: str = ""
-    """What says that it has this role."""
+    """Source of this role."""
 
     @property
     def is_text(self) -> bool:
@@ -50,12 +50,12 @@ class Shape:
 
     @property
     def is_note(self) -> bool:
-        """Annotation: it stands for nothing that is built."""
+        """True for an annotation: it shows nothing that is built."""
         return self.entity.dxftype() in _NOTES
 
     @property
     def name(self) -> str:
-        """How a finding calls it: kind, handle and layer."""
+        """Name in findings: kind, handle and layer."""
         return f"{self.kind} #{legible(str(self.entity.dxf.get('handle')))} on {self.layer}"
 
     @property
@@ -66,7 +66,7 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class _Placement:
-    """What a block's content takes over from the inserts around it."""
+    """Properties that a block's content inherits from the inserts around it."""
 
     matrix: Matrix44 | None = None
     layer: str = "0"
@@ -79,7 +79,7 @@ class _Placement:
 def shapes_of(
     drawing: Drawing, *, source: Path, layers: Layers | None = None
 ) -> tuple[list[Shape], list[Finding]]:
-    """All shapes of the model space, and a finding for each hidden layer and each thing not followed.
+    """Return all shapes of the model space, and a finding for each hidden layer and each block left out.
 
     Shapes of layers to ignore are left out.
 
@@ -91,7 +91,7 @@ def shapes_of(
 
 
 def ignored_in(drawing: Drawing, *, source: Path, layers: Layers) -> list[tuple[str, LayerReading, int]]:
-    """Each layer to ignore with what says so, and how many entities it holds."""
+    """Return each ignored layer with the source of that meaning, and its number of entities."""
     walk = _OutlineWalk(drawing, source=source, layers=layers)
     for _ in walk.through(drawing.modelspace(), _Placement()):
         pass
@@ -99,20 +99,20 @@ def ignored_in(drawing: Drawing, *, source: Path, layers: Layers) -> list[tuple[
 
 
 _BUILT = frozenset({*ROLES.values(), "openings"})
-"""Roles for which a layer that is hidden counts all the same."""
+"""Roles for which a hidden layer counts too."""
 
 
 class _OutlineWalk:
-    """One pass over a drawing, with what it met on the way."""
+    """One pass over a drawing, with its counts and anomalies."""
 
     def __init__(self, drawing: Drawing, *, source: Path, layers: Layers) -> None:
         self._source = source
         self._met = 0
         self._hidden = {layer.dxf.name.upper(): layer.is_frozen() for layer in _hidden_layers(drawing)}
         self._layers = layers
-        self._as_told: Counter[tuple[str, str]] = Counter()
+        self._given_uses: Counter[tuple[str, str]] = Counter()
         self._used: Counter[str] = Counter()
-        self._odd: Counter[tuple[str, str]] = Counter()
+        self._found: Counter[tuple[str, str]] = Counter()
         self.left_out: Counter[tuple[str, LayerReading]] = Counter()
 
     def through(self, entities: Iterable[DXFEntity], placed: _Placement) -> Iterator[Shape]:
@@ -138,7 +138,7 @@ class _OutlineWalk:
         try:
             return list(disassemble.recursive_decompose([multiline]))
         except BROKEN_INPUT as error:
-            self._odd["bad_coordinates", f"an MLINE is skipped: {legible(str(error))}"] += 1
+            self._found["bad_coordinates", f"an MLINE is skipped: {legible(str(error))}"] += 1
             return []
 
     def _insert(self, insert: Insert, placed: _Placement) -> Iterator[Shape]:
@@ -147,15 +147,15 @@ class _OutlineWalk:
             block, places = insert.block(), _places(insert, placed)
             clipped = XClip(insert).has_clipping_path
         except BROKEN_INPUT as error:
-            self._odd["bad_coordinates", f"block {name} is skipped: {legible(str(error))}"] += 1
+            self._found["bad_coordinates", f"block {name} is skipped: {legible(str(error))}"] += 1
             return
         if block is None or block.block is None or block.block.is_xref:
-            self._odd["missing_block", f"block {name} is not in the file; bind external references"] += 1
+            self._found["missing_block", f"block {name} is not in the file; bind external references"] += 1
         elif name in placed.blocks:
-            self._odd["endless_block", f"block {name} holds itself and is not followed"] += 1
+            self._found["endless_block", f"block {name} holds itself and is not followed"] += 1
         else:
             if clipped:
-                self._odd["clipped_block", f"block {name} is clipped in the drawing and read whole"] += 1
+                self._found["clipped_block", f"block {name} is clipped in the drawing and read whole"] += 1
             yield from self.through(insert.attribs, placed)
             inside = self._inside(insert, placed, name=name)
             for matrix in places:
@@ -187,28 +187,28 @@ class _OutlineWalk:
         yield Shape(entity, plain, reading.role, placed.matrix, global_id, reading.why)
 
     def _reading(self, layer: str, blocks: tuple[str, ...]) -> LayerReading:
-        """What a layer stands for, and that the user has said so."""
+        """Return the meaning of a layer, and count its use if the user gave it."""
         reading = self._layers.reading(layer, blocks)
-        if layer.upper() in self._layers.told:
-            self._as_told[layer, reading.role] += 1
+        if layer.upper() in self._layers.given:
+            self._given_uses[layer, reading.role] += 1
         return reading
 
     def findings(self) -> list[Finding]:
-        told = [
-            Finding("layer_as_told", f"layer {layer} is taken for {role}, as told: {count} entities")
-            for (layer, role), count in self._as_told.items()
+        given = [
+            Finding("layer_as_told", f"layer {layer} is taken for {role}, as given: {count} entities")
+            for (layer, role), count in self._given_uses.items()
         ]
         hidden = [
             Finding("hidden_layer", f"layer {legible(layer)} is frozen or off; its {count} entities are used")
             for layer, count in self._used.items()
         ]
-        return [*told, *self._absent(), *hidden] + [
-            Finding(code, text) for (code, text), count in self._odd.items() for _ in range(count)
+        return [*given, *self._absent(), *hidden] + [
+            Finding(code, text) for (code, text), count in self._found.items() for _ in range(count)
         ]
 
     def _absent(self) -> list[Finding]:
-        """Layers that the user names and the drawing does not have."""
-        absent = set(self._layers.told) - {layer.upper() for layer, _ in self._as_told}
+        """Findings on layers that the user named and the drawing does not have."""
+        absent = set(self._layers.given) - {layer.upper() for layer, _ in self._given_uses}
         return [
             Finding("no_such_layer", f"layer {legible(name)} is not in the drawing")
             for name in sorted(absent)
@@ -225,14 +225,14 @@ def _layer(entity: DXFEntity, placed: _Placement) -> str:
 
 
 def _attribute(entity: DXFEntity, name: str, default: object) -> object:
-    """An attribute that entities of a kind unknown to ezdxf keep among their raw tags."""
+    """Return an attribute; for entities unknown to ezdxf, from their raw tags."""
     if isinstance(entity, DXFTagStorage):
         return entity.graphic_properties().get(name, default)
     return entity.dxf.get(name, default) if entity.dxf.is_supported(name) else default
 
 
 def _places(insert: Insert, placed: _Placement) -> list[Matrix44]:
-    """Where the block is drawn: once, or in rows and columns."""
+    """Placements of the block: one, or rows and columns."""
     if insert.mcount > _MOST_COPIES:
         raise ValueError(f"{insert.mcount} copies are no building's")
     copies = insert.multi_insert() if insert.mcount > 1 else [insert]

@@ -1,4 +1,4 @@
-"""Reads a DXF: one floor, on layers named FLOOR, ROOMS, WALLS and so on, or as an architect drew it.
+"""Reader of DXF files: one floor, on layers named FLOOR, ROOMS, WALLS and so on, or as an architect drew it.
 
 The bytes become a drawing, the drawing shapes on layers, these strokes in metres, the strokes a floor plan.
 What no layer shows is derived from the line work.
@@ -19,7 +19,7 @@ from stopgo.mission.floor.floor_source import FloorSource
 from stopgo.mission.geometry import bounds
 from stopgo.planner.floors.drawing import METRES, open_drawing
 from stopgo.planner.floors.drawn_shapes import ignored_in
-from stopgo.planner.floors.dxf_sheet import DxfSheet, drawings_told, sheet_of
+from stopgo.planner.floors.dxf_sheet import DxfSheet, drawings_text, sheet_of
 from stopgo.planner.floors.linework import Derived, as_room_name, completed, derived
 from stopgo.planner.floors.parts import in_order, parts_of
 from stopgo.planner.floors.reader import FloorFile, FloorOptions
@@ -27,7 +27,7 @@ from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey, SurveyLi
 
 
 def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
-    """The floor that a DXF holds.
+    """Read the floor in a DXF.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def _source(file: FloorFile, options: FloorOptions) -> FloorSource:
 
 
 def floor_in(drawing: Drawing, *, source: Path, digest: str, d_dis: float) -> FloorPlan:
-    """The floor drawn in the model space of a drawing, whatever file it is from."""
+    """Return the floor drawn in the model space of a drawing, from any file."""
     sheet = sheet_of(drawing, FloorOptions(d_dis=d_dis), source=source)
     return _floor_of(sheet, source, FloorSource(source.name, digest))
 
@@ -74,7 +74,7 @@ def _floor_of(sheet: DxfSheet, path: Path, source: FloorSource) -> FloorPlan:
 
 
 def _derived(sheet: DxfSheet, path: Path) -> Derived:
-    """Strokes and words of a layered drawing, whatever kind of drawing it is."""
+    """Return the strokes and words of a layered drawing; for other drawings they are derived."""
     if sheet.layered:
         return Derived(sheet.strokes, sheet.words, [])
     roles = {stroke.role for stroke in sheet.strokes}
@@ -87,8 +87,8 @@ def _derived(sheet: DxfSheet, path: Path) -> Derived:
         return Derived(sheet.strokes, named, []) if large else completed(sheet.strokes, sheet.words)
     if len(sheet.drawings) > 1 and sheet.chosen is None:
         count = len(sheet.drawings)
-        told = drawings_told(sheet.drawings)
-        raise InputError(f"{path}: {count} drawings side by side, choose one with --drawing N{told}")
+        listed = drawings_text(sheet.drawings)
+        raise InputError(f"{path}: {count} drawings side by side, choose one with --drawing N{listed}")
     if size > LARGEST_FLOOR:
         raise InputError(
             f"{path}: the walls are {size:.4g} m across, read in {_unit_name(sheet)}; "
@@ -117,19 +117,19 @@ def _size(sheet: DxfSheet) -> float:
 
 
 LARGEST_FLOOR = 2000.0
-"""No storey is longer than this, in metres."""
+"""Greatest length of a storey, in metres."""
 _PATTERN = 150
-"""So many small cells among the lines of walls are a pattern of tiles or a hatch."""
+"""This many small cells among the lines of walls are a pattern of tiles or a hatch."""
 
 
 def _no_walls(sheet: DxfSheet) -> str:
-    """Why nothing can be made of a drawing in which no layer is known, and the way out."""
+    """Message for a drawing without any known layer, with the remedy."""
     layers = sorted({shape.layer for shape in sheet.shapes}, key=str.casefold)
     why = (
         f"no closed outline on layer FLOOR, and no layer that shows walls; layers present: {_listed(layers)}"
     )
     if len(layers) < 2:
-        return f"{why} (nothing tells walls from other lines; ask for an export with layers)"
+        return f"{why} (walls cannot be distinguished from other lines; ask for an export with layers)"
     return f"{why} (say which one holds the walls, such as --layer {layers[0]}=walls)"
 
 
@@ -139,19 +139,19 @@ def _listed(names: Sequence[str], *, most: int = 20) -> str:
 
 
 def _known(sheet: DxfSheet) -> frozenset[str]:
-    """Layers of which it is known what they are, though it is no kind of element."""
+    """Layers with a known meaning that is not a kind of element."""
     return frozenset(
         shape.layer for shape in sheet.shapes if shape.role in ("furniture", "names", "openings")
     )
 
 
 def metres_in(drawing: Drawing, *, source: Path, options: FloorOptions | None = None) -> float:
-    """Length of one drawing unit in metres, as `read` takes it: what is drawn over a floor needs it."""
+    """Length of one drawing unit in metres, as `read` uses it; drawings over a floor need it."""
     return sheet_of(drawing, options or FloorOptions(), source=source).scale
 
 
 def survey(file: FloorFile, options: FloorOptions) -> Survey:
-    """What a DXF holds: its drawings, what each layer stands for, what was worked out and what left out."""
+    """Return the survey of a DXF: drawings, meanings of layers, elements inferred and left out."""
     drawing, _ = open_drawing(file.data, source=file.path)
     sheet = sheet_of(drawing, options, source=file.path)
     try:
@@ -165,10 +165,10 @@ def survey(file: FloorFile, options: FloorOptions) -> Survey:
         units=_unit(sheet),
         floors=tuple(_choices(sheet, floor)),
         layers=tuple(_layers(drawing, sheet, file.path)),
-        inferred=_told(floor, "inferred_"),
-        ignored=_told(floor, "not_a_wall"),
+        inferred=_messages(floor, "inferred_"),
+        ignored=_messages(floor, "not_a_wall"),
         findings=tuple(
-            item for item in (floor or sheet).findings if not item.code.startswith(_TOLD_ELSEWHERE)
+            item for item in (floor or sheet).findings if not item.code.startswith(_REPORTED_ELSEWHERE)
         ),
         lines=tuple(SurveyLine(item.points, item.role not in _LEFT, item.closed) for item in sheet.strokes),
         floor=floor,
@@ -177,7 +177,7 @@ def survey(file: FloorFile, options: FloorOptions) -> Survey:
 
 
 def _unit(sheet: DxfSheet) -> str:
-    """The unit's name and what says so."""
+    """The unit's name and the source of it."""
     name = _unit_name(sheet)
     why = next((item.message for item in sheet.findings if item.code.startswith("units_")), "")
     return f"{name} ({why})" if why else f"{name}, as the header says"
@@ -188,30 +188,30 @@ def _unit_name(sheet: DxfSheet) -> str:
 
 
 _LEFT = ("other", "ignore")
-_TOLD_ELSEWHERE = ("inferred_", "layer_", "units_", "drawings_found", "not_a_wall")
-"""Codes of findings that a survey tells in lines of their own."""
+_REPORTED_ELSEWHERE = ("inferred_", "layer_", "units_", "drawings_found", "not_a_wall")
+"""Codes of findings that a survey reports in separate lines."""
 
 
-def _told(floor: FloorPlan | None, code: str) -> tuple[str, ...]:
+def _messages(floor: FloorPlan | None, code: str) -> tuple[str, ...]:
     findings = floor.findings if floor else ()
     return tuple(item.message for item in findings if item.code.startswith(code))
 
 
-def _not_told(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    return tuple(item for item in findings if not item.code.startswith(_TOLD_ELSEWHERE))
+def _other_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    return tuple(item for item in findings if not item.code.startswith(_REPORTED_ELSEWHERE))
 
 
 def _choices(sheet: DxfSheet, floor: FloorPlan | None) -> Iterable[FloorChoice]:
-    """The drawings side by side, or the one floor there is."""
+    """The drawings side by side, or the only floor."""
     if floor is not None and len(sheet.drawings) < 2:
         yield _choice(floor)
         return
     for number, item in enumerate(sheet.drawings, start=1):
         option = f"--drawing {number}" if len(sheet.drawings) > 1 else ""
         if floor is not None and item is sheet.chosen:
-            yield replace(_choice(floor), name=f"drawing {number}", option=option, notes=(item.told,))
+            yield replace(_choice(floor), name=f"drawing {number}", option=option, notes=(item.description,))
         else:
-            yield FloorChoice(f"drawing {number}", option, bounds=item.box, notes=(item.told,))
+            yield FloorChoice(f"drawing {number}", option, bounds=item.box, notes=(item.description,))
 
 
 def _choice(floor: FloorPlan) -> FloorChoice:
@@ -227,7 +227,7 @@ def _choice(floor: FloorPlan) -> FloorChoice:
 
 
 def _layers(drawing: Drawing, sheet: DxfSheet, source: Path) -> Iterable[LayerUse]:
-    """What each layer that holds anything was taken for."""
+    """Meaning of each layer that is not empty, with its counts of entities."""
     counts = Counter((shape.layer, shape.role, shape.why) for shape in sheet.shapes)
     for (layer, role, why), count in sorted(counts.items()):
         known = role != "other"
@@ -237,6 +237,6 @@ def _layers(drawing: Drawing, sheet: DxfSheet, source: Path) -> Iterable[LayerUs
 
 
 def _skipped(findings: Sequence[Finding]) -> str:
-    """The first damaged shape on FLOOR, for the error about an outline that is missing because of it."""
+    """The first damaged shape on FLOOR, for the error about the missing outline."""
     damaged = [finding.message for finding in findings if "on FLOOR is skipped" in finding.message]
     return f" ({damaged[0]})" if damaged else ""

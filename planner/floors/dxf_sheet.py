@@ -1,4 +1,4 @@
-"""What a DXF was taken for before a floor is made of it: layers, unit, drawings, and the strokes of one."""
+"""Interpretation of a DXF before it becomes a floor: layers, unit, drawings, and strokes of one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ezdxf.document import Drawing
 from stopgo.mission.errors import InputError
 from stopgo.mission.floor import Finding
 from stopgo.mission.geometry import FloatArray
-from stopgo.planner.floors.drawing import metres_per_unit, told_unit
+from stopgo.planner.floors.drawing import given_unit, metres_per_unit
 from stopgo.planner.floors.drawings import DrawingBox, DrawingFound, chosen_of, drawings_in, is_in
 from stopgo.planner.floors.drawn_shapes import Shape, shapes_of
 from stopgo.planner.floors.layers import Layers, is_layered, missing_in
@@ -21,13 +21,13 @@ from stopgo.planner.floors.reader import FloorOptions
 from stopgo.planner.floors.strokes import Stroke, Word, sketch, strokes_of
 
 _MARGIN = 1.0
-"""What lies this near to a drawing, in metres, belongs to it."""
+"""A stroke this near to a drawing, in metres, belongs to it."""
 _HOUSE = 30.0
 
 
 @dataclass(frozen=True, eq=False)
 class DxfSheet:
-    """A drawing as it was taken: its strokes and words in metres, and how that came about."""
+    """A drawing as interpreted: its strokes and words in metres, and the basis of the interpretation."""
 
     layers: Layers
     shapes: Sequence[Shape]
@@ -37,22 +37,22 @@ class DxfSheet:
     words: list[Word]
     findings: list[Finding]
     layered: bool
-    """Whether layers of our own names show all of the floor."""
+    """True if layers with stopgo's own names show all of the floor."""
     outlined: bool
-    """Whether a layer of our own name FLOOR shows the floor."""
+    """True if the layer FLOOR shows the floor."""
     drawings: tuple[DrawingFound, ...] = ()
-    """All drawings in the model space, where they were looked for."""
+    """All drawings in the model space, if they were searched."""
     chosen: DrawingFound | None = None
-    """The one that was taken; None where a person has to choose, or there is none."""
+    """The drawing used; None if the user has to choose, or there is none."""
 
 
 def sheet_of(drawing: Drawing, options: FloorOptions, *, source: Path) -> DxfSheet:
-    """The sheet that options make of a drawing.
+    """Return the sheet of a drawing for these options.
 
     Raises
     ------
     InputError
-        When a unit is told that makes no building, or a drawing or region that is not there.
+        When the given unit makes no building, or the given drawing or region does not exist.
     """
     shapes, odd = shapes_of(drawing, source=source, layers=Layers(options.layers))
     own = frozenset(shape.role for shape in shapes if not shape.is_text)
@@ -72,24 +72,24 @@ def sheet_of(drawing: Drawing, options: FloorOptions, *, source: Path) -> DxfShe
 
 
 def _by_name(shapes: Sequence[Shape]) -> list[Finding]:
-    """Layers that were taken for something by names that are not ours."""
+    """Findings on layers whose meaning comes from other names than stopgo's own."""
     taken = {(shape.layer, shape.role, shape.why) for shape in shapes if shape.role != "other"}
     return [
         Finding(
             "layer_by_name", f"layer {layer} is taken for {role}: {why} (--layer {layer}=KIND corrects it)"
         )
         for layer, role, why in sorted(taken)
-        if why not in ("its name", "as told", "by the map")
+        if why not in ("its name", "as given", "by the map")
     ]
 
 
 def scale_of(
     drawing: Drawing, shapes: Sequence[Shape], options: FloorOptions, *, outlined: bool, source: Path
 ) -> tuple[float, list[Finding]]:
-    """Metres per drawing unit: as told, else by the header, the floor's size and the doors' widths."""
+    """Metres per drawing unit: as given, else by the header, the floor's size and the doors' widths."""
     points = _extent(shapes, "floor" if outlined else "walls")
     if options.units is not None:
-        return told_unit(options.units, points, source=source)
+        return given_unit(options.units, points, source=source)
     widths = _door_widths(shapes, outlined=outlined)
     return metres_per_unit(drawing, floor=points, doors=widths, leaves=not outlined)
 
@@ -119,7 +119,7 @@ def _door_widths(shapes: Sequence[Shape], *, outlined: bool) -> list[float]:
 
 
 def _radii(shapes: Sequence[Shape]) -> list[float]:
-    """Radii of quarter arcs in drawing units; looked at as if the drawing were as large as a house."""
+    """Radii of quarter arcs in drawing units; searched as if the drawing had the size of a house."""
     sketched = sketch(shapes)
     size = float(np.ptp(np.vstack(sketched), axis=0).max()) if sketched else 0.0
     if not size:
@@ -155,14 +155,14 @@ def _within(sheet: DxfSheet, box: DrawingBox, *, margin: float) -> DxfSheet:
 
 
 def _one_drawing(sheet: DxfSheet, options: FloorOptions, source: Path) -> DxfSheet:
-    """One of several drawings: the one told, else the one that is plainly a plan."""
+    """Choose one of several drawings: the one given by the user, else the one that is clearly a plan."""
     if sheet.layered or (sheet.outlined and options.drawing is None):
         return sheet
     drawings = tuple(drawings_in(sheet.strokes))
     sheet = replace(sheet, drawings=drawings)
     if options.drawing is not None and not 1 <= options.drawing <= len(drawings):
         raise InputError(
-            f"{source}: --drawing {options.drawing}: found are {len(drawings)}{drawings_told(drawings)}"
+            f"{source}: --drawing {options.drawing}: found are {len(drawings)}{drawings_text(drawings)}"
         )
     chosen = chosen_of(drawings) if options.drawing is None else drawings[options.drawing - 1]
     if chosen is None:
@@ -171,7 +171,7 @@ def _one_drawing(sheet: DxfSheet, options: FloorOptions, source: Path) -> DxfShe
         return replace(sheet, chosen=chosen)
     number = drawings.index(chosen) + 1
     why = (
-        "as told"
+        "as given"
         if options.drawing
         else "the only one with door swings"
         if chosen.swings
@@ -179,15 +179,15 @@ def _one_drawing(sheet: DxfSheet, options: FloorOptions, source: Path) -> DxfShe
     )
     found = Finding(
         "drawings_found",
-        f"{len(drawings)} drawings side by side: number {number} is taken, {why}{drawings_told(drawings)}",
+        f"{len(drawings)} drawings side by side: number {number} is taken, {why}{drawings_text(drawings)}",
     )
     return replace(
         _within(sheet, chosen.box, margin=_MARGIN), chosen=chosen, findings=[*sheet.findings, found]
     )
 
 
-def drawings_told(drawings: Sequence[DrawingFound]) -> str:
-    """The drawings by number, each with its size and what is in it."""
+def drawings_text(drawings: Sequence[DrawingFound]) -> str:
+    """The drawings by number, each with its size and contents, in words."""
     if not drawings:
         return ""
-    return ": " + "; ".join(f"{k} is {item.told}" for k, item in enumerate(drawings, start=1))
+    return ": " + "; ".join(f"{k} is {item.description}" for k, item in enumerate(drawings, start=1))

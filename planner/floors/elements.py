@@ -1,4 +1,4 @@
-"""Makes the elements: filled shapes with their holes, and open lines, one element per thing drawn."""
+"""Elements of a floor: filled shapes with their holes, and open lines, one element per drawn object."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import shapely
 from stopgo.mission.floor import Element, Finding, IgnoredLine, Room
 from stopgo.mission.geometry import FloatArray, Polygon, frozen
 from stopgo.mission.settings.element_kinds import KINDS
-from stopgo.planner.floors.drawn import Closed, Drawn, Oddity, Open, faces_of, hole_indices, place
+from stopgo.planner.floors.drawn import Anomaly, Closed, Drawn, Open, faces_of, hole_indices, place
 from stopgo.planner.floors.rings import SNAP, Region, canonical_region, parents, polygons_of, to_shapely
 
 _NEAR = 1.0
@@ -20,7 +20,7 @@ _NEAR = 1.0
 _OUTLINES = ("walls", "windows", "railings", "other")
 """Kinds that people also draw as a ring around something that is not solid."""
 _STANDING = 0.35
-"""Half of the width in metres that no wall has and that a person or a robot stands in."""
+"""Half of a width in metres that no wall has and a person or a robot fits in."""
 _ROOM = 1.0
 """Least area in m² of a room that no solid fills."""
 
@@ -32,7 +32,7 @@ class _ElementPart:
     region: Region | None = None
     lines: tuple[FloatArray, ...] = ()
     global_id: str | None = None
-    odd: tuple[Oddity, ...] = ()
+    anomalies: tuple[Anomaly, ...] = ()
 
     @cached_property
     def solids(self) -> tuple[Polygon, ...]:
@@ -41,13 +41,13 @@ class _ElementPart:
 
 @dataclass(frozen=True, eq=False)
 class _Spaces:
-    """The floor and the rooms in it, which no wall fills."""
+    """The floor and its rooms, which no wall fills."""
 
     outline: Region
     rooms: tuple[Region, ...]
 
     def filled_by(self, region: Region) -> bool:
-        """Whether a shape would fill a whole room or more than half of the floor: then it is an outline."""
+        """True if a shape would fill a whole room or more than half of the floor: then it is an outline."""
         area, half = region.area, self._area / 2
         if area > half and region.intersection(self.outline).area > half:
             return True
@@ -68,7 +68,7 @@ class _Spaces:
 def elements_of(
     on: Mapping[str, Drawn], *, outline: Region, rooms: Sequence[Room]
 ) -> tuple[tuple[Element, ...], list[IgnoredLine], list[Finding]]:
-    """Elements kind by kind, in the order of their place, and outlines on unknown layers that are none.
+    """Return elements kind by kind, in the order of their positions, and ignored outlines.
 
     Ids count within a kind.
     """
@@ -79,13 +79,13 @@ def elements_of(
     for kind in KINDS:
         if kind in on:
             drawn = on[kind]
-            odd: list[Finding] = []
+            anomalies: list[Finding] = []
             if kind == "other":
-                drawn, left_out, odd = _on_the_floor(drawn, spaces)
+                drawn, left_out, anomalies = _on_the_floor(drawn, spaces)
                 ignored += left_out
             made, more = _of_kind(kind, drawn, spaces)
             elements += made
-            findings += [*odd, *more]
+            findings += [*anomalies, *more]
     return tuple(elements), ignored, findings
 
 
@@ -98,12 +98,12 @@ def _of_kind(kind: str, drawn: Drawn, spaces: _Spaces) -> tuple[list[Element], l
     findings: list[Finding] = []
     parts = [
         *_bodies(kind, closed, spaces),
-        *(_ElementPart(None, (line.points,), line.global_id, line.odd) for line in lines),
+        *(_ElementPart(None, (line.points,), line.global_id, line.anomalies) for line in lines),
     ]
     elements: list[Element] = []
     for number, part in enumerate(sorted(parts, key=_place_key), start=1):
         elements.append(_element(f"{kind}-{number:03d}", kind, part))
-        findings += [odd.about(elements[-1].id) for odd in part.odd]
+        findings += [anomaly.about(elements[-1].id) for anomaly in part.anomalies]
     return elements, findings
 
 
@@ -118,7 +118,7 @@ def _closed_and_lines(kind: str, drawn: Drawn) -> tuple[list[Closed], list[Open]
 
 
 def _on_the_floor(drawn: Drawn, spaces: _Spaces) -> tuple[Drawn, list[IgnoredLine], list[Finding]]:
-    """Unknown shapes that may stand on the floor; frames around it and things beside it are left out.
+    """Unknown shapes that may be on the floor; frames around it and objects outside it are left out.
 
     A frame's outline is drawn all the same, so it is handed on as a line that is ignored.
     """
@@ -129,7 +129,7 @@ def _on_the_floor(drawn: Drawn, spaces: _Spaces) -> tuple[Drawn, list[IgnoredLin
         at = place(shapely.get_coordinates(shape.region))
         if shape.region.distance(spaces.outline) > _NEAR:
             findings.append(
-                Finding("off_floor", f"layer {shape.layer}: a shape beside the floor is ignored", at=at)
+                Finding("off_floor", f"layer {shape.layer}: a shape outside the floor is ignored", at=at)
             )
         elif spaces.filled_by(shape.region):
             text = f"layer {shape.layer}: a ring around rooms ({shape.region.area:.3g} m²) is ignored"
@@ -142,7 +142,7 @@ def _on_the_floor(drawn: Drawn, spaces: _Spaces) -> tuple[Drawn, list[IgnoredLin
 
 
 def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_ElementPart]:
-    """Solids without their holes; a ring around rooms becomes a line, and what lies in it its own solid."""
+    """Solids without their holes; a ring around rooms becomes a line, and each shape in it its own solid."""
     above = parents([shape.region for shape in closed])
     holes = hole_indices(closed, above, partial(_is_hole, kind))
     parts: list[_ElementPart] = []
@@ -154,13 +154,13 @@ def _bodies(kind: str, closed: Sequence[Closed], spaces: _Spaces) -> list[_Eleme
         if not polygons_of(body) or (kind in _OUTLINES and spaces.filled_by(body)):
             parts += [_body_or_outline(kind, shape, spaces) for shape in (closed[index], *inner)]
         else:
-            odd = tuple(item for shape in (closed[index], *inner) for item in shape.odd)
-            parts.append(_ElementPart(body, (), closed[index].global_id, odd))
+            anomalies = tuple(item for shape in (closed[index], *inner) for item in shape.anomalies)
+            parts.append(_ElementPart(body, (), closed[index].global_id, anomalies))
     return parts
 
 
 def _is_hole(kind: str, inner: Closed, outer: Closed) -> bool:
-    """Whether a ring in another is its inside: said by GlobalId or hatch, else by direction and size.
+    """True if a ring in another is its hole: decided by GlobalId or hatch, else by direction and size.
 
     A tread drawn against its flight must not free the stairs; the two faces of a wall around a core are
     often drawn in one direction.
@@ -178,15 +178,15 @@ def _is_hole(kind: str, inner: Closed, outer: Closed) -> bool:
 
 def _body_or_outline(kind: str, shape: Closed, spaces: _Spaces) -> _ElementPart:
     if not spaces.filled_by(shape.region):
-        return _ElementPart(shape.region, (), shape.global_id, shape.odd)
+        return _ElementPart(shape.region, (), shape.global_id, shape.anomalies)
     lines = tuple(
         frozen(np.vstack((ring, ring[:1])))
         for polygon in canonical_region(shape.region)
         for ring in polygon.rings
     )
     text = f"its ring around {shape.region.area:.3g} m² of floor is read as a line, not as solid {kind}"
-    odd = Oddity("outline_not_solid", text, place(lines[0]))
-    return _ElementPart(None, lines, shape.global_id, (*shape.odd, odd))
+    anomaly = Anomaly("outline_not_solid", text, place(lines[0]))
+    return _ElementPart(None, lines, shape.global_id, (*shape.anomalies, anomaly))
 
 
 def _place_key(part: _ElementPart) -> tuple:

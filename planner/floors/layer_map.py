@@ -1,4 +1,4 @@
-"""Writes the file in which a person says what the layers of a drawing stand for."""
+"""Writer of the layer map: the file in which a person sets the meaning of a drawing's layers."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from stopgo.planner.floors.survey import LayerUse, Survey
 
 
 def layer_map(found: Survey) -> str:
-    """The layers of a surveyed drawing as such a file.
+    """Return the text of a layer map for a surveyed drawing.
 
     Raises
     ------
     InputError
-        When there are none, as in a robot's map.
+        When the file has no layers, such as a robot's map.
     """
     if not found.layers:
         raise InputError(f"{found.file}: has no layers to write down; leave --write-map out")
@@ -33,14 +33,14 @@ def layer_map(found: Survey) -> str:
 
 
 def _lines(layers: tuple[LayerUse, ...]) -> Iterator[str]:
-    """A line per layer; one whose content is told apart by the names of its blocks stands as a comment."""
+    """One line per layer; a layer whose blocks have several meanings becomes a comment."""
     for name in sorted({item.name for item in layers}):
         uses = [item for item in layers if item.name == name]
         kind = uses[0].role
-        why = "; ".join(dict.fromkeys(_told(item) for item in uses))
+        why = "; ".join(dict.fromkeys(_use_text(item) for item in uses))
         mark = "" if len({item.role for item in uses}) == 1 and kind in LAYER_ROLES else "# "
         yield f"{mark}{json.dumps(name, ensure_ascii=False)} = {json.dumps(kind)}  # {why}"
 
 
-def _told(item: LayerUse) -> str:
+def _use_text(item: LayerUse) -> str:
     return f"{item.taken + item.ignored} as {item.role}: {item.why}"

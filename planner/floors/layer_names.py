@@ -1,4 +1,4 @@
-"""Says what a layer stands for by its name: layer standards, and the words of many languages.
+"""Meaning of a layer by its name: layer standards, and words of many languages.
 
 AIA/NCS writes discipline and group (`A-WALL-FULL`); ISO 13567 and BS 1192 write a discipline and a code
 of the CI/SfB or Uniclass table (`A-21----E-`, `A-210-M_Wall`); everybody else writes words of his language,
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class LayerReading:
-    """What a name was taken for, and what says so."""
+    """Meaning of a name, and the source of that meaning."""
 
     role: str
     """A role of LAYER_ROLES."""
@@ -23,7 +23,7 @@ class LayerReading:
 
 
 def reading_of(name: str) -> LayerReading | None:
-    """What a layer or a block of this name stands for; None if the name says nothing."""
+    """Return the meaning of a layer or block by its name; None if the name is unknown."""
     return _reading(_plain(name))
 
 
@@ -36,7 +36,7 @@ def _reading(plain: str) -> LayerReading | None:
 
 
 def _whole_words(plain: str, found: re.Match[str]) -> str:
-    """What was found, drawn out to whole words."""
+    """Return the match, extended to whole words."""
     start = plain.rfind(" ", 0, found.start() + 1) + 1
     return plain[start : plain.find(" ", found.end())]
 
@@ -167,7 +167,7 @@ _PATTERNS = tuple(
         ("floor", _FLOOR),
     )
 )
-"""Roles by words, the first that fits."""
+"""Roles by words; the first match counts."""
 
 
 def _by_code(plain: str) -> LayerReading | None:

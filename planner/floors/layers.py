@@ -1,4 +1,4 @@
-"""Decides what each layer of a drawing stands for: as told, as mapped, by our own names, or by its name."""
+"""Meaning of each layer of a drawing: given by the user, mapped, by stopgo's own names, or by its name."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ ROLES: dict[str, str] = {
     "PASSAGES": "passages",
     **{kind.upper(): kind for kind in KINDS if kind != "other"},
 }
-"""What the shapes of a layer of our own names are."""
+"""Role of the shapes on each layer with one of stopgo's own names."""
 IGNORE = "ignore"
 OTHER = LayerReading("other", "no known name")
 NEEDED = ("floor", "rooms", "walls")
-"""What a layered drawing has, besides doors or passages."""
+"""Roles that a layered drawing needs, in addition to doors or passages."""
 
 _NONE: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class Layers:
-    """What layers stand for; names are in capitals."""
+    """Meanings of layers; names are in capitals."""
 
-    told: Mapping[str, str] = field(default_factory=lambda: _NONE)
-    """By options of the command."""
+    given: Mapping[str, str] = field(default_factory=lambda: _NONE)
+    """Given by options of the command."""
     mapped: Mapping[str, str] = field(default_factory=lambda: _NONE)
-    """By a file that a person may have corrected."""
+    """Given by a file that a person may have corrected."""
     by_name: frozenset[str] = frozenset()
-    """Roles for which names of other kinds than ours are read."""
+    """Roles for which other names than stopgo's own are read."""
 
     def reading(self, layer: str, blocks: Sequence[str]) -> LayerReading:
-        """What a layer stands for, and why; where its name says nothing, what the blocks around it do."""
+        """Return the meaning of a layer and its source; if the name is unknown, by the blocks around it."""
         name = layer.upper()
-        if name in self.told:
-            return LayerReading(self.told[name], "as told")
+        if name in self.given:
+            return LayerReading(self.given[name], "as given")
         if name in self.mapped:
             return LayerReading(self.mapped[name], "by the map")
         if name in ROLES:
@@ -59,7 +59,7 @@ class Layers:
 
 
 _OF_BLOCKS = ("doors", "windows", "columns", "stairs", "furniture", "walls", "railings")
-"""What blocks are drawn of; a block named by a storey or a view is not one of it."""
+"""Roles that a block's name can give; a block named after a storey or a view gives none."""
 
 
 ALL_ROLES = frozenset({*ROLES.values(), "openings", "furniture", "names", IGNORE})
@@ -67,7 +67,7 @@ ALL_ROLES = frozenset({*ROLES.values(), "openings", "furniture", "names", IGNORE
 
 
 def missing_in(roles: frozenset[str]) -> frozenset[str]:
-    """Which roles are looked for by other names, where our own names show some of a floor."""
+    """Roles to search by other names, if stopgo's own names show only a part of a floor."""
     if "floor" not in roles:
         return ALL_ROLES
     doors = frozenset() if roles & {"doors", "passages"} else frozenset({"doors", "openings", "passages"})
@@ -76,5 +76,5 @@ def missing_in(roles: frozenset[str]) -> frozenset[str]:
 
 
 def is_layered(roles: frozenset[str]) -> bool:
-    """Whether layers of our own names show all of a floor, so that nothing needs to be worked out."""
+    """True if layers with stopgo's own names show all of a floor, so that nothing is inferred."""
     return roles >= set(NEEDED) and bool(roles & {"doors", "passages"})

@@ -1,4 +1,4 @@
-"""Makes the openings: each line on DOORS or PASSAGES lies across one."""
+"""Openings of a floor: each line on DOORS or PASSAGES lies across one."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ import shapely
 
 from stopgo.mission.floor import Finding, Opening
 from stopgo.mission.geometry import FloatArray, frozen
-from stopgo.planner.floors.drawn import Closed, Drawn, Oddity, Open, place
+from stopgo.planner.floors.drawn import Anomaly, Closed, Drawn, Open, place
 from stopgo.planner.floors.rings import SNAP, canonical_line
 
-Across = tuple[FloatArray, str | None, tuple[Oddity, ...]]
-"""A line (2, 2) across an opening, its GlobalId, and what is odd about it."""
+Across = tuple[FloatArray, str | None, tuple[Anomaly, ...]]
+"""A line (2, 2) across an opening, its GlobalId, and its anomalies."""
 
 
 def openings_of(*, doors: Drawn, passages: Drawn) -> tuple[tuple[Opening, ...], list[Finding]]:
-    """Doors, then passages, in the order of their place; lines without length are dropped."""
+    """Return doors, then passages, in the order of their positions; lines without length are dropped."""
     openings: list[Opening] = []
     findings: list[Finding] = []
     for kind, drawn in (("door", doors), ("passage", passages)):
         lines, dropped = _across(drawn, kind=kind)
         findings += dropped
-        for number, (line, global_id, odd) in enumerate(lines, start=1):
+        for number, (line, global_id, anomalies) in enumerate(lines, start=1):
             openings.append(Opening(f"{kind}-{number:03d}", kind, line, global_id))
-            findings += [item.about(openings[-1].id) for item in odd]
+            findings += [item.about(openings[-1].id) for item in anomalies]
     return tuple(openings), findings
 
 
@@ -32,13 +32,13 @@ def _across(drawn: Drawn, *, kind: str) -> tuple[list[Across], list[Finding]]:
     findings: list[Finding] = []
     shapes: list[Open | Closed] = [*drawn.open, *drawn.closed]
     for shape in shapes:
-        line, odd = _line(shape)
+        line, anomalies = _line(shape)
         if isinstance(shape, Open) and shape.curved:
             findings.append(_ignored("not_an_opening", f"{kind}: a curve is not a line across it", line))
         elif float(np.hypot(*(line[1] - line[0]))) <= SNAP:
             findings.append(_ignored("no_length", f"{kind}: a line ends where it starts", line))
         else:
-            lines.append((line, shape.global_id, (*shape.odd, *odd)))
+            lines.append((line, shape.global_id, (*shape.anomalies, *anomalies)))
     return sorted(lines, key=lambda item: item[0].tolist()), findings
 
 
@@ -46,11 +46,11 @@ def _ignored(code: str, text: str, line: FloatArray) -> Finding:
     return Finding(code, f"{text}; it is ignored", at=place(line))
 
 
-def _line(shape: Open | Closed) -> tuple[FloatArray, tuple[Oddity, ...]]:
+def _line(shape: Open | Closed) -> tuple[FloatArray, tuple[Anomaly, ...]]:
     if isinstance(shape, Open):
         return canonical_line(shape.points[[0, -1]]), ()
-    odd = Oddity("closed_opening", "is drawn as a closed shape; read as the line along its middle")
-    return _middle(shape), (odd,)
+    anomaly = Anomaly("closed_opening", "is drawn as a closed shape; read as the line along its middle")
+    return _middle(shape), (anomaly,)
 
 
 def _middle(shape: Closed) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Makes the parts of a floor of strokes and words: its outline, rooms, openings and elements."""
+"""Parts of a floor from strokes and words: its outline, rooms, openings and elements."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from stopgo.planner.floors.strokes import Stroke, Word
 
 @dataclass(frozen=True, eq=False)
 class FloorParts:
-    """What a floor plan is made of."""
+    """Outline, rooms, openings and elements of a floor plan."""
 
     outline: tuple[Polygon, ...]
     rooms: tuple[Room, ...]
@@ -40,7 +40,7 @@ def parts_of(
     known: frozenset[str] = frozenset(),
     skipped: str = "",
 ) -> FloorParts:
-    """The parts that strokes and words on the known layers draw.
+    """Return the parts that strokes and words on the known layers draw.
 
     Raises
     ------
@@ -72,10 +72,10 @@ def _drawn_by_role(strokes: Iterable[Stroke]) -> defaultdict[str, Drawn]:
 
 
 def outline_of(floor: Drawn) -> tuple[Region, list[Finding]]:
-    """The region on layer FLOOR: rings in rings are holes, parts that overlap or nearly touch are one."""
+    """Return the region on layer FLOOR: rings in rings are holes, touching parts are one."""
     faces, findings = outline_faces(floor.open, layer="FLOOR", merge=True)
     rings = (*floor.closed, *faces)
-    findings += [odd.about("FLOOR") for ring in rings for odd in ring.odd]
+    findings += [anomaly.about("FLOOR") for ring in rings for anomaly in ring.anomalies]
     outline, joints = without_joints(even_odd([ring.region for ring in rings]))
     return outline, [*findings, *joints]
 
@@ -118,15 +118,15 @@ def _unknown_layers(other: Drawn, words: Iterable[Word], known: frozenset[str]) 
 
 def _dropped(on: Mapping[str, Drawn]) -> list[Finding]:
     return [
-        Finding(odd.code, f"layer {role.upper()}: {odd.text}", at=odd.at)
+        Finding(anomaly.code, f"layer {role.upper()}: {anomaly.text}", at=anomaly.at)
         for role, drawn_on in on.items()
         if role != "other"
-        for odd in drawn_on.dropped
+        for anomaly in drawn_on.dropped
     ]
 
 
 def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Sorted, and what is said more than once said once with its count."""
+    """Return the findings sorted; repeated findings become one with its count."""
     said: dict[tuple, list[Finding]] = {}
     for finding in sorted(findings, key=_finding_key):
         said.setdefault((finding.code, finding.element, finding.message), []).append(finding)

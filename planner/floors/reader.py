@@ -1,4 +1,4 @@
-"""What every reader of floors takes and gives: a file and options in, a floor plan or a survey out."""
+"""Interface of every floor reader: a file and options in, a floor plan or a survey out."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class FloorFile:
 
 @dataclass(frozen=True, kw_only=True)
 class FloorOptions:
-    """What a reader can be told. None and empty: not told, the reader decides and says so."""
+    """Options of a reader. None or empty means not given: the reader decides and reports its decision."""
 
     d_dis: float = 0.05
     """Curves are cut by Eq. 1 for units of this length in metres; every reader takes it."""
     layers: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    """What layers of other names stand for: names in capitals, kinds as in LAYER_ROLES."""
+    """Meanings of layers with other names: names in capitals, kinds as in LAYER_ROLES."""
     layer_map: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     """The same, from a file that `stopgo floors --write-map` wrote."""
     drawing: int | None = None
@@ -54,26 +54,26 @@ class FloorOptions:
     level: float | None = None
     """Level of the floor in metres, where the model names no storey there."""
     scan_height: float | None = None
-    """Height of the scanner above the floor in metres: what is cut there occludes and is a target."""
+    """Height of the scanner above the floor in metres: a solid cut there occludes and is a target."""
     robot_height: float | None = None
-    """Height of the robot in metres: what is lower than this stands in its way."""
+    """Height of the robot in metres: a solid lower than this is an obstacle."""
     date: str | None = None
     """The day whose construction status is read, as YYYY-MM-DD."""
     since: str | None = None
-    """Only what was finished after this day, as YYYY-MM-DD, is to be scanned."""
+    """Only elements finished after this day, as YYYY-MM-DD, is to be scanned."""
     schedule: Path | None = None
     """CSV of GlobalIds with the start and finish of their tasks."""
     schedule_columns: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    """Which column of the CSV is what: guid, task, start, finish."""
+    """Name of the CSV column for each of guid, task, start, finish."""
     in_progress: Literal["obstacle", "target"] | None = None
-    """Whether what is being built on the day is to be scanned as well."""
+    """Treatment of elements under construction on the day: obstacle only, or target too."""
 
     @property
     def given(self) -> tuple[str, ...]:
-        """Names of the options that were told, other than d_dis."""
-        return tuple(item.name for item in fields(self) if item.name != "d_dis" and self._told(item.name))
+        """Names of the options that were given, except d_dis."""
+        return tuple(item.name for item in fields(self) if item.name != "d_dis" and self._is_given(item.name))
 
-    def _told(self, name: str) -> bool:
+    def _is_given(self, name: str) -> bool:
         value = getattr(self, name)
         return bool(value) if isinstance(value, Mapping) else value is not None
 
@@ -81,11 +81,11 @@ class FloorOptions:
 class ReaderModule(Protocol):
     """The module of a reader: two functions of one signature.
 
-    Both raise InputError, one line with the file, what is wrong with it, and the way out.
+    Both raise InputError, one line with the file, the problem and the remedy.
     """
 
     def survey(self, file: FloorFile, options: FloorOptions) -> Survey:
-        """What is in the file, before anybody plans."""
+        """Return the survey of the file."""
 
     def read(self, file: FloorFile, options: FloorOptions) -> FloorPlan:
         """The floor that the options choose in it."""
@@ -96,14 +96,14 @@ class Reader:
     """One kind of file that floors are read from."""
 
     kind: str
-    """How a person calls it, such as `DXF drawing`."""
+    """Name for a person, such as `DXF drawing`."""
     suffixes: tuple[str, ...]
     holds: Callable[[bytes], bool]
-    """Whether bytes look like such a file, whatever its name is."""
+    """True if bytes look like such a file, whatever its name is."""
     module: str
     """Dotted name of its module, a ReaderModule, which is loaded when it is used."""
     takes: frozenset[str]
-    """Names of the FloorOptions that mean something to it, d_dis aside."""
+    """Names of the FloorOptions that apply to it, except d_dis."""
 
     def load(self) -> ReaderModule:
         """Its module."""

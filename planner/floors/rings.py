@@ -1,4 +1,4 @@
-"""Makes sound polygons of drawn rings and lines: repairs, joins, tells holes, and writes each in one way.
+"""Valid polygons from drawn rings and lines: repair, joining, holes, and a canonical form.
 
 Everything is in metres. Results do not depend on the order, direction or starting point of what is drawn.
 """
@@ -49,7 +49,7 @@ def without_repeats(points: FloatArray, *, within: float = 1e-6) -> FloatArray:
 
 
 def repaired(ring: FloatArray) -> tuple[list[shapely.Polygon], bool]:
-    """Sound polygons that cover what `ring` encloses, and whether it had to be changed."""
+    """Return valid polygons that cover the area in `ring`, and True if the ring had to be changed."""
     if len(ring) < 3:
         return [], True
     drawn = shapely.Polygon(ring)
@@ -60,13 +60,13 @@ def repaired(ring: FloatArray) -> tuple[list[shapely.Polygon], bool]:
 
 
 def polygons_of(region: Region) -> list[shapely.Polygon]:
-    """The polygons of any geometry, without slivers; what is a line or a point is left out."""
+    """Return the polygons of any geometry, without slivers, lines and points."""
     parts = shapely.get_parts(shapely.get_parts(region))
     return [part for part in parts if isinstance(part, shapely.Polygon) and part.area > SLIVER]
 
 
 def canonical(polygon: shapely.Polygon) -> Polygon:
-    """The one way to write a polygon: rings start at their smallest vertex, holes are sorted."""
+    """Return the canonical form of a polygon: rings start at their smallest vertex, holes are sorted."""
     holes = [canonical_ring(hole, clockwise=True) for hole in polygon.interiors]
     return Polygon(canonical_ring(polygon.exterior), tuple(sorted(holes, key=lambda hole: hole.tolist())))
 
@@ -81,12 +81,12 @@ def canonical_ring(ring: shapely.LinearRing, *, clockwise: bool = False) -> Floa
 
 
 def canonical_region(region: Region) -> tuple[Polygon, ...]:
-    """All polygons of a region, each written in the one way, sorted."""
+    """Return all polygons of a region in canonical form, sorted."""
     return tuple(sorted(map(canonical, polygons_of(region)), key=lambda part: part.exterior.tolist()))
 
 
 def canonical_line(points: FloatArray) -> FloatArray:
-    """The one way to write an open line: from its lexicographically smaller end."""
+    """Return the canonical form of an open line: from its lexicographically smaller end."""
     return frozen(points[::-1] if points[::-1].tolist() < points.tolist() else points)
 
 
@@ -113,7 +113,7 @@ def _same(one: shapely.Polygon, other: shapely.Polygon) -> bool:
 
 
 def parents(polygons: Sequence[shapely.Polygon]) -> list[int | None]:
-    """For each polygon the smallest larger one that holds it (within `SNAP`), or None."""
+    """For each polygon the smallest larger one that contains it (within `SNAP`), or None."""
     tree = shapely.STRtree(polygons)
     found: list[int | None] = []
     for index, polygon in enumerate(polygons):
@@ -140,7 +140,7 @@ def even_odd(polygons: Sequence[shapely.Polygon]) -> Region:
 
 
 def depths(polygons: Sequence[shapely.Polygon]) -> list[int]:
-    """In how many others each polygon lies."""
+    """Number of other polygons that contain each polygon."""
     above = parents(polygons)
     found = [0] * len(polygons)
     for index in range(len(polygons)):
@@ -153,14 +153,14 @@ def depths(polygons: Sequence[shapely.Polygon]) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """What open lines enclose together."""
+    """Areas that open lines enclose together."""
 
     faces: tuple[shapely.Polygon, ...]
     """Enclosed areas, without regard to what lies within them."""
     loose: tuple[int, ...]
     """Indices of the lines that enclose nothing."""
     gaps: tuple[tuple[float, tuple[float, float]], ...]
-    """Width and place of each gap that was closed."""
+    """Width and position of each gap that was closed."""
 
 
 def joined(lines: Sequence[FloatArray], *, merge: bool, gap: float = GAP) -> Joined:
@@ -169,7 +169,7 @@ def joined(lines: Sequence[FloatArray], *, merge: bool, gap: float = GAP) -> Joi
     Parameters
     ----------
     merge
-        Whether areas that share an edge are one (a slab with a joint drawn in it) or several (rooms).
+        True if areas that share an edge are one (a slab with a joint drawn in it), False if several (rooms).
     """
     if not lines:
         return Joined((), (), ())

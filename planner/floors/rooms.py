@@ -1,4 +1,4 @@
-"""Makes the rooms: each ring on ROOMS is a room, or a hole in the room around it."""
+"""Rooms of a floor: each ring on ROOMS is a room, or a hole in the room around it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import shapely
 
 from stopgo.mission.floor import Finding, Room
-from stopgo.planner.floors.drawn import Closed, Drawn, Oddity, hole_indices, outline_faces, place, region_key
+from stopgo.planner.floors.drawn import Anomaly, Closed, Drawn, hole_indices, outline_faces, place, region_key
 from stopgo.planner.floors.rings import Region, canonical_region, parents, polygons_of
 from stopgo.planner.floors.strokes import Word
 
@@ -23,13 +23,13 @@ class _Room:
     region: Region
     name: str
     global_id: str | None
-    odd: tuple[Oddity, ...]
+    anomalies: tuple[Anomaly, ...]
 
 
 def rooms_of(
     drawn: Drawn, words: Sequence[Word], *, outline: Region
 ) -> tuple[tuple[Room, ...], list[Finding]]:
-    """The rooms, apart from one another, named by the texts in them.
+    """Return the rooms, without overlaps, named by the texts in them.
 
     A ring within another is a hole of it if it has the same GlobalId, or is drawn against it without a text
     or GlobalId of its own; else it is a room within a room. Both are cut out of the outer one.
@@ -41,12 +41,12 @@ def rooms_of(
     named = {id(ring) for ring, texts in zip(rings, names, strict=True) if texts}
     holes = hole_indices(rings, above, lambda inner, outer: _is_hole(inner, outer, named=id(inner) in named))
     rooms = [
-        _Room(_hollowed(index, rings, above), _title(names[index]), ring.global_id, ring.odd)
+        _Room(_hollowed(index, rings, above), _title(names[index]), ring.global_id, ring.anomalies)
         for index, ring in enumerate(rings)
         if index not in holes
     ]
-    numbered, odd = _numbered(_apart(_by_global_id(rooms)), outline=outline)
-    return numbered, [*findings, *stray, *odd]
+    numbered, dropped = _numbered(_apart(_by_global_id(rooms)), outline=outline)
+    return numbered, [*findings, *stray, *dropped]
 
 
 def _names(
@@ -108,14 +108,16 @@ def _by_global_id(rooms: Sequence[_Room]) -> list[_Room]:
         if key in merged:
             region = merged[key].region.union(room.region)
             name = merged[key].name or room.name
-            merged[key] = replace(merged[key], region=region, name=name, odd=(*merged[key].odd, *room.odd))
+            merged[key] = replace(
+                merged[key], region=region, name=name, anomalies=(*merged[key].anomalies, *room.anomalies)
+            )
         else:
             merged[key] = room
     return list(merged.values())
 
 
 def _apart(rooms: Sequence[_Room]) -> list[_Room]:
-    """Where two rooms overlap, the smaller one keeps the place."""
+    """Remove overlaps of rooms: the smaller room keeps the area."""
     ordered = sorted(rooms, key=lambda room: (room.region.area, region_key(room.region)))
     tree = shapely.STRtree([room.region for room in ordered])
     return [_without_smaller(index, ordered, tree) for index in range(len(ordered))]
@@ -128,9 +130,9 @@ def _without_smaller(index: int, ordered: Sequence[_Room], tree: shapely.STRtree
         shared = room.region.intersection(ordered[item].region)
         if shared.area > _NOISE:
             text = f"overlaps room '{ordered[item].name}' by {shared.area:.3g} m², which is left to that one"
-            odd = Oddity("rooms_overlap", text, _corner(shared))
+            anomaly = Anomaly("rooms_overlap", text, _corner(shared))
             region = room.region.difference(ordered[item].region)
-            room = replace(room, region=region, odd=(*room.odd, odd))
+            room = replace(room, region=region, anomalies=(*room.anomalies, anomaly))
     return room
 
 
@@ -149,13 +151,13 @@ def _numbered(rooms: Sequence[_Room], *, outline: Region) -> tuple[tuple[Room, .
             continue
         made = Room(f"room-{len(numbered) + 1:03d}", room.name, canonical_region(room.region), room.global_id)
         numbered.append(made)
-        findings += [odd.about(made.id) for odd in (*room.odd, *_outside(room.region, outline))]
+        findings += [anomaly.about(made.id) for anomaly in (*room.anomalies, *_outside(room.region, outline))]
     return tuple(numbered), findings
 
 
-def _outside(region: Region, outline: Region) -> tuple[Oddity, ...]:
+def _outside(region: Region, outline: Region) -> tuple[Anomaly, ...]:
     off = region.area - region.intersection(outline).area
     if off <= region.area / 2:
         return ()
     text = f"{off:.3g} m² of its {region.area:.3g} m² lie outside the outline on FLOOR"
-    return (Oddity("room_off_floor", text, _corner(region)),)
+    return (Anomaly("room_off_floor", text, _corner(region)),)

@@ -1,4 +1,4 @@
-"""Turns placed shapes into strokes, polylines in metres, and texts into words; leaves out what is damaged."""
+"""Strokes and words from placed shapes: polylines in metres and texts; damaged shapes are left out."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Stroke:
 
 @dataclass(frozen=True, eq=False)
 class Word:
-    """A text, and the points that may stand for it: where it is inserted, where it is aligned.
+    """A text, and its possible positions: the insertion point and the alignment point.
 
     A dimension or another note is a word without text.
     """
@@ -55,7 +55,7 @@ class Word:
 
 
 def sketch(shapes: Iterable[Shape]) -> list[FloatArray]:
-    """The points (n, 2) of each shape in drawing units, coarsely: enough to see how large it is."""
+    """Coarse points (n, 2) of each shape in drawing units, enough to measure its size."""
     sketches: list[FloatArray] = []
     for shape in shapes:
         try:
@@ -114,7 +114,7 @@ def _strokes(shape: Shape, *, scale: float, chord: float) -> list[Stroke]:
 
 
 def _filled(boundaries: Sequence[Stroke]) -> list[Stroke]:
-    """The boundaries of a hatch, turned by how deep they are nested: every second one is a hole."""
+    """Boundaries of a hatch, oriented by their nesting depth: every second one is a hole."""
     rings = [item for item in boundaries if len(item.points) >= 3]
     drawn = [shapely.Polygon(item.points) for item in rings]
     nested = depths(shapely.make_valid(drawn, method="structure", keep_collapsed=False).tolist())
@@ -189,7 +189,7 @@ def _damage(shape: Shape, error: Exception, *, scale: float) -> Finding:
 
 
 def _place(shape: Shape, *, scale: float) -> tuple[float, float] | None:
-    """The first sound point of a damaged shape, as it is drawn in its block."""
+    """The first finite point of a damaged shape, in its block's coordinates."""
     values = shape.entity.dxf.all_existing_dxf_attribs()
     named = [values.get(key) for key in ("start", "end", "center", "insert", "vtx0", "vtx1")]
     listed = shape.entity.get_points("xy") if isinstance(shape.entity, LWPolyline) else []
@@ -200,7 +200,7 @@ def _place(shape: Shape, *, scale: float) -> tuple[float, float] | None:
 
 
 def _without_outline(solid: Counter[tuple[str, str]]) -> list[Finding]:
-    """Solids, meshes and proxies: what they draw cannot be seen from the file alone."""
+    """Findings on solids, meshes and proxies, whose outlines the file does not contain."""
     return [
         Finding("no_outline", f"layer {layer}: {count} {kind} have no outline to read; explode them to lines")
         for (layer, kind), count in sorted(solid.items())

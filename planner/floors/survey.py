@@ -1,4 +1,4 @@
-"""What a floor's file holds: its storeys or drawings, what its layers were taken for, and what is odd."""
+"""Survey of a floor's file: its storeys or drawings, the meaning of its layers, and its anomalies."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class FloorChoice:
 
     name: str
     option: str
-    """What chooses it on the command line, such as `--storey EG`; empty where the file holds but one."""
+    """Option that chooses it, such as `--storey EG`; empty if the file has only one."""
     level_m: float | None = None
     area_m2: float | None = None
     bounds: tuple[float, float, float, float] | None = None
@@ -25,31 +25,31 @@ class FloorChoice:
     elements: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     """Elements by kind; `rooms`, `doors` and `passages` are counted with them."""
     notes: tuple[str, ...] = ()
-    """What a person should know, such as `foundation` or `2 duplicates merged`."""
+    """Notes for a person, such as `foundation` or `2 duplicates merged`."""
     aside: bool = False
-    """Whether nobody would plan it: a foundation, a roof, or what has no floor."""
+    """True if it is not for planning: a foundation, a roof, or a level without a floor."""
     chosen: bool = False
-    """Whether this is the floor that is planned with the same options."""
+    """True if a plan with the same options uses this floor."""
 
 
 @dataclass(frozen=True)
 class LayerUse:
-    """What a layer of a drawing, or a class of a model's elements, was taken for."""
+    """Meaning assigned to a layer of a drawing, or to a class of a model's elements."""
 
     name: str
     role: str
     """A role of LAYER_ROLES."""
     why: str
-    """What says so, such as `AIA name A-WALL*` or `as told`."""
+    """Source of the role, such as `AIA name A-WALL*` or `as given`."""
     taken: int = 0
     """Entities that were used."""
     ignored: int = 0
-    """Entities that were not."""
+    """Entities that were not used."""
 
 
 @dataclass(frozen=True, eq=False)
 class SurveyLine:
-    """A line of a drawing, for a picture of what was taken and what was ignored."""
+    """A line of a drawing, for a picture of the lines used and the lines ignored."""
 
     points: FloatArray
     """(n, 2) in metres."""
@@ -59,30 +59,30 @@ class SurveyLine:
 
 @dataclass(frozen=True)
 class Survey:
-    """What is in a floor's file, told before anybody plans."""
+    """Contents of a floor's file, for a report before planning."""
 
     file: str
     kind: str
     """Such as `DXF drawing, AC1032` or `IFC4 model`."""
     digest: str
     units: str | None = None
-    """The unit of length and what says so, such as `millimetre, as the header says`."""
+    """The unit of length and its source, such as `millimetre, as the header says`."""
     floors: tuple[FloorChoice, ...] = ()
     layers: tuple[LayerUse, ...] = ()
     inferred: tuple[str, ...] = ()
-    """What the file does not say and was worked out, one sentence each."""
+    """Elements that the file does not state and the reader inferred, one sentence each."""
     ignored: tuple[str, ...] = ()
-    """What is in the file and was left out, one sentence each."""
+    """Elements of the file that were left out, one sentence each."""
     findings: tuple[Finding, ...] = ()
     lines: tuple[SurveyLine, ...] = ()
-    """What is drawn, where the file is a drawing …"""
+    """Lines of the file, if it is a drawing …"""
     floor: FloorPlan | None = None
-    """… and the floor that was made of it; none where that cannot be done."""
+    """… and the floor made from it; None if that is not possible."""
     refusal: str | None = None
-    """Why no floor can be made of it with these options, and the way out."""
+    """Reason why these options give no floor, and the remedy."""
 
     def as_json(self) -> dict[str, Any]:
-        """The object that `stopgo floors --json` prints."""
+        """Return the object that `stopgo floors --json` prints."""
         return {
             "file": self.file,
             "kind": self.kind,

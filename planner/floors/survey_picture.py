@@ -1,4 +1,4 @@
-"""Draws what was found in a floor's file: what was taken in its kind's colour, what was ignored in grey."""
+"""Picture of a survey: used shapes in their kind's colour, ignored shapes in grey."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _OPENING = {"stroke": "#0b63b0", "stroke_width": 0.6, "fill": "none"}
 
 
 def survey_svg(lines: Sequence[SurveyLine], floor: FloorPlan | None, *, title: str) -> bytes:
-    """The picture as SVG; without a floor only the lines are drawn."""
+    """Return the picture as SVG; without a floor only the lines are drawn."""
     paper = _Paper(_everything(lines, floor))
     body = [
         rect(0.0, 0.0, paper.width, paper.height, fill="#ffffff"),
@@ -39,7 +39,7 @@ def survey_svg(lines: Sequence[SurveyLine], floor: FloorPlan | None, *, title: s
 
 
 def _everything(lines: Sequence[SurveyLine], floor: FloorPlan | None) -> Iterator[FloatArray]:
-    """What the picture must hold: the floor, else all lines."""
+    """Points that the picture must show: the floor, else all lines."""
     if floor is None:
         yield from (line.points for line in lines)
         return
@@ -49,7 +49,7 @@ def _everything(lines: Sequence[SurveyLine], floor: FloorPlan | None) -> Iterato
 
 
 class _Paper:
-    """Where a point of the floor lies on the paper."""
+    """Position on the paper of a point of the floor."""
 
     def __init__(self, parts: Iterable[FloatArray]) -> None:
         x0, y0, x1, y1 = bounds(parts)

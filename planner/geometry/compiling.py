@@ -10,11 +10,11 @@ from typing import Any
 
 @cache
 def compiled(kernel: Callable[..., Any], *helpers: Callable[..., Any]) -> Callable[..., Any]:
-    """The kernel as machine code, kept on disk between runs; the kernel itself where numba does not load.
+    """Return the kernel as machine code, cached on disk; the kernel itself if numba is not available.
 
-    `helpers` are the functions it calls, of the kernel's own file: what is kept on disk is known to be of
-    an older source by that file alone. A kernel's integers must fit 64 bits, where machine code and Python
-    part; each kernel's file says why its own do.
+    `helpers` are the functions it calls. They must be in the kernel's own file: only that file's date shows
+    that the cache is out of date. A kernel's integers must fit 64 bits, beyond which machine code and Python
+    differ; each kernel's file states why they do.
     """
     try:
         from numba import njit
@@ -24,18 +24,18 @@ def compiled(kernel: Callable[..., Any], *helpers: Callable[..., Any]) -> Callab
     for helper in helpers:
         register_jitable(helper)
     try:
-        return anew_if_not_kept(njit(kernel, cache=True), njit(kernel))
-    except RuntimeError:  # a read-only install and a user without a home: there is no place to keep it
+        return recompiled_if_unreadable(njit(kernel, cache=True), njit(kernel))
+    except RuntimeError:  # a read-only install and a user without a home: no folder for the cache
         return njit(kernel)
 
 
-def anew_if_not_kept(kept: Callable[..., Any], anew: Callable[..., Any]) -> Callable[..., Any]:
-    """The kernel that is kept on disk; where that is full, or what is kept is damaged, one compiled anew."""
+def recompiled_if_unreadable(cached: Callable[..., Any], uncached: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the kernel cached on disk; if the disk is full or the cache damaged, compile it again."""
 
     def call(*arguments: Any) -> Any:
         try:
-            return kept(*arguments)
+            return cached(*arguments)
         except (OSError, EOFError, UnpicklingError):  # before the first line ran: kernels open no files
-            return anew(*arguments)
+            return uncached(*arguments)
 
     return call

@@ -1,4 +1,4 @@
-"""Keeps what was worked out of a noun with that noun, for as long as the noun itself is kept."""
+"""Cache of derived values: each lives as long as the instance from which it was computed."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ import functools
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-Noun = TypeVar("Noun")
+Instance = TypeVar("Instance")
 T = TypeVar("T")
 
 
-def kept(work_out: Callable[[Noun], T]) -> Callable[[Noun], T]:
-    """The function, whose result for a noun is worked out once.
+def instance_cached(compute: Callable[[Instance], T]) -> Callable[[Instance], T]:
+    """Decorate a function of one instance, so that it computes its result once per instance.
 
-    As `functools.cached_property` does, for what `mission` may not know of: the result lies beside the
-    noun's own values, so that it goes with the noun, and a noun with other values has another.
+    It works as `functools.cached_property`, for functions outside the class, which `mission` must not import.
+    The result is stored in the instance's `__dict__`; a changed copy of the instance has no result yet.
     """
-    name = f"_kept_{work_out.__module__}.{work_out.__qualname__}"
+    name = f"_cached_{compute.__module__}.{compute.__qualname__}"
 
-    @functools.wraps(work_out)
-    def result(noun: Noun) -> T:
-        values: dict[str, Any] = vars(noun)
+    @functools.wraps(compute)
+    def result(instance: Instance) -> T:
+        values: dict[str, Any] = vars(instance)
         if name not in values:
-            values[name] = work_out(noun)
+            values[name] = compute(instance)
         found: T = values[name]
         return found
 

@@ -1,7 +1,7 @@
-"""Between the nouns' arrays and shapely: polygons in a local frame, snapped to a grid of 10 µm.
+"""Conversion between arrays and shapely: polygons in a local frame, snapped to a grid of 10 µm.
 
-The local frame begins at the lower left corner of the floor, so that coordinates stay small and a
-floor that is moved is planned the same. On the grid, orientation tests are exact integer arithmetic.
+The local frame begins at the lower left corner of the floor. So coordinates stay small, and a floor that is
+moved gets the same plan. On the grid, orientation tests are exact integer arithmetic.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from stopgo.mission.document.problems import FAR
 from stopgo.mission.errors import InputError, StopgoError
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import FloatArray, Polygon, bounds, frozen
-from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.instance_cache import instance_cached
 
 GRID = 1e-5
 """Metres per grid step."""
@@ -27,14 +27,14 @@ SLACK = 1e-6
 HAIRLINE = 4e-7
 """Thickness in metres that an obstacle drawn as a single line gets, so that it has an inside."""
 LARGEST = 5000.0
-"""Greatest extent of a floor in metres: with what is drawn round it, within FARTHEST_STEPS."""
+"""Greatest extent of a floor in metres; with the elements around it, it stays within FARTHEST_STEPS."""
 SETTLING = 20
-"""Times an outline is rounded at most until it stays as it is; two or three are enough."""
+"""Maximum number of rounding passes until an outline no longer changes; two or three are enough."""
 FARTHEST_STEPS = 2**29
 """Grid steps from 0, 0 up to which all integer arithmetic is exact, a little more than 5.3 km."""
 
 
-@kept
+@instance_cached
 def local_origin(floor: FloorPlan) -> FloatArray:
     """The lower left corner of everything on the floor (2,); refuses floors too large or too far."""
     drawn = {"its outline": [ring for polygon in floor.outline for ring in polygon.rings]}
@@ -58,7 +58,7 @@ def local_origin(floor: FloorPlan) -> FloatArray:
 
 
 def _farthest(drawn: Mapping[str, Sequence[FloatArray]]) -> str:
-    """The name of what reaches farthest from the first point of all."""
+    """Name of the element that reaches farthest from the first point of all."""
     first = next(part[0] for parts in drawn.values() for part in parts if len(part))
     away = {
         name: max((float(np.hypot(*(part - first).T).max()) for part in parts if len(part)), default=0.0)
@@ -75,8 +75,8 @@ def to_shape(polygons: Iterable[Polygon], origin: FloatArray) -> BaseGeometry:
 def union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
     """The union of shapes, the same to the last bit in whatever order they come.
 
-    Where edges nearly meet, GEOS now and then loses a piece without a word; a union that some corner is not
-    in is made again on a grid far finer than SLACK, on which it is sound.
+    Where edges nearly meet, GEOS sometimes loses a piece without an error. If a corner is missing from the
+    union, the union is made again on a grid far finer than SLACK, which is reliable.
     """
     found = np.array(list(shapes), dtype=object)
     ordered = found[np.argsort(shapely.to_wkb(found), kind="stable")]
@@ -90,7 +90,7 @@ def union(shapes: Iterable[BaseGeometry]) -> BaseGeometry:
 
 
 def one_shape(polygon: Polygon, origin: FloatArray) -> BaseGeometry:
-    """One polygon in the local frame, mended where it crosses itself; empty where it has no area."""
+    """One polygon in the local frame, repaired where it crosses itself; empty if it has no area."""
     if len(polygon.exterior) < 3:
         return shapely.Polygon()
     holes = [hole - origin for hole in polygon.holes if len(hole) >= 3]
@@ -99,7 +99,7 @@ def one_shape(polygon: Polygon, origin: FloatArray) -> BaseGeometry:
 
 
 def mended(shape: BaseGeometry) -> BaseGeometry:
-    """What is valid of a polygonal geometry; empty where it has no area."""
+    """The valid part of a polygonal geometry; empty if it has no area."""
     return shapely.union_all(polygon_parts(shapely.make_valid(shape)))
 
 
@@ -146,13 +146,13 @@ def _in_metres(steps: BaseGeometry) -> BaseGeometry:
 
 
 def _settled(steps: BaseGeometry) -> BaseGeometry:
-    """The shape rounded to whole steps, until no line that rounding moves meets one more vertex."""
+    """Round the shape to whole steps, until no line moved by rounding meets another vertex."""
     for _ in range(SETTLING):
         before, steps = steps, shapely.normalize(shapely.set_precision(shapely.set_precision(steps, 1.0), 0))
         if shapely.equals_exact(before, steps):
             return steps
     x, y = shapely.get_coordinates(steps).mean(axis=0) * GRID
-    raise StopgoError(f"outlines near ({x:.3f}, {y:.3f}) cannot be rounded to {GRID:g} m; draw them anew")
+    raise StopgoError(f"outlines near ({x:.3f}, {y:.3f}) cannot be rounded to {GRID:g} m; draw them again")
 
 
 def whole_steps(shape: BaseGeometry) -> BaseGeometry:
@@ -187,26 +187,26 @@ def widened(
 ) -> BaseGeometry:
     """All points at most `distance` metres (of each line its own) from straight lines.
 
-    Lines are widened one by one: GEOS simplifies a whole outline before it widens it, and at some angles
-    gives a polygon whose rings cross, which no later operation can be asked about.
+    Lines are widened one by one: GEOS simplifies a whole outline before it widens it. At some angles the
+    result is a polygon whose rings cross, on which later operations fail.
     """
     return shapely.union_all(shapely.buffer(lines, distance, quad_segs=quad_segs), grid_size=grid_size)
 
 
 def roughly_widened(shape: BaseGeometry, distance: float, **style: Any) -> BaseGeometry:
-    """A shape widened as a whole, made sound: quick, and off by up to 1 % of the distance."""
+    """A shape widened as a whole and made valid: fast, with an error of up to 1 % of the distance."""
     wide = shapely.buffer(shape, distance, **style)
     return shapely.make_valid(wide, method="structure", keep_collapsed=False)
 
 
 def holds(region: BaseGeometry, shape: BaseGeometry, *, slack: float) -> bool:
-    """Whether a point or line lies in a region, or at most `slack` metres beside it."""
+    """True if a point or line lies in a region, or at most `slack` metres outside it."""
     if region.covers(shape):
         return True
-    beside = shape.difference(region)
+    outside = shape.difference(region)
     edges = boundary_lines(region)
-    near = edges[shapely.dwithin(edges, beside, slack)]
-    return bool(widened(near, slack, quad_segs=QUARTER).covers(beside))
+    near = edges[shapely.dwithin(edges, outside, slack)]
+    return bool(widened(near, slack, quad_segs=QUARTER).covers(outside))
 
 
 QUARTER = 4

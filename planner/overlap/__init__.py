@@ -7,7 +7,7 @@ from scipy.sparse import csr_array
 
 from stopgo.mission.geometry import IntArray
 from stopgo.mission.stages import Candidates
-from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.overlap.boundary import shown
 from stopgo.planner.overlap.pairs import Overlaps, Pairs
 
@@ -19,7 +19,7 @@ USUAL_SHARE = 0.1
 """Of a scan, that its neighbour must see too where nobody says how much."""
 
 
-@kept
+@instance_cached
 def overlaps_of(candidates: Candidates) -> Overlaps:
     """What the kept candidates see in common."""
     return Overlaps(shown(candidates, np.arange(len(candidates.kept))))

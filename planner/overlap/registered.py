@@ -14,13 +14,13 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState, Route
 from stopgo.mission.stages.network import Network
-from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.overlap import USUAL_SHARE, Overlaps, registers
 from stopgo.planner.overlap.boundary import shown
 
 
-@kept
+@instance_cached
 def registered_pairs(route: Route) -> tuple[Overlap, ...]:
     """Pairs of the route's stops that register with one another, in the order of driving.
 
@@ -38,7 +38,7 @@ def registered_pairs(route: Route) -> tuple[Overlap, ...]:
     return tuple(found)
 
 
-@kept
+@instance_cached
 def _overlaps_of_stops(route: Route) -> Overlaps:
     """What the stops see in common; row k is the k-th that is driven to."""
     selection = route.selection

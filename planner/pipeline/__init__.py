@@ -19,17 +19,17 @@ def plan(
     floor: FloorPlan,
     settings: Settings,
     *,
-    observe: Observe = lambda noun: None,
+    observe: Observe = lambda result: None,
     all_parts: bool = False,
 ) -> Plan:
     """Plan the part of the floor that holds the start, else the largest; with `all_parts` the others too.
 
-    Every noun on the way is handed to `observe` as soon as it is made.
+    Every stage result goes to `observe` as soon as it exists.
 
     Raises
     ------
-    AnswerIsNo
-        No target, no candidate, or nothing in sight.
+    NegativeResult
+        No target, no candidate, or nothing visible.
     InputError
         A start, an end or a variant that does not fit the floor.
     """
@@ -42,7 +42,7 @@ def plan(
     space = navigable(floor, settings)
     observe(space)
     if all_parts and settings.divided:
-        raise InputError("--all-parts is not done with robots or shifts; plan each part by its --start")
+        raise InputError("--all-parts: not possible with robots or shifts; plan each part by its --start")
     found = parts_to_plan(space) if all_parts else [candidates(space)]
     planned = frozenset(part.chosen_part for part in found)
     if settings.divided:
@@ -62,7 +62,7 @@ def _plan_part(found: Candidates, number: int, planned: frozenset[int], observe:
 
 
 def _selected(found: Candidates, observe: Observe) -> Selection:
-    """The fewest stops."""
+    """Select the fewest stops."""
     from stopgo.planner.selection import select
     from stopgo.planner.selection.continuous_selection import SELECTOR, anywhere
     from stopgo.planner.selection.refine import refined
@@ -81,7 +81,7 @@ def _in_least_time(route: Route) -> Route:
 
 
 def _part(driven: Route, number: int, planned: frozenset[int], observe: Observe) -> PartPlan:
-    """The plan that drives a route."""
+    """Return the plan of a route."""
     from stopgo.mission.plan import PartPlan
     from stopgo.planner.appraisal.figures_of_route import figures_of
     from stopgo.planner.routing.assemble import assemble
@@ -95,35 +95,35 @@ def _part(driven: Route, number: int, planned: frozenset[int], observe: Observe)
 
 
 UNDIVIDED = -1
-"""Number of the plan that is shared out: its mission is not driven, and has an id of its own."""
+"""Part number of the plan that is divided: its mission is not driven, and has its own id."""
 
 
 def _plan_divided(found: Candidates, planned: frozenset[int], observe: Observe) -> Plan:
-    """Plan one part, and share its stops out among robots or tours."""
+    """Plan one part, and divide its stops among robots or tours."""
     from stopgo.mission.document import MissionShare
     from stopgo.mission.plan import DividedPlan, PartPlan, Plan
     from stopgo.planner.appraisal.figures_of_route import figures_of_share
     from stopgo.planner.routing.assemble import assemble
 
     selection = _selected(found, observe)
-    driven, out = _shared_out(selection)
+    driven, division = _divided(selection)
     observe(driven.selection)
     whole = _part(driven, UNDIVIDED, planned, observe)
     shares = []
-    for k, route in enumerate(out.routes):
-        share = MissionShare(kind=out.kind, number=k + 1, of=len(out.routes))
+    for k, route in enumerate(division.routes):
+        share = MissionShare(kind=division.kind, number=k + 1, of=len(division.routes))
         mission = assemble(route, part=k, share=share)
         shares.append(PartPlan(route, figures_of_share(route, whole.figures), mission))
-    made = DividedPlan(out.kind, whole, tuple(shares), out.limit_s, out.bound, out.method)
+    made = DividedPlan(division.kind, whole, tuple(shares), division.limit_s, division.bound, division.method)
     observe(made)
     return Plan(made.shares, made)
 
 
-def _shared_out(selection: Selection) -> tuple[Route, DividedRoute]:
-    """The route over all stops, and how they are shared out.
+def _divided(selection: Selection) -> tuple[Route, DividedRoute]:
+    """Return the route over all stops, and their division among robots or tours.
 
-    For the least time it is done both with the route of least time and with that of fewest stops: what is
-    quicker for one robot need not be quicker shared out.
+    For the least time, both the route of least time and the route of fewest stops are divided. The route
+    that is quicker for one robot is not always quicker for several.
     """
     from stopgo.planner.covering_tour import as_before
     from stopgo.planner.routing import route
@@ -138,9 +138,9 @@ def _shared_out(selection: Selection) -> tuple[Route, DividedRoute]:
 
 
 def parts_to_plan(space: NavigableSpace) -> list[Candidates]:
-    """Candidates of every part that has any: the part of `plan` first, then the others by area.
+    """Return candidates of every part that has any: the part of `plan` first, then the others by area.
 
-    Parts that hold no room are left out where nothing is to be seen from them, as from a landing.
+    A part without a room is left out if no target is visible from it, such as a landing.
     """
     from stopgo.planner.candidates import candidates
 
@@ -150,10 +150,11 @@ def parts_to_plan(space: NavigableSpace) -> list[Candidates]:
     }
     others = sorted(set(first.part.tolist()) - {-1, first.chosen_part})
     found = [candidates(space, part=part) for part in others]
-    return [first, *(item for item in found if item.chosen_part in rooms or _see_anything(item))]
+    return [first, *(item for item in found if item.chosen_part in rooms or _any_visible(item))]
 
 
-def _see_anything(found: Candidates) -> bool:
+def _any_visible(found: Candidates) -> bool:
+    """True if any target is visible from the candidates."""
     from stopgo.mission.errors import NegativeResult
     from stopgo.planner.visibility import visibility
 

@@ -1,4 +1,4 @@
-"""Where a robot stood -> what it saw of the floor, and the smallest further mission that sees the rest."""
+"""Scanner poses of a run -> the coverage they reached, and the smallest follow-up mission for the rest."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ from stopgo.planner.visibility.headings import in_view
 from stopgo.planner.visibility.sight.sightlines import SightLines
 from stopgo.planner.visibility.unit_ranges import visibility_of
 
-Places = FloatArray
-"""x, y and heading of each place where a scanner stood (n, 3)."""
+ScanPoses = FloatArray
+"""x, y and heading of each scan (n, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,26 +58,28 @@ class PlannedFloor:
 
     @cached_property
     def seen(self) -> Visibility:
-        """What every place sees where a stop might be, in the mission's part of the floor."""
+        """Visibility from every candidate in the mission's part of the floor."""
         return visibility(candidates(self.space, part=self._part))
 
     @property
     def _part(self) -> int:
-        places = np.array([(stop.x, stop.y) for stop in self.mission.stops]).reshape(-1, 2)
-        parts = reach_of(self.space).part_at(places - local_origin(self.floor))
+        positions = np.array([(stop.x, stop.y) for stop in self.mission.stops]).reshape(-1, 2)
+        parts = reach_of(self.space).part_at(positions - local_origin(self.floor))
         counts = Counter(parts[parts >= 0].tolist())
         if not counts:
-            raise NegativeResult(f"{self.floor.name}: no stop of the mission is where the robot gets to")
+            raise NegativeResult(
+                f"{self.floor.name}: the robot can reach no stop of the mission; check its radius"
+            )
         return int(counts.most_common(1)[0][0])
 
 
 def planned_floor(path: Path, mission: Mission) -> PlannedFloor:
-    """The floor in a file, if the mission was planned on it.
+    """Read the floor from a file, and check that the mission was planned on it.
 
     Raises
     ------
     InputError
-        When it cannot be read, or is another floor than the mission's.
+        When the file cannot be read, or is not the mission's floor.
     """
     settings = read_settings(None, mission.origin.parameters)
     floor = read_floor(path, options_of(settings))
@@ -89,13 +91,13 @@ def planned_floor(path: Path, mission: Mission) -> PlannedFloor:
     return PlannedFloor(floor, settings, mission)
 
 
-def as_driven(planned: PlannedFloor, places: Places) -> AsDriven:
-    """What is seen from where the robot stood, counted line by line, beside what the mission's stops see.
+def as_driven(planned: PlannedFloor, poses: ScanPoses) -> AsDriven:
+    """Compare the coverage from the robot's actual scan poses with the coverage from the mission's stops.
 
     Raises
     ------
-    AnswerIsNo
-        When nothing on the floor can be seen.
+    NegativeResult
+        When no target on the floor is visible.
     """
     lines = SightLines(planned.space)
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in planned.mission.stops]).reshape(-1, 3)
@@ -103,59 +105,59 @@ def as_driven(planned: PlannedFloor, places: Places) -> AsDriven:
     return AsDriven(
         ledger=ledger,
         planned=_seen_by(_views(planned.space, lines, stops), ledger),
-        driven=_seen_by(_views(planned.space, lines, places), ledger),
+        driven=_seen_by(_views(planned.space, lines, poses), ledger),
     )
 
 
 def _seen_by(views: Iterable[IntArray], ledger: CoverageTotals) -> BoolArray:
-    """Whether enough of the places that see these units see each unit."""
+    """True for each unit that enough of the poses see; `views` has the units of each pose."""
     counted = np.zeros(len(ledger.weight), dtype=np.int64)
     for units in views:
         counted[units] += 1
     return ledger.enough(counted)
 
 
-def _views(space: NavigableSpace, lines: SightLines, places: Places) -> list[IntArray]:
-    """Units that each place sees, along its heading where the scanner does not look all round."""
+def _views(space: NavigableSpace, lines: SightLines, poses: ScanPoses) -> list[IntArray]:
+    """Units that each pose sees; within the field of view if it is less than 360 degrees."""
     fov = math.radians(space.settings.fov)
     views = []
-    for x, y, heading in places.tolist():
+    for x, y, heading in poses.tolist():
         units = np.unique(lines.seen_from(np.array([x, y])))
         if space.settings.fov < 360:
-            way = space.targets.unit_xy[units] - (x, y)
-            units = units[in_view(way, heading, fov=fov)]
+            direction = space.targets.unit_xy[units] - (x, y)
+            units = units[in_view(direction, heading, fov=fov)]
         views.append(units)
     return views
 
 
 def top_up(
-    planned: PlannedFloor, places: Places, *, obstacles: Sequence[Polygon] = (), evidence: str = ""
+    planned: PlannedFloor, poses: ScanPoses, *, obstacles: Sequence[Polygon] = (), evidence: str = ""
 ) -> Mission | None:
-    """The smallest further mission by which all is seen that was asked for; None where nothing is missing.
+    """Return the smallest follow-up mission that reaches the required coverage; None if nothing is missing.
 
-    It begins where the mission began, and keeps clear of obstacles that the plan did not know of, which
-    also hide what is behind them.
+    It begins where the mission began. It keeps clear of obstacles that the plan did not contain; they also
+    hide the targets behind them.
 
     Parameters
     ----------
     evidence
-        What the mission's id is made from besides the mission's own id: a log's digest.
+        Added to the text that the follow-up mission's id is hashed from, such as a log's digest.
 
     Raises
     ------
-    AnswerIsNo
-        When what is asked for cannot be reached any more.
+    NegativeResult
+        When the required coverage cannot be reached any more.
     InputError
-        When the mission is one of several that share a floor: what it leaves is for the others to see.
+        When the mission is one of several that divide a floor: the others cover the rest.
     """
     share = planned.mission.share
     if share is not UNSET:
         raise InputError(
-            f"{planned.mission.name}: shares its floor with {share.of - 1} more; a further mission is "
-            "planned for a floor that one mission sees alone"
+            f"{planned.mission.name}: divides its floor with {share.of - 1} more; a follow-up mission needs "
+            "a floor that one mission covers alone"
         )
     known = replace(planned, floor=_with(planned.floor, obstacles)) if obstacles else planned
-    seen, done = _with_places(known, places)
+    seen, done = _with_poses(known, poses)
     selection = select_further(seen, done)
     if not len(selection.chosen):
         return None
@@ -166,11 +168,11 @@ def top_up(
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
     once = replace(ledger_of(known.seen), asked=frozen([1], np.int64))
     alone = once.shares(_seen_by(_views(known.space, SightLines(known.space), stops), once))
-    return _further(mission, planned.mission, evidence, alone.whole.coverage or 0.0)
+    return _follow_up(mission, planned.mission, evidence, alone.whole.coverage or 0.0)
 
 
 def _with(floor: FloorPlan, obstacles: Sequence[Polygon]) -> FloorPlan:
-    """The floor with what stands on it besides."""
+    """Return the floor with the unplanned obstacles added."""
     found = tuple(
         Element(f"unplanned-{number}", "unplanned", solids=(shape,), occludes=True, obstacle=True)
         for number, shape in enumerate(obstacles, 1)
@@ -178,26 +180,26 @@ def _with(floor: FloorPlan, obstacles: Sequence[Polygon]) -> FloorPlan:
     return replace(floor, elements=(*floor.elements, *found))
 
 
-def _with_places(planned: PlannedFloor, places: Places) -> tuple[Visibility, IntArray]:
-    """The visibility with a row for each place where the robot stood, and these rows."""
+def _with_poses(planned: PlannedFloor, poses: ScanPoses) -> tuple[Visibility, IntArray]:
+    """Return the visibility with a row added for each scan pose, and the numbers of these rows."""
     seen, space = planned.seen, planned.space
-    views = _views(space, SightLines(space), places)
-    joined = _joined(seen.candidates, places)
+    views = _views(space, SightLines(space), poses)
+    joined = _joined(seen.candidates, poses)
     units = [*(seen.seen_by(row) for row in range(seen.rows)), *views]
     whole = visibility_of(joined, units, method=seen.method)
-    return whole, np.arange(seen.rows, seen.rows + len(places))
+    return whole, np.arange(seen.rows, seen.rows + len(poses))
 
 
-def _joined(found: Candidates, places: Places) -> Candidates:
-    """Candidates with places that are no candidates of the plan, and count nothing for what is visible."""
-    count = len(places)
+def _joined(found: Candidates, poses: ScanPoses) -> Candidates:
+    """Return the candidates with scan poses added; these do not count for the visible share."""
+    count = len(poses)
     more: dict[str, Any] = {
-        "xy": places[:, :2], "room": np.full(count, -1), "reason": np.full(count, KEPT),
+        "xy": poses[:, :2], "room": np.full(count, -1), "reason": np.full(count, KEPT),
         "part": np.full(count, found.chosen_part),
         "doorway": np.zeros(count, bool), "must": np.zeros(count, bool),
     }  # fmt: skip
     if len(found.heading):
-        more["heading"] = places[:, 2]
+        more["heading"] = poses[:, 2]
     both = {name: _frozen(getattr(found, name), values) for name, values in more.items()}
     extra = found.extra if len(found.extra) else np.zeros(len(found.xy), bool)
     return replace(found, **both, extra=_frozen(extra, np.ones(count, bool)))
@@ -207,10 +209,10 @@ def _frozen(one: Any, other: Any) -> Any:
     return frozen(np.concatenate([one, other]), one.dtype)
 
 
-def _further(mission: Mission, before: Mission, evidence: str, coverage: float) -> Mission:
-    """With an id of its own, what the mission before was told besides its plan, and what it sees.
+def _follow_up(mission: Mission, before: Mission, evidence: str, coverage: float) -> Mission:
+    """Return the mission with its own id, and with the frame and georeference of the mission before.
 
-    What it adds to what was seen before is for one view of each target; it claims no more of its own.
+    Its required coverage is what its own stops reach, for one view of each target.
     """
     asked = {"coverage": math.floor(coverage * 1e6) / 1e6, "room_coverage": 0.0, "kind_coverage": 0.0}
     parameters = {**mission.origin.parameters, **asked}
@@ -231,6 +233,6 @@ def _further(mission: Mission, before: Mission, evidence: str, coverage: float) 
 
 
 def hull_of(points: FloatArray, *, margin: float) -> Polygon:
-    """The convex outline of points (n, 2), widened by a margin in metres."""
+    """Return the convex outline of points (n, 2), widened by a margin in metres."""
     shape = shapely.MultiPoint(points).convex_hull.buffer(margin, quad_segs=4)
     return Polygon.of(shapely.get_coordinates(shape.exterior))

@@ -1,4 +1,4 @@
-"""Points of a scanner -> what they show of a floor's targets, and of what stands there unplanned."""
+"""Scanner points -> measured coverage of a floor's targets, and unplanned obstacles."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, hull_of
 
 TOLERANCE_M = 0.05
-"""A unit is measured if a point lies as near to its face."""
+"""A unit is measured if a point lies at most this far from its face."""
 WIDEST_M = 0.3
-"""Points farther from a face than this are not of it."""
+"""Points farther from a face than this do not belong to it."""
 BINS = 60
 CELL_M = 0.1
 LEAST_SWEEPS = 3
-"""What is hit in fewer sweeps at one place may have walked by."""
+"""An object hit in fewer sweeps at one position may be a person who walks by."""
 LEAST_CELLS = 2
 MARGIN_M = 0.05
 
@@ -35,27 +35,27 @@ def measured(
     tolerance: float = TOLERANCE_M,
     least_sweeps: int = LEAST_SWEEPS,
 ) -> Measured:
-    """Lay sweeps of points (n, 2) in the mission's frame on the floor, one after another.
+    """Compare sweeps of points (n, 2) in the mission's frame with the floor, one after another.
 
-    A point belongs to the nearest unit; how far off it is, is its distance from the face. Where points lie
-    far from everything that is drawn, in `least_sweeps` of them or more, there is something unplanned.
+    A point belongs to the nearest unit; its error is its distance from the face. Points far from every
+    drawn element, in `least_sweeps` sweeps or more, are an unplanned obstacle.
     """
-    tally = _SeenTally(planned.space, tolerance)
+    counts = _SweepCounts(planned.space, tolerance)
     for points in sweeps:
-        tally.take(points)
+        counts.add(points)
     return Measured(
         ledger=ledger_of(planned.seen),
-        hit=frozen(tally.hit, np.bool_),
+        hit=frozen(counts.hit, np.bool_),
         tolerance_m=tolerance,
-        points=tally.points,
-        edges_m=frozen(tally.edges),
-        histogram=frozen(tally.histogram, np.int64),
-        unplanned=tuple(_unplanned(tally, planned.space, least_sweeps)),
+        points=counts.points,
+        edges_m=frozen(counts.edges),
+        histogram=frozen(counts.histogram, np.int64),
+        unplanned=tuple(_unplanned(counts, planned.space, least_sweeps)),
     )
 
 
-class _SeenTally:
-    """Counts, as sweeps come; all that is kept is as large as the floor."""
+class _SweepCounts:
+    """Counts that grow with the sweeps; their memory depends only on the size of the floor."""
 
     def __init__(self, space: NavigableSpace, tolerance: float) -> None:
         targets = space.targets
@@ -72,47 +72,49 @@ class _SeenTally:
         self.corner = np.array([low_x, low_y])
         shape = np.ceil((np.array([high_x, high_y]) - self.corner) / CELL_M).astype(int) + 1
         self.cells: IntArray = np.zeros(shape, np.int64)
-        """In how many sweeps each cell of the floor held points far from every target."""
+        """Number of sweeps in which each cell of the floor held points far from every target."""
 
-    def take(self, points: FloatArray) -> None:
+    def add(self, points: FloatArray) -> None:
         points = points[np.isfinite(points).all(axis=1)]
         self.points += len(points)
         if not len(points):
             return
-        away, unit = self._tree.query(points, distance_upper_bound=WIDEST_M + self._targets.unit_length.max())
-        near = np.isfinite(away)
-        self._near(points[near], unit[near])
-        self._far(points[~near])
+        distance, unit = self._tree.query(
+            points, distance_upper_bound=WIDEST_M + self._targets.unit_length.max()
+        )
+        near = np.isfinite(distance)
+        self._count_near(points[near], unit[near])
+        self._count_far(points[~near])
 
-    def _near(self, points: FloatArray, unit: IntArray) -> None:
+    def _count_near(self, points: FloatArray, unit: IntArray) -> None:
         segment = self._targets.unit_segment[unit]
         along, to = self._along[segment], points - self._targets.unit_xy[unit]
         off = along[:, 1] * to[:, 0] - along[:, 0] * to[:, 1]  # to the right of a -> b: outside
-        beside = np.abs((along * to).sum(axis=1)) - self._targets.unit_length[unit] / 2
-        own = beside <= self._tolerance
+        past_end = np.abs((along * to).sum(axis=1)) - self._targets.unit_length[unit] / 2
+        own = past_end <= self._tolerance
         self.hit[unit[own & (np.abs(off) <= self._tolerance)]] = True
-        kept = own & (np.abs(off) < WIDEST_M)
-        bins = np.searchsorted(self.edges, off[kept], side="right") - 1
-        np.add.at(self.histogram, (self._targets.element[segment[kept]], np.clip(bins, 0, BINS - 1)), 1)
+        close = own & (np.abs(off) < WIDEST_M)
+        bins = np.searchsorted(self.edges, off[close], side="right") - 1
+        np.add.at(self.histogram, (self._targets.element[segment[close]], np.clip(bins, 0, BINS - 1)), 1)
 
-    def _far(self, points: FloatArray) -> None:
+    def _count_far(self, points: FloatArray) -> None:
         index = np.floor((points - self.corner) / CELL_M).astype(np.int64)
         inside = ((index >= 0) & (index < self.cells.shape)).all(axis=1)
         cells = np.unique(index[inside], axis=0)
         self.cells[cells[:, 0], cells[:, 1]] += 1
 
 
-def _unplanned(tally: _SeenTally, space: NavigableSpace, least: int) -> list[Unplanned]:
-    """Groups of cells that hang together, on floor where nothing is drawn near."""
-    cells = np.argwhere(tally.cells >= least)
+def _unplanned(counts: _SweepCounts, space: NavigableSpace, least: int) -> list[Unplanned]:
+    """Connected groups of cells, on floor without a drawn element nearby."""
+    cells = np.argwhere(counts.cells >= least)
     if not len(cells):
         return []
     origin = local_origin(space.floor)
-    middles = shapely.points(tally.corner + (cells + 0.5) * CELL_M - origin)
+    middles = shapely.points(counts.corner + (cells + 0.5) * CELL_M - origin)
     drawn = to_shape((*space.obstacles, *space.occluders), origin)
     free = shapely.distance(middles, drawn) > WIDEST_M
     free &= shapely.contains(to_shape(space.ground or space.floor.outline, origin), middles)
-    mask = np.zeros(tally.cells.shape, bool)
+    mask = np.zeros(counts.cells.shape, bool)
     mask[tuple(cells[free].T)] = True
     groups, count = label(mask, structure=np.ones((3, 3)))
     found = []
@@ -120,9 +122,9 @@ def _unplanned(tally: _SeenTally, space: NavigableSpace, least: int) -> list[Unp
         own = np.argwhere(groups == number)
         if len(own) >= LEAST_CELLS:
             corners = (
-                tally.corner
+                counts.corner
                 + np.concatenate([own, own + 1, own + np.array([0, 1]), own + np.array([1, 0])]) * CELL_M
             )
-            hits = int(tally.cells[tuple(own.T)].max())
+            hits = int(counts.cells[tuple(own.T)].max())
             found.append(Unplanned(hull_of(corners, margin=MARGIN_M), hits))
     return sorted(found, key=lambda item: -item.hits)

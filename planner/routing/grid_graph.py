@@ -50,7 +50,7 @@ def grid_ways(space: NavigableSpace, points: FloatArray) -> Ways:
 
     Raises
     ------
-    AnswerIsNo
+    NegativeResult
         Where the finest grids do not connect the points.
     """
     for k in range(len(RESOLUTIONS)):

@@ -49,7 +49,7 @@ def prove_file(
 
     Raises
     ------
-    AnswerIsNo
+    NegativeResult
         When the mission makes no sense, or has no stops.
     InputError
         When a file cannot be read, or the floor or coverage.json is another mission's.

@@ -68,7 +68,7 @@ def prove(
 
     Raises
     ------
-    AnswerIsNo
+    NegativeResult
         When the mission has no stops.
     InputError
         When coverage.json is of another reading of the floor.

@@ -154,7 +154,7 @@ def select_further(visibility: Visibility, done: IntArray) -> Selection:
 
     Raises
     ------
-    AnswerIsNo
+    NegativeResult
         When it cannot be reached.
     """
     settings = visibility.candidates.space.settings

@@ -1,1 +1,1 @@
-"""The space of a floor: what carries the robot, what stands in its way, and what is to be seen."""
+"""The space of a floor: the ground, the obstacles, the drive area and the targets."""

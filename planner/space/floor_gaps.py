@@ -1,4 +1,4 @@
-"""Gaps in the floor that keep the robot from places where it could drive: how wide, and where."""
+"""Gaps in the floor that separate the robot from drivable floor: their width and position."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from shapely.geometry.base import BaseGeometry
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
-from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import SLACK, local_origin, polygon_parts, segments_of, to_shape
 from stopgo.planner.space.reach import INSIDE, reach_of
 
 APART = 0.1
-"""Floor edges are asked every so many metres what lies across."""
+"""Spacing in metres of the points on floor edges from which a gap is measured."""
 WIDEST = 10.0
 """Floor farther apart than this (m) is not called a gap."""
 
 
 @dataclass(frozen=True, eq=False)
 class FloorGaps:
-    """Straight ways from floor edges over a gap to other floor, clear of everything but the edges."""
+    """Straight lines from floor edges over a gap to other floor, clear of everything except the edges."""
 
     begin: FloatArray
-    """Where the floor ends (n, 2), local."""
+    """Points where the floor ends (n, 2), local."""
     end: FloatArray
-    """Where other floor begins (n, 2)."""
+    """Points where other floor begins (n, 2)."""
     here: IntArray
     """Part of the floor before the gap (n,), -1 where the robot may not be."""
     there: IntArray
-    """Part of the floor behind it (n,)."""
+    """Part of the floor behind the gap (n,)."""
 
 
 def gap_before(space: NavigableSpace, shape: BaseGeometry, parts: Set[int]) -> str:
-    """The narrowest gap before floor in a shape that is not of the parts, in words; "" if there is none.
+    """Describe the narrowest gap at the edge of a shape's floor outside the parts; "" if there is none.
 
-    A gap that leads to the parts comes before one that leads to other floor.
+    A gap that leads to the parts comes before a gap that leads to other floor.
     """
     gaps = _gaps_of(space)
     apart = (gaps.here != gaps.there) & (gaps.there >= 0) & ~np.isin(gaps.here, sorted(parts))
@@ -55,14 +55,14 @@ def gap_before(space: NavigableSpace, shape: BaseGeometry, parts: Set[int]) -> s
     return f"a gap of {width.min():.3f} m in the floor at ({x:.2f}, {y:.2f})"
 
 
-@kept
+@instance_cached
 def _gaps_of(space: NavigableSpace) -> FloorGaps:
-    """Every gap of a space, each as often as it is long."""
+    """Every gap of a space, measured at each point of its edges."""
     ground = to_shape(space.ground, local_origin(space.floor))
     shapely.prepare(ground)
     begin, out = _edge_points(ground)
-    open_to = ~_blocked(space, shapely.points(begin))
-    begin, out = begin[open_to], out[open_to]
+    unblocked = ~_blocked(space, shapely.points(begin))
+    begin, out = begin[unblocked], out[unblocked]
     rays = shapely.linestrings(np.stack([begin + INSIDE * out, begin + WIDEST * out], axis=1))
     across = shapely.distance(shapely.points(begin), shapely.intersection(rays, ground))
     begin, out, across = (values[np.isfinite(across)] for values in (begin, out, across))
@@ -74,7 +74,7 @@ def _gaps_of(space: NavigableSpace) -> FloorGaps:
 
 
 def _edge_points(ground: BaseGeometry) -> tuple[FloatArray, FloatArray]:
-    """Points on the edges of the floor (n, 2), and the ways off it, unit vectors (n, 2)."""
+    """Points on the edges of the floor (n, 2), and unit vectors that point off the floor (n, 2)."""
     edges = segments_of(shapely.orient_polygons(shapely.MultiPolygon(polygon_parts(ground))))
     along = edges[:, 1] - edges[:, 0]
     length = np.hypot(*along.T)
@@ -86,7 +86,7 @@ def _edge_points(ground: BaseGeometry) -> tuple[FloatArray, FloatArray]:
 
 
 def _blocked(space: NavigableSpace, shapes: NDArray[np.object_]) -> BoolArray:
-    """Whether something other than a floor edge is nearer to each shape than the robot's radius."""
+    """True for each shape that an obstacle or a closed opening is nearer to than the robot's radius."""
     origin = local_origin(space.floor)
     solid = np.concatenate([segments_of(to_shape(space.obstacles, origin)), space.barriers - origin])
     radius = space.settings.radius - SLACK

@@ -1,8 +1,8 @@
-"""Gaps that the robot just fits through: found between corners and walls, decided by distance.
+"""Tight gaps that the robot just fits through: found between corners and walls, checked by exact distances.
 
-The drive area is drawn with a little more clearance than the robot needs, so it closes such gaps. Each
-gets a crossing here, a chain of straight ways checked by exact distances, and so no drawn polygon
-decides what is connected.
+The drive area is drawn with a little more clearance than the robot needs, so it closes such gaps. Each gap
+gets a crossing here: a chain of straight lines, checked by exact distances. So no drawn polygon decides
+which parts are connected.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.planner.geometry.shapes import GRID, GROWTH, SLACK, holds
 
 STEPS = 0.02 * 1.4 ** np.arange(15)
-"""Distances from a gap's middle, up to about 2 m, at which the drive area is looked for."""
+"""Distances from a gap's middle, up to about 2 m, at which the drive area is searched."""
 LONGEST = 10.0
 """Gaps at most this far apart (m) are tried as the two ends of one narrow corridor."""
 CLEAR_SLACK = 2e-6
-"""What rounding a mission to micrometres may cost in clearance."""
+"""Clearance in metres that is lost when a mission is rounded to micrometres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class Walls:
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """The narrowest place between a corner and a wall."""
+    """The narrowest passage between a corner and a wall."""
 
     middle: FloatArray
     across: FloatArray
@@ -56,7 +56,7 @@ class Gap:
 
 
 def keeps_clear(shape: BaseGeometry, walls: Walls, tree: shapely.STRtree) -> bool:
-    """Whether a point or line keeps every wall's clearance, to within SLACK."""
+    """True if a point or line keeps every wall's clearance, to within SLACK."""
     if not len(walls.segments):
         return True
     near = tree.query(shape, predicate="dwithin", distance=float(walls.clearance.max()))
@@ -97,7 +97,7 @@ def _feet(points: FloatArray, segments: FloatArray) -> FloatArray:
 
 
 def _distinct(gaps: list[Gap]) -> list[Gap]:
-    """One gap per place and direction, in a canonical order."""
+    """One gap per position and direction, in a canonical order."""
     found: dict[tuple[float, ...], Gap] = {}
     for gap in gaps:
         sign = 1.0 if tuple(gap.across) > (0.0, 0.0) else -1.0
@@ -109,85 +109,85 @@ def _distinct(gaps: list[Gap]) -> list[Gap]:
 def crossings_through(
     gaps: list[Gap], walls: Walls, drive_area: BaseGeometry, ground: BaseGeometry
 ) -> FloatArray:
-    """Straight ways (k, 2, 2) through gaps that chain up from drive area to drive area.
+    """Straight lines (k, 2, 2) through gaps, chained from drive area to drive area.
 
-    Every way keeps every clearance and stays on the ground. A gap that is left on one side only is
-    one end of a narrow corridor and is joined with other such ends that can be seen from it.
+    Every line keeps every clearance and stays on the ground. A gap with an exit on one side only is one
+    end of a narrow corridor. It is joined with every other such end that a straight drive reaches.
     """
-    gaps = _still_open(gaps, walls)
+    gaps = _unblocked(gaps, walls)
     if not gaps:
         return np.empty((0, 2, 2))
     site = Site(walls, drive_area, ground)
-    ways: list[tuple[FloatArray, FloatArray]] = []
+    lines: list[tuple[FloatArray, FloatArray]] = []
     ends: list[FloatArray] = []
     for gap in gaps:
         along = np.array([-gap.across[1], gap.across[0]])
-        here, there = (site.way_out(gap, sign * along) for sign in (1.0, -1.0))
+        here, there = (site.exit_from(gap, sign * along) for sign in (1.0, -1.0))
         if (len(here) > 1) != (len(there) > 1):
             ends.append(gap.middle)
         if len(here) > 1 or len(there) > 1:
-            ways += pairwise([*here[:0:-1], gap.middle, *there[1:]])
-    ways += site.corridors(ends)
-    return np.array(ways).reshape(-1, 2, 2)
+            lines += pairwise([*here[:0:-1], gap.middle, *there[1:]])
+    lines += site.corridors(ends)
+    return np.array(lines).reshape(-1, 2, 2)
 
 
-def _still_open(gaps: list[Gap], walls: Walls) -> list[Gap]:
-    """Gaps whose middle no third wall comes too near: no way leads through the others.
+def _unblocked(gaps: list[Gap], walls: Walls) -> list[Gap]:
+    """Gaps whose middle keeps the clearance of every wall; no line leads through the others.
 
-    Asked of the nearest wall of each clearance, for all at once: with a clearance of many metres
-    hundreds of walls are near every gap, and trying its ways would measure them all.
+    Only the nearest wall of each clearance is measured, for all gaps at once. With a clearance of many
+    metres, hundreds of walls are near every gap, and each trial line would measure them all.
     """
     middles = shapely.points(np.array([gap.middle for gap in gaps]).reshape(-1, 2))
     lines = walls.shapes()
-    kept = np.ones(len(gaps), dtype=bool)
+    clear = np.ones(len(gaps), dtype=bool)
     for clearance in np.unique(walls.clearance):
         alike = lines[walls.clearance == clearance]
         nearest = alike[shapely.STRtree(alike).nearest(middles)]
-        kept &= shapely.distance(middles, nearest) >= clearance - 2 * SLACK
-    return [gap for gap, keep in zip(gaps, kept, strict=True) if keep]
+        clear &= shapely.distance(middles, nearest) >= clearance - 2 * SLACK
+    return [gap for gap, is_clear in zip(gaps, clear, strict=True) if is_clear]
 
 
 class Site:
-    """Walls, ground and drive area, prepared for trying many ways."""
+    """Walls, ground and drive area, prepared for collision checks of many straight drives."""
 
     def __init__(self, walls: Walls, drive_area: BaseGeometry, ground: BaseGeometry) -> None:
         self.walls, self.drive_area = walls, drive_area
         self.ground = ground
         self.slop = 2 * (GROWTH - 1) * float(walls.clearance.max(initial=0.0)) + 8 * GRID
-        """The drive area may begin this far (m) beside a place that keeps every clearance."""
+        """The drive area may begin this far (m) from a point that keeps every clearance."""
         self.tree = shapely.STRtree(walls.shapes())
         shapely.prepare(drive_area)
         shapely.prepare(self.ground)
 
     def allows(self, a: FloatArray, b: FloatArray) -> bool:
-        """Whether the robot may drive straight from a to b."""
-        way = shapely.LineString([a, b])
-        return keeps_clear(way, self.walls, self.tree) and holds(self.ground, way, slack=SLACK)
+        """True if the robot may drive straight from a to b."""
+        line = shapely.LineString([a, b])
+        return keeps_clear(line, self.walls, self.tree) and holds(self.ground, line, slack=SLACK)
 
-    def way_out(self, gap: Gap, along: FloatArray) -> list[FloatArray]:
-        """Points from the gap's middle to the drive area; only the middle where there is no way.
+    def exit_from(self, gap: Gap, along: FloatArray) -> list[FloatArray]:
+        """Points from the gap's middle to the drive area; only the middle if there is no exit.
 
-        Past the gap the robot may still be as near to a wall as it may be at all; the last point then
-        lies beside the way, where the drive area begins.
+        Past the gap the robot may still be at the minimum distance from a wall. The last point then lies
+        aside of the straight line, where the drive area begins.
         """
         for step in STEPS:
             end = gap.middle + step * along
             if not self.allows(gap.middle, end):
                 break
-            for aside in self._asides(gap):
-                if self.drive_area.contains_properly(shapely.Point(end + aside)):
-                    if not aside.any():
+            for offset in self._offsets(gap):
+                if self.drive_area.contains_properly(shapely.Point(end + offset)):
+                    if not offset.any():
                         return [gap.middle, end]
-                    if self.allows(end, end + aside):
-                        return [gap.middle, end, end + aside]
+                    if self.allows(end, end + offset):
+                        return [gap.middle, end, end + offset]
         return [gap.middle]
 
-    def _asides(self, gap: Gap) -> Iterator[FloatArray]:
+    def _offsets(self, gap: Gap) -> Iterator[FloatArray]:
         yield np.zeros(2)
         yield -self.slop * gap.across
         yield self.slop * gap.across
 
     def corridors(self, ends: list[FloatArray]) -> list[tuple[FloatArray, FloatArray]]:
-        """Ways between the two ends of corridors exactly as wide as the robot."""
+        """Straight lines between the two ends of corridors exactly as wide as the robot."""
         near = [(a, b) for a, b in combinations(ends, 2) if 0 < np.hypot(*(a - b)) <= LONGEST]
         return [(a, b) for a, b in near if self.allows(a, b)]

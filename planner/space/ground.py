@@ -1,4 +1,4 @@
-"""Floor -> ground: what carries the robot, what stands in its way, and where its centre may drive."""
+"""Floor -> ground: the drivable surface, the obstacles, and the area where the robot's centre may drive."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from stopgo.planner.space.targets import solid_of
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """The floor in the local frame: what carries the robot and what stands in its way."""
+    """The floor in the local frame: the drivable surface and the obstacles."""
 
     floor: FloorPlan
     origin: FloatArray
@@ -60,14 +60,14 @@ class Ground:
         return cls(floor, origin, outline, obstacles, crossings, np.array(lines).reshape(-1, 2, 2))
 
     def walls(self, settings: Settings) -> Walls:
-        """Everything a robot's centre keeps a distance from: obstacles, barriers, and floor edges."""
+        """Everything that a robot's centre keeps clear of: obstacles, barriers, and floor edges."""
         solid = np.concatenate([segments_of(self.obstacles), self.barriers])
         edges = segments_of(self.outline)
         clearance = np.repeat([settings.radius, settings.edge], [len(solid), len(edges)])
         return Walls(np.concatenate([solid, edges]), clearance)
 
     def stop_walls(self, settings: Settings) -> Walls:
-        """Everything a stop keeps a distance from: elements, and the edges of the floor layer."""
+        """Everything that a stop keeps clear of: elements, and the edges of the floor layer."""
         solid = segments_of(self.obstacles)
         edges = segments_of(to_shape(self.floor.outline, self.origin))
         keep = max(settings.d_sec, settings.radius)
@@ -76,10 +76,10 @@ class Ground:
 
 
 def drivable(ground: Ground, settings: Settings) -> tuple[BaseGeometry, FloatArray]:
-    """Where the robot's centre may drive, and the exact crossings of gaps just wide enough."""
+    """Return the drive area of the robot's centre, and the exact crossings of gaps just wide enough."""
     walls = ground.walls(settings)
     area = snapped(_clear_of(walls, ground))
-    if not _keeps(area, walls):
+    if not _keeps_clearances(area, walls):
         area = snapped(_clear_of(walls, ground, grid_size=GRID))
     area = shapely.MultiPolygon([part for part in polygon_parts(area) if part.area > GRID])
     if area.is_empty:
@@ -88,19 +88,19 @@ def drivable(ground: Ground, settings: Settings) -> tuple[BaseGeometry, FloatArr
 
 
 def _clear_of(walls: Walls, ground: Ground, *, grid_size: float | None = None) -> BaseGeometry:
-    """The ground that keeps every wall's clearance, drawn a little too small: arcs are round from outside.
+    """The ground that keeps every wall's clearance, drawn a little too small: polygons enclose the arcs.
 
-    What lies inside keeps its clearance; what is missing keeps less than 2 % more.
+    Every point inside keeps its clearance. A point that is missing keeps at most 2 % more than that.
     """
-    kept = walls.clearance > 0
-    reach = walls.clearance[kept] * GROWTH + 2 * GRID
-    near = widened(walls.shapes()[kept], reach, quad_segs=QUARTER, grid_size=grid_size)
+    solid = walls.clearance > 0
+    reach = walls.clearance[solid] * GROWTH + 2 * GRID
+    near = widened(walls.shapes()[solid], reach, quad_segs=QUARTER, grid_size=grid_size)
     return ground.outline.difference(ground.obstacles, grid_size=grid_size).difference(
         near, grid_size=grid_size
     )
 
 
-def _keeps(area: BaseGeometry, walls: Walls) -> bool:
-    """Whether an area keeps every clearance: without a grid, GEOS now and then loses what is taken off."""
+def _keeps_clearances(area: BaseGeometry, walls: Walls) -> bool:
+    """True if an area keeps every clearance; without a grid, GEOS sometimes loses what is subtracted."""
     shapely.prepare(area)
     return not shapely.dwithin(area, walls.shapes(), walls.clearance - SLACK).any()

@@ -1,4 +1,4 @@
-"""Floor -> navigable space: where stops may be, where the robot may drive, and what is to be seen."""
+"""Floor -> navigable space: stop areas, drive area, targets and occluders."""
 
 from __future__ import annotations
 
@@ -11,23 +11,25 @@ from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import NavigableSpace
 from stopgo.planner.geometry.shapes import local_origin, to_polygons
-from stopgo.planner.space.facing import faced_rooms
+from stopgo.planner.space.faced_rooms import faced_rooms
 from stopgo.planner.space.ground import Ground, drivable
 from stopgo.planner.space.opening_joins import Crossing, barrier
-from stopgo.planner.space.passable import opening_states
+from stopgo.planner.space.opening_states import opening_states
 from stopgo.planner.space.room_spaces import room_spaces
 from stopgo.planner.space.targets import occluders_of, targets_of
 
 
 def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
-    """Everything later stages need to know about the floor, for this robot and these clearances."""
+    """Return the navigable space of a floor, for this robot and these clearances."""
     floor = floor if settings.targets is None else floor.with_targets(settings.targets)
     origin = local_origin(floor)
     _check_georeference(floor, origin, settings)
     ground = Ground.of(floor, settings)
     drive_area, gaps = drivable(ground, settings)
     states, findings = opening_states(ground, drive_area, gaps, settings)
-    closed = np.array([line for c in ground.crossings if (line := _shut(c, settings, ground)) is not None])
+    closed = np.array(
+        [line for c in ground.crossings if (line := _closed_door(c, settings, ground)) is not None]
+    )
     occluders = occluders_of(floor, closed)
     targets = targets_of(floor, occluders, d_dis=settings.d_dis)
     if targets.total == 0:
@@ -53,7 +55,7 @@ def navigable(floor: FloorPlan, settings: Settings) -> NavigableSpace:
 
 
 def _check_georeference(floor: FloorPlan, corner: FloatArray, settings: Settings) -> None:
-    """Refuse to place on the earth, by its 0,0, a floor that lies far from there."""
+    """Refuse `--origin` for a floor that lies far from its 0,0, which the origin georeferences."""
     far = out_of_reach((float(corner[0]), float(corner[1])))
     if settings.origin is not None and far:
         raise InputError(f"{floor.name}: its corner {far}, or plan without --origin")
@@ -63,8 +65,8 @@ def _kinds(floor: FloorPlan) -> str:
     return ", ".join(sorted({item.kind for item in floor.elements})) or "none"
 
 
-def _shut(crossing: Crossing, settings: Settings, ground: Ground) -> FloatArray | None:
-    """The line of a door that the laser does not pass, with `doors = closed`."""
+def _closed_door(crossing: Crossing, settings: Settings, ground: Ground) -> FloatArray | None:
+    """The line of a door that blocks the laser, with `doors = closed`; else None."""
     if settings.doors == "open" or crossing.opening.kind != "door":
         return None
     return barrier(crossing, ground.origin, ground.obstacles)

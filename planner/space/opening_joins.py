@@ -1,4 +1,4 @@
-"""Doors and passages: which rooms they join, how wide they are, and whether the robot is let through."""
+"""Doors and passages: the rooms they join, their clear width, and the reason if they are closed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from stopgo.planner.geometry.shapes import (
 )
 
 PROBES = (0.15, 0.25, 0.4, 0.6)
-"""Distances in metres from an opening's line at which its rooms are looked for."""
+"""Distances in metres from an opening's line at which its rooms are searched."""
 THRESHOLD = 0.3
 """Half the depth of the floor assumed under an opening."""
 ALONG = 2e-4
@@ -32,14 +32,14 @@ END_GAP = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """An opening in the local frame, before it is known whether the robot gets to it."""
+    """An opening in the local frame, before its reachability is known."""
 
     opening: Opening
     clear: BaseGeometry
     """The widest piece of its line that is free of obstacles; empty if there is none."""
     rooms: tuple[int | None, int | None]
     closed_because: str
-    """Why the robot is not let through whatever its size; empty if it is."""
+    """Reason why no robot of any size may pass; empty if it may."""
 
     @property
     def width(self) -> float:
@@ -73,22 +73,22 @@ def _crossing(
 def widest_clear(line: BaseGeometry, obstacles: BaseGeometry) -> BaseGeometry:
     """The longest piece of an opening's line between obstacles; empty if there is none.
 
-    A line drawn along a wall's face, or within ALONG of it, is in the wall there.
+    A line drawn along a wall's face, or within ALONG of it, counts as inside the wall there.
     """
     near = part_near(obstacles, line)
-    beside = _longest(line.difference(near).difference(_alongside(line, near)))
-    if beside.is_empty:
-        return beside
-    a, b = shapely.get_coordinates(beside)[[0, -1]]
+    clear = _longest(line.difference(near).difference(_alongside(line, near)))
+    if clear.is_empty:
+        return clear
+    a, b = shapely.get_coordinates(clear)[[0, -1]]
     step = ALONG * (b - a) / np.hypot(*(b - a))
     reach = shapely.LineString([a - step, b + step]).difference(near)
     whole = shapely.get_coordinates(line)[[0, -1]]
     ends = shapely.get_coordinates(_longest(reach))[[0, -1]]
-    return shapely.LineString([_within(end, whole) for end in ends])
+    return shapely.LineString([_clamped(end, whole) for end in ends])
 
 
 def _alongside(line: BaseGeometry, obstacles: BaseGeometry) -> BaseGeometry:
-    """Where a line is within ALONG of an obstacle's outline."""
+    """The area within ALONG of the obstacle outlines near a line."""
     edges = boundary_lines(obstacles)
     return widened(edges[shapely.dwithin(edges, line, ALONG)], ALONG, quad_segs=16)
 
@@ -98,7 +98,7 @@ def _longest(lines: BaseGeometry) -> BaseGeometry:
     return max(pieces, key=lambda piece: piece.length, default=shapely.LineString())
 
 
-def _within(point: FloatArray, ends: FloatArray) -> FloatArray:
+def _clamped(point: FloatArray, ends: FloatArray) -> FloatArray:
     """The point, or the end of the line (2, 2) that it lies beyond."""
     along = ends[1] - ends[0]
     t = float(np.dot(point - ends[0], along) / np.dot(along, along))
@@ -106,7 +106,7 @@ def _within(point: FloatArray, ends: FloatArray) -> FloatArray:
 
 
 def part_near(shape: BaseGeometry, line: BaseGeometry) -> BaseGeometry:
-    """What of a large shape lies within 1 m of a line's bounds, quick to work with."""
+    """The part of a large shape within 1 m of a line's bounds, which is faster to compute with."""
     x0, y0, x1, y1 = line.bounds
     # Not clip_by_rect: it fails where it leaves less than a triangle of a shape.
     near = shape.intersection(shapely.box(x0 - 1.0, y0 - 1.0, x1 + 1.0, y1 + 1.0))
@@ -152,14 +152,14 @@ def _closed(
 
 
 def _is_exterior(clear: BaseGeometry, sides: tuple[int | None, int | None], outline: BaseGeometry) -> bool:
-    """Whether there is neither a room nor any floor on one side, past what walls are thick."""
+    """True if one side has neither a room nor floor, beyond the thickness of walls."""
     return any(
         room is None and not outline.intersects(end) for room, end in zip(sides, _ends(clear), strict=True)
     )
 
 
 def _ends(clear: BaseGeometry) -> tuple[BaseGeometry, BaseGeometry]:
-    """The places on either side where an opening leads to."""
+    """Points on both sides of an opening, beyond the thickness of walls."""
     middle, across = middle_and_normal(clear)
     left, right = (shapely.Point(middle + sign * PROBES[-1] * across) for sign in (1.0, -1.0))
     return left, right
@@ -171,11 +171,11 @@ def threshold(crossing: Crossing) -> BaseGeometry:
 
 
 def barrier(crossing: Crossing, origin: FloatArray, obstacles: BaseGeometry) -> FloatArray:
-    """The opening's line (2, 2), drawn out to the jambs when it ends just short of them."""
+    """The opening's line (2, 2), extended to the jambs when it ends just short of them."""
     a, b = crossing.opening.line - origin
     along = (b - a) / max(float(np.hypot(*(b - a))), SLACK)
     ends = []
-    for end, way in ((a, -along), (b, along)):
-        reach = shapely.LineString([end, end + END_GAP * way])
-        ends.append(end + END_GAP * way if reach.intersects(part_near(obstacles, reach)) else end)
+    for end, outward in ((a, -along), (b, along)):
+        reach = shapely.LineString([end, end + END_GAP * outward])
+        ends.append(end + END_GAP * outward if reach.intersects(part_near(obstacles, reach)) else end)
     return np.stack(ends)

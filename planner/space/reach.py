@@ -1,7 +1,7 @@
-"""What the robot can reach: which part of the floor a point belongs to, and where it enters the drive area.
+"""Reachability: the part of the floor that a point belongs to, and its anchor in the drive area.
 
 The drive area is drawn a little too small, so a point that keeps every clearance exactly may lie just
-outside it. Such a point has an anchor, a point of the drive area to which the way is checked exactly.
+outside it. Such a point has an anchor: a point of the drive area, to which the straight drive is checked.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import shapely
 
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray
 from stopgo.mission.stages import NavigableSpace
-from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import GRID, boundary_lines, local_origin, segments_of, to_shape
-from stopgo.planner.space.connected import Parts, parts_of
+from stopgo.planner.space.connected_parts import Parts, parts_of
 from stopgo.planner.space.gaps import Site, Walls
 
 INSIDE = 3 * GRID
@@ -22,7 +22,7 @@ SIDES = 8
 
 
 class Reach:
-    """A navigable space, prepared for asking where the robot gets; points are local (n, 2)."""
+    """A navigable space, prepared for reachability queries; points are local (n, 2)."""
 
     def __init__(self, space: NavigableSpace) -> None:
         origin = local_origin(space.floor)
@@ -33,15 +33,15 @@ class Reach:
         self._rim_tree = shapely.STRtree(self._rim)
 
     def part_at(self, xy: FloatArray) -> IntArray:
-        """Part of each point, -1 where the robot does not get to."""
+        """Part of each point, -1 where the robot cannot reach it."""
         anchors = self.anchors(xy)
         found = np.full(len(xy), -1, dtype=np.int64)
-        somewhere = np.isfinite(anchors[:, 0])
-        found[somewhere] = self.parts.part_at(anchors[somewhere])
+        anchored = np.isfinite(anchors[:, 0])
+        found[anchored] = self.parts.part_at(anchors[anchored])
         return found
 
     def anchors(self, xy: FloatArray) -> FloatArray:
-        """The drive area's point for each point: itself where it is well inside; NaN where there is none."""
+        """Anchor of each point: itself if it is well inside the drive area; NaN if there is none."""
         found = np.array(xy, dtype=np.float64)
         for k in np.flatnonzero(~self._well_inside(xy)):
             if not self._on_crossing(found[k]):
@@ -62,29 +62,29 @@ class Reach:
         )
 
     def _anchor(self, point: FloatArray) -> FloatArray:
-        """A point of the drive area beside this one, to which the robot may drive straight."""
-        nowhere = np.full(2, np.nan)
+        """A point of the drive area next to this one, to which the robot may drive straight."""
+        no_anchor = np.full(2, np.nan)
         if not len(self._rim):
-            return nowhere
+            return no_anchor
         rim = self._rim[self._rim_tree.nearest(shapely.Point(point))]
         foot = shapely.get_coordinates(rim.interpolate(rim.project(shapely.Point(point))))[0]
         if np.hypot(*(foot - point)) > self.site.slop:
-            return nowhere
+            return no_anchor
         for angle in np.arange(SIDES) * (2 * np.pi / SIDES):
             end = foot + 4 * INSIDE * np.array([np.cos(angle), np.sin(angle)])
             if self._well_inside(end[None])[0] and self.site.allows(point, end):
                 return end
-        return nowhere
+        return no_anchor
 
 
-@kept
+@instance_cached
 def reach_of(space: NavigableSpace) -> Reach:
-    """The space, prepared once."""
+    """Return the space's reachability, prepared once."""
     return Reach(space)
 
 
 def walls_of(space: NavigableSpace) -> Walls:
-    """Everything a robot's centre keeps a distance from: obstacles, closed openings, floor edges."""
+    """Everything that a robot's centre keeps clear of: obstacles, closed openings, floor edges."""
     origin = local_origin(space.floor)
     solid = np.concatenate([segments_of(to_shape(space.obstacles, origin)), space.barriers - origin])
     edges = segments_of(to_shape(space.ground, origin))

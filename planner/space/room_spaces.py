@@ -1,4 +1,4 @@
-"""The rooms as they are planned: rooms within rooms parted, and floor outside every room."""
+"""Rooms as planned: inner rooms are separate, and floor outside every room is an unnamed room."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ def _without_inner(
     shape: BaseGeometry, shapes: list[BaseGeometry], index: int, tree: shapely.STRtree
 ) -> BaseGeometry:
     """A room without the rooms that lie inside it (paper: a room in a room is subtracted)."""
-    held = np.sort(tree.query(shape, predicate="intersects"))
-    inner = [shapes[k] for k in held if k != index and shapes[k].area < shape.area]
+    nearby = np.sort(tree.query(shape, predicate="intersects"))
+    inner = [shapes[k] for k in nearby if k != index and shapes[k].area < shape.area]
     return shape.difference(shapely.union_all(inner)) if inner else shape
 
 
 def _stop_area(ground: Ground, settings: Settings) -> BaseGeometry:
-    """Where stops may be, to look at."""
+    """The area where stops may be, for pictures only: it is approximate."""
     keep = max(settings.d_sec, settings.radius)
     edges = shapely.boundary(to_shape(ground.floor.outline, ground.origin))
     near = (roughly_widened(ground.obstacles, keep), roughly_widened(edges, settings.edge))

@@ -1,4 +1,4 @@
-"""What is to be scanned: element boundaries, solids that touch unioned, cut into units (paper, 3.1)."""
+"""Targets to be scanned: element boundaries, touching solids unioned, divided into units (paper, 3.1)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from stopgo.mission.floor import Element, FloorPlan
 from stopgo.mission.geometry import FloatArray, frozen, polyline_length
 from stopgo.mission.stages import Targets
-from stopgo.planner.geometry.instance_cache import kept
+from stopgo.planner.geometry.instance_cache import instance_cached
 from stopgo.planner.geometry.shapes import (
     GRID,
     local_origin,
@@ -27,31 +27,31 @@ from stopgo.planner.geometry.shapes import (
 )
 
 CRACK = 2e-4
-"""Solids at most this far apart (m) are taken to touch."""
+"""Solids at most this far apart (m) touch."""
 NOISE = GRID / 100
 """Width in metres up to which closing cracks widens a face by rounding only."""
 STRAIGHT = 1.5
-"""A vertex less than this many grid steps beside the line of its neighbours is on it: snapping moved it."""
+"""A vertex less than this many grid steps off the line of its neighbours is on it: snapping moved it."""
 CLEAR = 2.5
 """Grid steps that a straightened face keeps from all other vertices: more than STRAIGHT, so that two
-faces which both are straightened do not come to cross."""
+straightened faces do not cross."""
 FLUSH = 3 * GRID
-"""What runs along a face and is no farther from it, in metres, is flush with it."""
+"""A line along a face, at most this far (m) from it, is flush with it."""
 LINE_WALL = 1e-3
 """Thickness in metres given to an occluding element that is drawn as a single line."""
 
 
 def occluders_of(floor: FloorPlan, closed: FloatArray) -> BaseGeometry:
-    """Everything the laser does not pass, unioned on the grid, in the local frame.
+    """Union of everything that blocks the laser, on the grid, in the local frame.
 
-    A wall drawn as a single line is LINE_WALL thick, so that it has two faces. `closed` are openings the
-    laser does not pass either, as segments (k, 2, 2) in the local frame.
+    A wall drawn as a single line is LINE_WALL thick, so that it has two faces. `closed` are openings that
+    block the laser too, as segments (k, 2, 2) in the local frame.
     """
     doors = [thin_solid(segment, LINE_WALL) for segment in closed]
-    return without_idle_vertices(without_cracks(snapped_union([*_occluding(floor)[1], *doors])), floor)
+    return without_needless_vertices(without_cracks(snapped_union([*_occluding(floor)[1], *doors])), floor)
 
 
-@kept
+@instance_cached
 def _occluding(floor: FloorPlan) -> tuple[list[int], NDArray[np.object_]]:
     """The occluding elements and their solids, on the grid."""
     origin = local_origin(floor)
@@ -61,9 +61,9 @@ def _occluding(floor: FloorPlan) -> tuple[list[int], NDArray[np.object_]]:
 
 
 def without_cracks(shape: BaseGeometry) -> BaseGeometry:
-    """The shape with hairline gaps between solids closed: drawn to touch, they miss by rounding.
+    """Close hairline gaps between solids that were drawn to touch and miss by rounding.
 
-    A laser would else look through, and the faces in the gap would be targets nobody can see.
+    Else the laser would pass through the gap, and its faces would be targets that are never visible.
     """
     wide = shape.buffer(CRACK / 2, join_style="mitre", mitre_limit=100.0)
     closed = mended(wide.buffer(-CRACK / 2, join_style="mitre", mitre_limit=100.0))
@@ -87,8 +87,8 @@ def thin_solid(line: FloatArray, thickness: float) -> BaseGeometry:
 def targets_of(floor: FloorPlan, occluders: BaseGeometry, *, d_dis: float) -> Targets:
     """Units of at most `d_dis` metres on every target element of the floor.
 
-    Faces of occluding solids come from their union, so hidden joint faces are none; what does not
-    occlude (beams) keeps its own outline.
+    Faces of occluding solids come from their union, so hidden joint faces are not targets. An element that
+    does not occlude (a beam) keeps its own outline.
     """
     origin = local_origin(floor)
     faces, owners = _occluding_faces(floor, occluders)
@@ -107,10 +107,10 @@ def targets_of(floor: FloorPlan, occluders: BaseGeometry, *, d_dis: float) -> Ta
 
 
 def units_on(lengths: FloatArray, *, d_dis: float) -> FloatArray:
-    """Fewest equal pieces of at most `d_dis` that make up each length (paper, 3.1).
+    """Least number of equal units of at most `d_dis` that make up each length (paper, 3.1).
 
-    A length may be over by what snapping its ends to the grid adds, so that turning the drawing does
-    not add a unit.
+    A length may exceed this by the amount that snapping its ends to the grid adds. So rotating the drawing
+    does not add a unit.
     """
     return np.maximum(1, np.ceil((lengths - 2 * GRID) / d_dis)).astype(np.int64)
 
@@ -134,7 +134,7 @@ def _edges(element: Element) -> Iterator[tuple[FloatArray, FloatArray]]:
 
 
 def _free_segments(floor: FloorPlan) -> list[tuple[FloatArray, int]]:
-    """Outline segments of targets that do not occlude, each with its element; what is drawn twice, once."""
+    """Outline segments of targets that do not occlude, each with its element; duplicates count once."""
     origin = local_origin(floor)
     found: dict[tuple[tuple[float, ...], ...], tuple[FloatArray, int]] = {}
     for index, item in enumerate(floor.elements):
@@ -146,31 +146,31 @@ def _free_segments(floor: FloorPlan) -> list[tuple[FloatArray, int]]:
 
 
 def off_faces(segments: FloatArray, faces: FloatArray) -> FloatArray:
-    """Segments (n, 2, 2), those that run along a face moved a hair's breadth before it.
+    """Segments (n, 2, 2); a segment that runs along a face is moved slightly in front of it.
 
-    A beam flush with a wall would else be before it or within it as rounding has it, and its side seen at
-    one angle of the drawing and hidden at another.
+    Else rounding would put a beam flush with a wall in front of it or inside it. Its side would be visible
+    at one angle of the drawing and hidden at another.
     """
     if not len(segments) or not len(faces):
         return segments
     tree = shapely.STRtree(shapely.linestrings(faces))
     free, face = tree.query(shapely.linestrings(segments), predicate="dwithin", distance=FLUSH)
-    begin, way = faces[face, 0], faces[face, 1] - faces[face, 0]
-    length = np.hypot(*way.T)
-    along = way / length[:, None]
+    begin, extent = faces[face, 0], faces[face, 1] - faces[face, 0]
+    length = np.hypot(*extent.T)
+    along = extent / length[:, None]
     before = np.stack([-along[:, 1], along[:, 0]], axis=1)
     shared = np.ptp(np.clip(_dots(segments[free] - begin[:, None], along), 0.0, length[:, None]), axis=1)
     straight = np.ptp(_dots(segments[free], before), axis=1) * shared <= FLUSH * np.ptp(
         _dots(segments[free], along), axis=1
     )
-    aside = np.zeros((len(segments), 2))
-    np.add.at(aside, free, np.where(straight, shared, 0.0)[:, None] * before)
-    size = np.maximum(np.hypot(*aside.T), LINE_WALL)
-    return segments + (FLUSH * aside / size[:, None])[:, None]
+    offset = np.zeros((len(segments), 2))
+    np.add.at(offset, free, np.where(straight, shared, 0.0)[:, None] * before)
+    size = np.maximum(np.hypot(*offset.T), LINE_WALL)
+    return segments + (FLUSH * offset / size[:, None])[:, None]
 
 
 def _dots(points: FloatArray, axes: FloatArray) -> FloatArray:
-    """Each pair of points (n, 2, 2) along its own axis (n, 2)."""
+    """Coordinates of each pair of points (n, 2, 2) along its own axis (n, 2)."""
     return np.einsum("nij,nj->ni", points, axes)
 
 
@@ -207,26 +207,26 @@ def owners_of(faces: FloatArray, floor: FloorPlan) -> list[int]:
     return owners
 
 
-def without_idle_vertices(shape: BaseGeometry, floor: FloorPlan) -> BaseGeometry:
-    """The union without vertices on a straight face of one element, left there by crossings inside.
+def without_needless_vertices(shape: BaseGeometry, floor: FloorPlan) -> BaseGeometry:
+    """Remove vertices on a straight face of one element, which crossings inside the union left there.
 
-    They would cut a face into pieces and so make more units than the paper's fewest. What is straightened
-    keeps clear of every other vertex, so the outlines still meet where they met and nowhere else.
+    They would divide a face and so give more units than the paper's least number. A straightened face keeps
+    clear of every other vertex, so the outlines still meet at the same points and nowhere else.
     """
     corners = _Corners(shape, floor)
     polygons = []
     for part in polygon_parts(shape):
-        turned = shapely.orient_polygons(part, exterior_cw=True)
+        oriented = shapely.orient_polygons(part, exterior_cw=True)
         rings = [
             corners.straightened(shapely.get_coordinates(r)[:-1])
-            for r in (turned.exterior, *turned.interiors)
+            for r in (oriented.exterior, *oriented.interiors)
         ]
         polygons.append(shapely.Polygon(rings[0], rings[1:]))
     return shapely.MultiPolygon(polygons)
 
 
 class _Corners:
-    """All vertices of a union, and which of them a face may do without."""
+    """All vertices of a union, with the test for vertices that a face does not need."""
 
     def __init__(self, shape: BaseGeometry, floor: FloorPlan) -> None:
         faces = face_segments(shape)
@@ -236,36 +236,36 @@ class _Corners:
         self._tree = shapely.STRtree(shapely.points(self._all))
 
     def straightened(self, ring: FloatArray) -> FloatArray:
-        """The ring (n, 2) with as few of its vertices as keep it where it is."""
-        n, steps, idle = len(ring), to_grid(ring).astype(float), self._idle(ring)
-        needed = (k for k in range(n) if not (idle[k] and self._is_straight(steps, k - 1, k + 1)))
-        kept = [next(needed, 0)]
-        for k in range(kept[0] + 2, kept[0] + n + 1):
-            if not (idle[(k - 1) % n] and self._is_straight(steps, kept[-1], k)):
-                kept.append(k - 1)
-        return ring[np.array(kept) % n] if len(kept) >= 3 else ring
+        """Return the ring (n, 2) with the fewest vertices that keep its shape."""
+        n, steps, needless = len(ring), to_grid(ring).astype(float), self._needless(ring)
+        needed = (k for k in range(n) if not (needless[k] and self._is_straight(steps, k - 1, k + 1)))
+        corners = [next(needed, 0)]
+        for k in range(corners[0] + 2, corners[0] + n + 1):
+            if not (needless[(k - 1) % n] and self._is_straight(steps, corners[-1], k)):
+                corners.append(k - 1)
+        return ring[np.array(corners) % n] if len(corners) >= 3 else ring
 
-    def _idle(self, ring: FloatArray) -> list[bool]:
-        """Whether each vertex parts two faces of one element and is no other ring's."""
+    def _needless(self, ring: FloatArray) -> list[bool]:
+        """True for each vertex between two faces of one element that no other ring has."""
         sides = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
         owners = [self._owner[_key(side)] for side in sides]
         return [self._uses[_key(xy)] == 1 and owners[k - 1] == owners[k] for k, xy in enumerate(ring)]
 
     def _is_straight(self, steps: FloatArray, begin: int, end: int) -> bool:
-        """Whether the vertices between two of a ring lie on the line between these, and no others near it."""
+        """True if the vertices between two of a ring lie on their line, and no other vertex is near it."""
         between = steps[np.arange(begin + 1, end) % len(steps)]
         line = steps[[begin % len(steps), end % len(steps)]]
-        if (_beside(between, line) >= STRAIGHT).any():
+        if (_distance_to(between, line) >= STRAIGHT).any():
             return False
         near = self._all[self._tree.query(shapely.LineString(line), predicate="dwithin", distance=CLEAR)]
         return len(near) == len(between) + 2
 
 
-def _beside(points: FloatArray, line: FloatArray) -> FloatArray:
+def _distance_to(points: FloatArray, line: FloatArray) -> FloatArray:
     """Distance of each point (n, 2) to a line (2, 2) from end to end."""
     distance: FloatArray = shapely.distance(shapely.points(points), shapely.LineString(line))
     return distance
 
 
-def _key(place: FloatArray) -> tuple[float, ...]:
-    return tuple(place.ravel().tolist())
+def _key(xy: FloatArray) -> tuple[float, ...]:
+    return tuple(xy.ravel().tolist())

@@ -40,7 +40,7 @@ def divided(route: Route) -> DividedRoute:
 
     Raises
     ------
-    AnswerIsNo
+    NegativeResult
         When a stop is too far for a tour of its own within the time.
     InputError
         When there are more robots than stops, or a start is where none can be.

@@ -44,7 +44,7 @@ def seen_well(in_sight: Visibility) -> Visibility:
 
     Raises
     ------
-    AnswerIsNo
+    NegativeResult
         When the limits leave nothing.
     """
     seen = within_limits(in_sight)

@@ -23,7 +23,7 @@ def within_limits(in_sight: Visibility) -> Visibility:
 
     Raises
     ------
-    AnswerIsNo
+    NegativeResult
         When they leave nothing, naming the limits.
     """
     settings = in_sight.candidates.space.settings

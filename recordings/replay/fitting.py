@@ -58,7 +58,7 @@ def fitted(halts: Sequence[Standing], mission: Mission) -> Fit:
 
     Raises
     ------
-    AnswerIsNo
+    NegativeResult
         When too few halts lie on stops, or another placing does nearly as well.
     """
     stops = np.array([(stop.x, stop.y) for stop in mission.stops]).reshape(-1, 2)

@@ -76,7 +76,7 @@ def placed(log: FieldLog, mission: Mission, how: Placing) -> PlacedLog:
     ------
     InputError
         When the log has no pose, several robots, or nothing tells how its frame lies to the mission's.
-    AnswerIsNo
+    NegativeResult
         When its halts fit the stops in no way or in several.
     """
     source = chosen(log, how)

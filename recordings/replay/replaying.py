@@ -39,7 +39,7 @@ def replay(log: FieldLog, mission: Mission, how: Placing, sights: Iterable[Sight
     ------
     InputError
         When the log has no pose, cannot be placed, or is not of this mission.
-    AnswerIsNo
+    NegativeResult
         When `--align stops` finds no placing, or several.
     """
     laid = placed(log, mission, how)

@@ -1,4 +1,4 @@
-"""`stopgo floors`: what is in a floor's file, told before anybody plans."""
+"""`stopgo floors` reports the contents of a floor's file; `stopgo convert` writes it as a layered DXF."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from stopgo.planner.floors.survey import FloorChoice, LayerUse, Survey
 
 
-def add_floor_commands(app: typer.Typer) -> None:
-    """Add the verbs about floors' files."""
+def add_commands(app: typer.Typer) -> None:
+    """Add `convert` and `floors` to the app."""
     from stopgo.mission.settings import FLOOR_PARAMETERS
     from stopgo.planner.commands.options import with_options
 
@@ -31,16 +31,16 @@ def add_floor_commands(app: typer.Typer) -> None:
 def floors_command(
     file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf, .ifc, .ifczip or map.yaml.")],
     *,
-    svg: Annotated[Path | None, typer.Option(help="Draw what was read, and what was left out.")] = None,
+    svg: Annotated[Path | None, typer.Option(help="Draw the elements read and those left out.")] = None,
     write_map: Annotated[
-        Path | None, typer.Option(help="Write what each layer was taken for, to be corrected.")
+        Path | None, typer.Option(help="Write the meaning assigned to each layer, for correction.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
     **given: Any,
 ) -> int:
-    """Tell what a file holds that a plan can be made of, what it was taken for, and what is odd about it.
+    """Report the floors in a file, the meaning assigned to its layers, and its anomalies.
 
-    Exit code 1: no floor can be made of it as it is; the last line says why, and the way out.
+    Exit code 1: the file gives no floor as it is; the last line states the reason and the remedy.
     """
     from stopgo.mission.console.table import printable_lines
     from stopgo.mission.files.atomic import must_not_replace, write_atomic
@@ -66,12 +66,12 @@ def floors_command(
 
 def convert_command(
     file: Annotated[Path, typer.Argument(help="The floor's file: a .dxf, an .ifc or an .ifczip.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The .dxf that is written.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The .dxf to write.")],
     *,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
     **given: Any,
 ) -> int:
-    """Write a floor as a layered DXF in metres, which plans to the same stops and may be drawn on before."""
+    """Write a floor as a layered DXF in metres; it gives the same stops, and can be edited first."""
     from stopgo.mission.files.atomic import must_not_replace, write_atomic
     from stopgo.mission.files.layered_dxf import layered_dxf
     from stopgo.mission.files.plan_toml import read_settings
@@ -79,34 +79,34 @@ def convert_command(
     from stopgo.planner.floors import options_of, read_floor
 
     if out.suffix.lower() != ".dxf":
-        raise InputError(f"{out}: must end in .dxf")
+        raise InputError(f"{out}: does not end in .dxf; give a name that ends in .dxf")
     must_not_replace(out, file)
     floor = read_floor(file, options_of(read_settings(None, values_of(given))))
     write_atomic(out, layered_dxf(floor))
-    lost = list(_not_in_a_drawing(floor))
+    lost = list(_lost_in_drawing(floor))
     for text in lost:
         typer.echo(f"stopgo: {text}", err=True)
     if as_json:
-        told = {"file": str(out), "floor": floor.name, "rooms": len(floor.rooms), "lost": lost}
-        typer.echo(json.dumps(told, ensure_ascii=False))
+        result = {"file": str(out), "floor": floor.name, "rooms": len(floor.rooms), "lost": lost}
+        typer.echo(json.dumps(result, ensure_ascii=False))
     else:
         typer.echo(f"{out}: {floor.name}, {floor.area:.0f} m², {len(floor.rooms)} rooms")
     return 0
 
 
-def _not_in_a_drawing(floor: FloorPlan) -> Iterator[str]:
-    """What a layered drawing has no place for."""
-    place = floor.georeference
-    if place is not None:
-        origin = f"{place.lat:.7f},{place.lon:.7f},{place.alt:.2f},{place.heading_deg:.3f}"
-        yield f"a drawing has no place on earth; plan it with --origin {origin}"
+def _lost_in_drawing(floor: FloorPlan) -> Iterator[str]:
+    """Data of the floor that a layered drawing cannot store, in words."""
+    earth = floor.georeference
+    if earth is not None:
+        origin = f"{earth.lat:.7f},{earth.lon:.7f},{earth.alt:.2f},{earth.heading_deg:.3f}"
+        yield f"a drawing stores no georeference; plan it with --origin {origin}"
     settled = sum(not item.to_scan for item in floor.elements)
     if settled:
-        yield f"{settled} elements are not to be scanned on that day; in the drawing all are"
+        yield f"{settled} elements are not to be scanned on that date; the drawing marks all as to be scanned"
 
 
 def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:
-    """Draw the floor that the options choose; else every floor of the file that a plan may be made of."""
+    """Draw the floor that the options choose; else every floor of the file that can be planned."""
     from dataclasses import replace
 
     from stopgo.mission.files.atomic import write_atomic
@@ -126,7 +126,7 @@ def _draw(out: Path, file: Path, found: Survey, options: FloorOptions) -> None:
 
 
 def survey_lines(found: Survey) -> list[str]:
-    """What a person reads: the floors, the layers, what was worked out, left out, and is odd."""
+    """Return the lines for a person: floors, layers, inferred elements, elements left out, and findings."""
     from stopgo.planner.commands.plan_report import finding_lines
 
     units = f"; unit: {found.units}" if found.units else ""

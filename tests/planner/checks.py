@@ -1,4 +1,4 @@
-"""What every plan must be, whatever made it: checked with plain shapely from the floor as it was read."""
+"""Properties of every plan, by any variant: checked with plain shapely from the floor as read."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ ALL_UP_TO = 100
 
 
 def matrix_by_force(visibility: Visibility, always: np.ndarray) -> np.ndarray:
-    """What each candidate sees (rows, units): in the short form told again for some, `always` among them."""
+    """Units that each candidate sees (rows, units), computed again for some rows and all of `always`."""
     every = 1 if FULL else 1 + visibility.rows // ALL_UP_TO
     again = np.union1d(np.arange(0, visibility.rows, every), always)
     seen = np.zeros((visibility.rows, visibility.targets.total), dtype=bool)

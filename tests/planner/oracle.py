@@ -1,4 +1,4 @@
-"""What is seen, by holding every line against every edge: as whole matrices, and once more in fractions."""
+"""Visibility by a test of every line against every edge: as whole matrices, and again in fractions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def visible_pairs(viewpoints, edges, a, b, units, is_face, *, reach):
 
 
 def seen_in_fractions(place, a, b, odd, pieces, edges, *, is_face, reach) -> bool:
-    """Whether the place sees one midpoint, in Python's own numbers, which have no bounds."""
+    """True if the position sees one midpoint, in Python's integers, which have no bounds."""
     q, a, b = (tuple(map(int, point)) for point in (place, a, b))
     t = Fraction(int(odd), int(pieces))
     m = (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]))

@@ -14,7 +14,7 @@ import pytest
 
 import stopgo
 from stopgo.command_line import main
-from stopgo.commands.plan_commands import plan_files
+from stopgo.commands.plan_files import plan_files
 from stopgo.mission.files.mission_json import read
 from stopgo.mission.files.plan_toml import read_settings
 from stopgo.mission.settings import Settings

@@ -11,7 +11,7 @@ from pickle import UnpicklingError
 
 import pytest
 
-from stopgo.planner.geometry.compiling import anew_if_not_kept
+from stopgo.planner.geometry.compiling import recompiled_if_unreadable
 
 ROOT = Path(__file__).parents[2]
 NO_FILE_GROWS = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
@@ -61,4 +61,4 @@ def test_whatever_is_wrong_with_the_cache_the_kernel_is_compiled_anew(error: typ
     def kept(number: int) -> int:
         raise error
 
-    assert anew_if_not_kept(kept, lambda number: number + 1)(1) == 2
+    assert recompiled_if_unreadable(kept, lambda number: number + 1)(1) == 2

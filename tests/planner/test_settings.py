@@ -67,7 +67,7 @@ NEEDS = {
     "robots": ("start",),
     "further_starts": ("start", "robots"),
 }
-"""What says nothing without others."""
+"""Options that have no effect without others."""
 
 
 def other(name: str) -> Any:

@@ -18,7 +18,7 @@ from stopgo.planner.appraisal.unreached import unreached
 from stopgo.planner.candidates import STRATEGIES, candidates
 from stopgo.planner.routing.roadmap import ways_between
 from stopgo.planner.space.navigable import navigable
-from stopgo.planner.space.place import Place
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 from tests.planner.worlds import (
     box,
     column,
@@ -39,7 +39,7 @@ from tests.planner.worlds import (
 
 def reason_at(floor: FloorPlan, x: float, y: float, settings: Settings | None = None) -> str:
     """Why a stop may not be at a point of the first room, or `kept`."""
-    place = Place(navigable(floor, settings or Settings()))
+    place = StopFeasibility(navigable(floor, settings or Settings()))
     return DROP_REASONS[int(place.reasons(np.array([[x, y]]), np.array([0]))[0])]
 
 
@@ -163,7 +163,7 @@ def test_every_strategy_keeps_its_candidates_clear_and_reachable(name: str, degr
 
 
 def check_candidates(found: Candidates) -> None:
-    place = Place(found.space)
+    place = StopFeasibility(found.space)
     again = place.reasons(found.xy, found.room)
     assert np.all(again[found.kept] == KEPT)
     assert np.all((found.reason != KEPT) | (found.part == found.chosen_part))
@@ -246,7 +246,7 @@ def test_a_strip_between_two_gaps_is_told_with_one_of_them() -> None:
     )
     told = told_of(floor)
     assert told["strip"].startswith(
-        "no place 0.35 m from the floor's edges (a gap of 0.100 m in the floor at"
+        "no position 0.35 m from the floor's edges (a gap of 0.100 m in the floor at"
     )
 
 

@@ -20,7 +20,7 @@ from stopgo.mission.stages import KEPT, Candidates, NavigableSpace
 from stopgo.planner.candidates import candidates
 from stopgo.planner.floors.dxf import floor_in
 from stopgo.planner.geometry.shapes import GRID, local_origin, to_grid, to_shape
-from stopgo.planner.space.connected import parts_of
+from stopgo.planner.space.connected_parts import parts_of
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.visibility.exact_sight import open_space
 from stopgo.planner.visibility.sight.sight import Scene, scene_of, sight
@@ -73,7 +73,7 @@ def places(count: int, *, seed: int) -> list[Place]:
 
 @dataclass(frozen=True)
 class Figures:
-    """What does not depend on how a drawing lies."""
+    """Figures that do not depend on the drawing's position and angle."""
 
     passable: tuple[bool, ...]
     """By opening, in the order of where they were drawn."""
@@ -112,7 +112,7 @@ class MovableDrawing:
         self._insert = model.add_blockref("DRAWN", (0, 0))
 
     def floor(self, place: Place) -> FloorPlan:
-        """What the reader makes of it there."""
+        """Floor that the reader gives at this placement."""
         self._insert.dxf.insert = (*place.shift, 0.0)
         self._insert.dxf.rotation = place.degrees
         self._insert.dxf.xscale = -1.0 if place.mirrored else 1.0
@@ -137,7 +137,7 @@ class MovableDrawing:
         return frozen(some + np.random.default_rng(1).uniform(-ASIDE, ASIDE, some.shape))
 
     def figures(self, place: Place) -> Figures:
-        """What the floor amounts to there, seen from the same positions in it."""
+        """Figures of the floor at this placement, seen from the same positions in it."""
         space = self.space(place)
         origin = local_origin(space.floor)
         drive_area = to_shape(space.drive_area, origin)
@@ -173,14 +173,14 @@ def _scene(looking: Candidates) -> Scene:
 
 
 def _seen(looking: Candidates, scene: Scene) -> BoolArray:
-    """Whether any position sees each unit."""
+    """True for each unit that any position sees."""
     local = looking.xy - local_origin(looking.space.floor)
     runs = sight(scene, to_grid(local), reach=looking.space.settings.range)
     return _units(scene, runs.segment, runs.low, runs.high)
 
 
 def _held(scene: Scene) -> BoolArray:
-    """Whether each unit is on an edge of the mesh or in one of its triangles."""
+    """True for each unit on an edge of the mesh or in one of its triangles."""
     faces = np.unique(scene.face[scene.face >= 0])
     on_edge = _units(scene, faces, np.zeros_like(faces), scene.units[faces] - 1)
     return on_edge | _units(scene, scene.bucket_segment, scene.bucket_low, scene.bucket_high)
@@ -196,7 +196,7 @@ def _units(scene: Scene, segment: FloatArray, low: FloatArray, high: FloatArray)
 
 
 def _covered(space: NavigableSpace) -> BoolArray:
-    """Whether each unit that does not occlude lies within something that does."""
+    """True for each unit that does not occlude and lies within an occluder."""
     targets, origin = space.targets, local_origin(space.floor)
     covered = ~targets.occluding[targets.unit_segment]
     occluders = to_shape(space.occluders, origin)

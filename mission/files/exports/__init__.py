@@ -113,7 +113,7 @@ def exported(mission: Mission, name: str, supplements: Supplements) -> bytes:
     ------
     InputError
         When the format needs a georeference and the mission has none.
-    AnswerIsNo
+    NegativeResult
         When the format cannot hold what the mission depends on.
     """
     found = _form(name)

@@ -1,4 +1,4 @@
-"""Reads a storey of an IFC model: the reader's two functions, `read` and `survey`."""
+"""Reader of a storey of an IFC model: its two functions, `read` and `survey`."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ WORKED_OUT = (
     *("floor_from_rooms", "floor_from_proxies", "floor_from_walls", "rooms_derived"),
     *("spaces_overlap", "beside_floor"),
 )
-"""Findings about what the model does not say and was worked out."""
+"""Codes of findings on elements that the model does not state and the reader inferred."""
 
 
 def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
-    """The storey that the options choose in a model.
+    """Read the storey that the options choose in a model.
 
     Raises
     ------
     InputError
-        When the file is no model, or the storey is not told or not there, or has no floor.
+        When the file is not a model, or the storey is not given, not there or without a floor.
     """
     model = load(file)
     levels = with_uses(levels_of(model), model)
@@ -40,19 +40,19 @@ def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
 
 
 def survey(file: FloorFile, options: FloorOptions) -> Survey:
-    """What a model holds: its storeys, and what its classes of elements were taken for.
+    """Return the survey of a model: its storeys, and the meaning of its classes of elements.
 
     Raises
     ------
     InputError
-        As `read` does, but for a storey that is not told.
+        As `read` does, except for a storey that is not given.
     """
     model = load(file)
     levels = with_uses(levels_of(model), model)
-    told = options.storey is not None or options.level is not None or len(walked(levels)) == 1
+    is_chosen = options.storey is not None or options.level is not None or len(walked(levels)) == 1
     own = (
         chosen_level(levels, model=model, storey=options.storey, z=options.level, path=file.path)
-        if told
+        if is_chosen
         else None
     )
     shown = levels if own is None or own in levels else (*levels, own)
@@ -94,7 +94,7 @@ def _choice(
 
 
 def _classes(model: Model) -> tuple[LayerUse, ...]:
-    """What each class of products was taken for."""
+    """Meaning of each class of products."""
     found = Counter((item.ifc_class, item.role) for item in model.described.products if item.faces[1])
     bare = Counter(
         (item.ifc_class, item.role) for item in model.described.products if not (item.faces[1] or item.parts)

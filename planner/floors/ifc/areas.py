@@ -1,4 +1,4 @@
-"""Where the floor of a storey is, and which rooms lie on it: as modelled, else worked out."""
+"""Floor area and rooms of a storey: as modelled, else inferred."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ CLOSINGS = (0.6, 1.2, 2.4, 4.0, 6.0)
 LIKE_MOST = 0.8
 """A closing is wide enough once it encloses this share of what the widest does."""
 LEAST_ROOM = 1.0
-"""Least area of a room that is worked out from walls, m²."""
+"""Least area of a room inferred from walls, m²."""
 STRIP = 0.3
-"""What is left of a space beside smaller ones and narrower than this is no room, metres."""
+"""The rest of a space next to smaller ones is not a room if it is narrower than this, metres."""
 OWN = 0.2
-"""A space that keeps less than this share of its area beside smaller ones is a sum of them."""
+"""A space with less than this fraction of its area outside smaller ones is a sum of them."""
 NOISE = 1e-3
 """Spaces overlap by this share of their area without anybody meaning it."""
 BARRIERS = ("walls", "columns", "windows", "railings")
@@ -117,7 +117,7 @@ def floor_area(
 
 
 def _slabs(level: Level, bodies: Iterable[Surface]) -> Region:
-    """What of bodies looks up within reach of a level, small gaps closed."""
+    """Upward faces of bodies near a level, with small gaps closed."""
     faces: list[Region] = []
     for mesh in bodies:
         if mesh.z[0] > level.z + NEAR_LEVEL or mesh.z[1] < level.z - NEAR_LEVEL:
@@ -134,7 +134,7 @@ def closed(region: Region, gap: float) -> Region:
 
 
 def _enclosed(standing: Sequence[Region]) -> tuple[Region, float]:
-    """What walls enclose, by the smallest closing of gaps that is about as good as the widest."""
+    """The area that walls enclose, by the smallest closing of gaps about as good as the widest."""
     walls = shapely.union_all(standing) if standing else NOTHING
     hulls = [(_filled(walls, gap), gap) for gap in CLOSINGS]
     most = max(hull.area for hull, _ in hulls)
@@ -151,7 +151,7 @@ def _filled(walls: Region, gap: float) -> Region:
 def derived_rooms(floor: Region, solids: Sequence[Solid], doors: Sequence[Door]) -> list[Space]:
     """Rooms of a floor without spaces: what is left between its barriers with all doors shut.
 
-    What a wall bounds on less than half of its way round, such as a terrace, is floor and no room.
+    An area with walls on less than half of its outline, such as a terrace, is floor and not a room.
     """
     barriers = [item.region for item in solids if item.kind in BARRIERS]
     shut = shapely.union_all(

@@ -15,7 +15,7 @@ from stopgo.planner.floors.rings import Region
 SILL = 0.3
 """The bottom of a door lies at most so far above its floor, metres."""
 LEAST_HEIGHT = 1.0
-"""What opens less than this above the floor is a hatch."""
+"""An opening lower than this is a hatch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ def _world(local: FloatArray, frame: FloatArray) -> FloatArray:
 
 
 def _is_turned(box: FloatArray, product: Product) -> bool:
-    """Whether the door's width lies along the frame's other axis."""
+    """True if the door's width lies along the frame's other axis."""
     if product.overall_width is None:
         return True
     wide, deep = np.ptp(box[:, 0]), np.ptp(box[:, 1])
@@ -88,7 +88,7 @@ def _host(product: Product, model: Model, walls: dict[str, Region]) -> Region | 
 
 
 def _faces_of_wall(box: FloatArray, frame: FloatArray, wall: Region | None) -> tuple[float, float]:
-    """The y of the wall's faces beside the opening; of the opening itself without a wall."""
+    """The y of the wall's faces at the opening; of the opening itself if there is no wall."""
     if wall is not None:
         local = (shapely.get_coordinates(wall) - frame[0]) @ frame[1:].T
         x, y = local.T

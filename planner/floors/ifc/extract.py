@@ -1,6 +1,6 @@
 """IFC file -> model, in a process of its own, with the arguments MODEL and OUT.
 
-The geometry kernel is compiled code that may crash on a bad solid; here it takes nobody with it. Progress
+The geometry kernel is compiled code that may crash on a bad solid: a crash ends only this process. Progress
 goes to stderr where that is a terminal. What it was working on last is in the file OUT.at.
 """
 
@@ -20,9 +20,9 @@ import ifcopenshell.util.placement
 import ifcopenshell.util.unit
 import numpy as np
 
-from stopgo.planner.floors.ifc.dated import phases_of, tasks_by_product
+from stopgo.planner.floors.ifc.construction_dates import phases_of, tasks_by_product
+from stopgo.planner.floors.ifc.earth_placement import place_of
 from stopgo.planner.floors.ifc.model import Described, Model, Placement, Product, Storey, packed
-from stopgo.planner.floors.ifc.placed import place_of
 
 KERNEL: Final = "hybrid-cgal-simple-opencascade"
 ROLES = {
@@ -49,7 +49,7 @@ ROLES = {
     "IfcSpace": "spaces",
     "IfcOpeningElement": "openings",
 }
-"""What the classes of a model are to a plan; all others are left out and counted."""
+"""Role of each class of a model in a plan; all other classes are left out and counted."""
 UNSEEN = (
     "IfcSpatialStructureElement",
     "IfcSpatialElement",
@@ -84,7 +84,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _complaints() -> Iterator[str]:
-    """What the library's log holds by now, without its dates: at most a few lines."""
+    """Lines of the library's log so far, without dates: at most a few."""
     log = str(ifcopenshell.get_log())
     lines = [re.sub(r"^(\[[^]]*\]\s*)+", "", line) for line in log.splitlines()]
     yield from [line for line in lines if line][:MOST_COMPLAINTS]
@@ -160,7 +160,7 @@ def _all_at_once(model: ifcopenshell.file) -> Iterator[Made]:
     if not iterator.initialize():
         return
     while True:
-        _tell(iterator.progress())
+        _show_progress(iterator.progress())
         shape = iterator.get()
         yield shape.id, shape.geometry
         if not iterator.next():
@@ -173,16 +173,16 @@ def _one_by_one(model: ifcopenshell.file, without: frozenset[str], at: Path) -> 
     for number, entity in enumerate(chosen):
         if entity.GlobalId in without:
             continue
-        _tell(100 * number // len(chosen))
+        _show_progress(100 * number // len(chosen))
         at.write_text(entity.GlobalId)
         try:
             made = ifcopenshell.geom.create_shape(_settings(), entity, geometry_library=KERNEL)
         except RuntimeError:
-            continue  # told of as failed
+            continue  # reported as failed
         yield entity.id(), cast(Any, made).geometry
 
 
-def _tell(percent: int) -> None:
+def _show_progress(percent: int) -> None:
     if sys.stderr.isatty():
         sys.stderr.write(f"\r\033[Kmodel {percent} %" if percent < 100 else "\r\033[K")
         sys.stderr.flush()
@@ -289,7 +289,7 @@ def _lining(entity: Any, unit: float) -> float | None:
 
 
 def _has_body(entity: Any) -> bool:
-    """Whether a product is drawn as a body and not as a line or symbol alone."""
+    """True if a product has a body, and not only a line or a symbol."""
     kinds = {item.RepresentationIdentifier for item in entity.Representation.Representations}
     return bool(kinds & {"Body", "Facetation", None, ""})
 

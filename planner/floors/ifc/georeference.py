@@ -1,4 +1,4 @@
-"""Where a model stands on earth: by its map conversion, else its site; the implausible is told, not used."""
+"""Georeference of a model: from its map conversion, else its site; implausible values become findings."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ DEFAULTS = {
     "London, as Archicad sets it": (51.50015, -0.12624),
     "0, 0": (0.0, 0.0),
 }
-"""Sites that programs write where nobody has said one."""
+"""Default sites that programs write if the user gave none."""
 NEAR_DEFAULT = 0.005
 """A site this near to a default is one, degrees."""
 UNITS = {"m": 1.0, "mm": 1e-3, "ft": 0.3048, "cm": 1e-2, "US survey ft": 1200 / 3937}
-"""What eastings may be in, the likelier first."""
+"""Possible units of eastings, the likelier first."""
 FARTHEST_SITE = 10_000.0
 """A site that is placed farther from the model's origin says nothing of it, metres."""
 APART = 1000.0
@@ -34,7 +34,7 @@ EARTH = pyproj.Geod(ellps="WGS84")
 
 @dataclass(frozen=True)
 class _Read:
-    """A position of the model's origin, or None, and what is to be told."""
+    """A position of the model's origin, or None, and the findings."""
 
     at: Georeference | None
     findings: tuple[Finding, ...] = ()
@@ -69,31 +69,33 @@ def _by_map(place: OnEarth) -> _Read:
         return _Read(None)
     east, north = place.eastings, place.northings
     if not east or not north:
-        return _odd(f"{place.said_by} is blank (eastings {east}, northings {north})")
+        return _refused(f"{place.said_by} is blank (eastings {east}, northings {north})")
     try:
         crs = pyproj.CRS.from_user_input(place.crs or "")
     except CRSError:
-        return _odd(f"{place.said_by} names no known reference system ('{legible(place.crs or '')}')")
+        return _refused(f"{place.said_by} names no known reference system ('{legible(place.crs or '')}')")
     if not crs.is_projected and not (crs.is_compound and crs.sub_crs_list[0].is_projected):
-        return _odd(f"{place.said_by} names {legible(place.crs or '')}, which is no map projection")
+        return _refused(f"{place.said_by} names {legible(place.crs or '')}, which is no map projection")
     return _in_use(place, crs, (east, north))
 
 
-def _odd(text: str) -> _Read:
+def _refused(text: str) -> _Read:
     return _Read(None, (Finding("georeference_odd", f"{text}; it gives no position"),))
 
 
 def _in_use(place: OnEarth, crs: pyproj.CRS, at: tuple[float, float]) -> _Read:
     """The position, in the unit that puts it where the reference system is used."""
     plane = crs.sub_crs_list[0] if crs.is_compound else crs
-    told = place.map_unit_m or 1.0
-    for name, metres in sorted(UNITS.items(), key=lambda item: abs(item[1] - told) > 1e-9):
+    stated = place.map_unit_m or 1.0
+    for name, metres in sorted(UNITS.items(), key=lambda item: abs(item[1] - stated) > 1e-9):
         found = _position(place, plane, (at[0] * metres, at[1] * metres))
         if found is not None:
             text = f"the eastings of {place.said_by} are read in {name}; in its own unit they lie far off"
-            odd = () if abs(metres - told) < 1e-9 else (Finding("georeference_unit", text),)
-            return _Read(found, odd)
-    return _odd(f"{place.said_by}: {at[0]:g}, {at[1]:g} lie beyond where {legible(place.crs or '')} is used")
+            unit_findings = () if abs(metres - stated) < 1e-9 else (Finding("georeference_unit", text),)
+            return _Read(found, unit_findings)
+    return _refused(
+        f"{place.said_by}: {at[0]:g}, {at[1]:g} lie beyond where {legible(place.crs or '')} is used"
+    )
 
 
 def _position(place: OnEarth, crs: pyproj.CRS, at: tuple[float, float]) -> Georeference | None:
@@ -123,9 +125,9 @@ def _by_site(place: OnEarth) -> _Read:
         return _Read(None)
     for name, (known_lat, known_lon) in DEFAULTS.items():
         if abs(lat - known_lat) < NEAR_DEFAULT and abs(lon - known_lon) < NEAR_DEFAULT:
-            return _odd(f"the site's latitude and longitude are a default ({name})")
+            return _refused(f"the site's latitude and longitude are a default ({name})")
     if abs(lat) > 90 or abs(lon) > 180:
-        return _odd(f"the site's latitude {lat:g} and longitude {lon:g} are on no globe")
+        return _refused(f"the site's latitude {lat:g} and longitude {lon:g} are on no globe")
     heading, odd = _heading(place.true_north)
     return _from_site(place.site, (lat, lon), place.elevation or 0.0, heading, odd)
 
@@ -149,7 +151,7 @@ def _from_site(
     x, y, z = (site[3], site[7], site[11]) if site else (0.0, 0.0, 0.0)
     away = math.hypot(x, y)
     if away > FARTHEST_SITE:
-        return _odd(f"the site is placed {away / 1000:.0f} km from the model's origin")
+        return _refused(f"the site is placed {away / 1000:.0f} km from the model's origin")
     back = heading + math.degrees(math.atan2(-x, -y))
     lon, lat, _ = EARTH.fwd(at[1], at[0], back, away)
     return _Read(Georeference(lat, lon, elevation - z, heading), odd)

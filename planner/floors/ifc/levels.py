@@ -1,4 +1,4 @@
-"""Which floors a model has: where each storey's slab lies, and which storeys are one floor."""
+"""Levels of a model: the height of each storey's slab, and the storeys that are one floor."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Level:
     """Products that the model places in it."""
     notes: tuple[str, ...] = ()
     aside: bool = False
-    """Whether nobody walks there: a foundation, a crawl space, a roof."""
+    """True if nobody walks there: a foundation, a crawl space, a roof."""
 
 
 def levels_of(model: Model) -> tuple[Level, ...]:
@@ -171,7 +171,7 @@ def standing_at(model: Model) -> str:
 
 
 def with_uses(levels: tuple[Level, ...], model: Model) -> tuple[Level, ...]:
-    """The same floors; those that nobody walks on are marked: crawl spaces, foundations and open roofs."""
+    """The same floors; those not for walking are marked: crawl spaces, foundations and open roofs."""
     if not levels:
         return ()
     lively = [_lively(level, model) for level in levels]
@@ -195,13 +195,13 @@ def _crawled(level: Level, above: Level | None) -> str:
 
 
 def _lively(level: Level, model: Model) -> bool:
-    """Whether a door stands on a floor, or several rooms."""
+    """True if a floor has a door, or several rooms."""
     doors = any(abs(mesh.z[0] - level.z) < 0.3 for _, mesh in model.of_role("doors"))
     return doors or sum(abs(mesh.z[0] - level.z) < 0.6 for _, mesh in model.of_role("spaces")) > 1
 
 
 def _under_the_sky(level: Level, model: Model) -> bool:
-    """Whether less than half of the floor lies under a slab or a roof, where the model has any."""
+    """True if less than half of the floor lies under a slab or a roof, in a model that has any."""
     if not model.of_role("slabs", "roofs"):
         return False
     floor = _surfaces(model)

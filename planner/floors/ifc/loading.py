@@ -35,7 +35,7 @@ MARK = b"ISO-10303-21"
 
 
 def is_model(data: bytes) -> bool:
-    """Whether bytes look like an IFC file, or a zip file of one."""
+    """True if bytes look like an IFC file, or a zip file of one."""
     if data.startswith(b"PK\x03\x04"):
         return bool(re.search(rb"\.ifc(?:PK|[^\w]|$)", data[:4096], re.IGNORECASE))
     return MARK in data[:1024] and b"IFC" in data[:65536].upper()
@@ -139,7 +139,7 @@ def _check(data: bytes, path: Path) -> None:
 
 
 def _extracted(data: bytes, path: Path) -> bytes:
-    """What the other process makes of a model; where that crashes, shape by shape without the bad ones."""
+    """The subprocess's result for a model; if it crashes, the model shape by shape without the bad shapes."""
     with tempfile.TemporaryDirectory(prefix="stopgo-model-") as folder:
         source, out = Path(folder) / "model.ifc", Path(folder) / "model.npz"
         source.write_bytes(data)
@@ -156,10 +156,10 @@ def _extracted(data: bytes, path: Path) -> bytes:
 
 def _run(source: Path, out: Path, rest: Sequence[str]) -> int:
     """The other process's exit code; below 0 where a signal ended it."""
-    told = None if sys.stderr.isatty() else subprocess.DEVNULL
+    stderr = None if sys.stderr.isatty() else subprocess.DEVNULL
     command = [sys.executable, "-c", READING, str(source), str(out), *rest]
     code = subprocess.run(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=told, check=False
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=stderr, check=False
     )
     return code.returncode
 

@@ -44,7 +44,7 @@ class Product(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     ifc_class: str
     role: str
-    """What it is to a plan: a kind, or slabs, roofs, coverings, members, spaces, doors, openings."""
+    """Role in a plan: a kind, or slabs, roofs, coverings, members, spaces, doors, openings."""
     predefined: str = ""
     storey: str | None = None
     """GlobalId of the storey it is contained in."""
@@ -69,7 +69,7 @@ class Product(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class OnEarth(msgspec.Struct, frozen=True, kw_only=True):
-    """What a model says of its place on earth; everything in the model's own words."""
+    """Georeference data of a model, unchanged."""
 
     eastings: float | None = None
     northings: float | None = None
@@ -105,7 +105,7 @@ class Described(msgspec.Struct, frozen=True, kw_only=True):
     failed: tuple[str, ...] = ()
     """Products whose geometry could not be made, in words."""
     damage: tuple[str, ...] = ()
-    """What in the file could not be read, in the library's words."""
+    """Parts of the file that could not be read, in the library's words."""
     crashed: tuple[str, ...] = ()
     """Products at which the geometry kernel crashed, in words."""
 

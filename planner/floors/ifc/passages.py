@@ -1,4 +1,4 @@
-"""Open ways between rooms that no door marks: where a robot fits from one room straight into the next."""
+"""Passages between rooms without a door, through which a robot fits from one room into the next."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ def _leading_on(line: FloatArray, free: Region) -> Iterator[FloatArray]:
     across = np.array([-along[1], along[0]]) / length * REACH
     t = np.linspace(0, 1, max(2, int(np.ceil(length / STEP)) + 1))
     middles = line[0] + (t[1:, None] + t[:-1, None]) / 2 * along
-    ways = shapely.linestrings(np.stack([middles - across, middles + across], axis=1))
-    leads = np.concatenate([[False], shapely.covers(free, ways), [False]])
+    crossings = shapely.linestrings(np.stack([middles - across, middles + across], axis=1))
+    leads = np.concatenate([[False], shapely.covers(free, crossings), [False]])
     changes = np.flatnonzero(leads[1:] != leads[:-1])
     for first, last in zip(changes[::2], changes[1::2], strict=True):
         if (t[last] - t[first]) * length >= NARROWEST:

@@ -21,7 +21,7 @@ NOTHING = shapely.Polygon()
 
 
 def cut(mesh: Surface, height: float) -> Region:
-    """What of a mesh a horizontal plane at `height` goes through.
+    """Section of a mesh with a horizontal plane at `height`.
 
     Triangles become directed segments; a face between them is solid if the surface winds around it, or if
     it is entered an odd number of times: so nested, overlapping and badly oriented bodies are read alike.
@@ -53,7 +53,7 @@ def _segments(triangles: FloatArray, height: float) -> FloatArray:
 
 
 def _inside(point: FloatArray, segments: FloatArray) -> bool:
-    """Whether directed segments wind around a point, or a ray from it meets an odd number of them."""
+    """True if directed segments wind around a point, or a ray from it meets an odd number of them."""
     a, b = segments[:, 0] - point, segments[:, 1] - point
     rising = (a[:, 1] <= 0) & (b[:, 1] > 0)
     falling = (a[:, 1] > 0) & (b[:, 1] <= 0)
@@ -64,7 +64,7 @@ def _inside(point: FloatArray, segments: FloatArray) -> bool:
 
 
 def same_throughout(body: Surface, low: float, high: float) -> bool:
-    """Whether every cut between two heights is the same: no corner lies there, and the faces stand."""
+    """True if every cut between two heights is the same: no corner lies there, and the faces are vertical."""
     z = body.triangles[..., 2]
     if ((z > low) & (z < high)).any():
         return False

@@ -1,4 +1,4 @@
-"""What stands on a floor of a model: the cut at the scanner's height, and what the robot would run into."""
+"""Solids on a floor of a model: the cut at the scanner's height, and obstacles for the robot."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from stopgo.planner.floors.rings import Region
 OFF_LEVEL = 1.37e-3
 """A cut lies this much above a round height: planes on which things were modelled are not cut along."""
 KERB = 0.1
-"""What is lower than this above the floor is driven over or is the floor's own edge, metres."""
+"""A solid lower than this above the floor is driven over, or is the floor's own edge, metres."""
 LAID = 0.01
-"""A beam that hangs less than this below the next floor lies in it, metres."""
+"""A beam less than this below the next floor lies in it, metres."""
 TREADS = (0.15, 2.0)
-"""Heights above the floor between which a stair is in the way."""
+"""Heights above the floor between which a stair is an obstacle."""
 FRAME = 0.1
 """Gaps up to this width between the parts of a window are closed, metres."""
 LEAST = 4e-4
@@ -48,7 +48,7 @@ class Heights:
 
     scan: float = 1.3
     robot: float | None = None
-    """As high as the scanner where it is not told."""
+    """As high as the scanner if it is not given."""
 
     @property
     def top(self) -> float:
@@ -115,7 +115,7 @@ def _stairs(product: Product, mesh: Surface, level: Level) -> list[Solid]:
 
 
 def _low(product: Product, mesh: Surface, level: Level, heights: Heights) -> list[Solid]:
-    """What the scanner looks over, and the robot runs into."""
+    """Obstacles for the robot that are below the scanner's plane."""
     top = max(heights.top, TREADS[1]) if product.role == "railings" else heights.top
     low, high = level.z + KERB, level.z + top
     if product.role == "roofs" or mesh.z[1] <= low or mesh.z[0] >= high:
@@ -125,7 +125,7 @@ def _low(product: Product, mesh: Surface, level: Level, heights: Heights) -> lis
 
 
 def _below_the_cut(found: list[Solid], model: Model, level: Level, heights: Heights) -> Iterator[Solid]:
-    """What of walls stands below the scanner's plane and not in it: the parapet under a window."""
+    """Parts of walls below the scanner's plane that the plane does not cut: the parapet under a window."""
     standing = [item for item in found if item.kind != "beams"]
     regions = [item.region for item in standing]
     tree = shapely.STRtree(regions)

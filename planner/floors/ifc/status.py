@@ -1,4 +1,4 @@
-"""What of a model is built on a day: from the tasks of its products, or from a schedule beside it."""
+"""Construction status of a model on a day: from the tasks of its products, or from a separate schedule."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Tasks = Mapping[str, tuple[Task, ...]]
 
 @dataclass(frozen=True)
 class Statuses:
-    """What is built on a day, by GlobalId, and what was built already on an earlier day."""
+    """Products built on a day, by GlobalId, and products built before an earlier day."""
 
     day: str
     since: str | None
@@ -69,7 +69,7 @@ def _of_phases(product: Product, schedule: Tasks) -> tuple[Task, ...]:
 
 
 def status_on(day: str, tasks: tuple[Task, ...]) -> Status:
-    """What tasks make of a product at the end of a day; days are YYYY-MM-DD.
+    """Status of a product at the end of a day, from its tasks; days are YYYY-MM-DD.
 
     It is built once its last task is finished, and begun with its first; a removal ends it.
     """
@@ -86,9 +86,9 @@ def status_on(day: str, tasks: tuple[Task, ...]) -> Status:
 
 
 def on_day(model: Model, found: Statuses, level: Level) -> tuple[Model, list[Finding], dict[str, int]]:
-    """The model as it stands on a day, what is to be told of it, and the count of each class on a floor.
+    """Return the model as built on a day, the findings on it, and the count of each class on a floor.
 
-    A slab that is being made bears nobody: only built ones are floor.
+    A slab under construction does not carry the robot: only built ones are floor.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def on_day(model: Model, found: Statuses, level: Level) -> tuple[Model, list[Fin
     kept = tuple(item for item in model.described.products if _stands(item, found))
     _check_floor(model, found, level)
     there = Model(replace(model.described, products=kept), model.vertices, model.faces)
-    return there, list(_told(found, counts, counted)), _figures(found, counts, counted)
+    return there, list(_status_findings(found, counts, counted)), _figures(found, counts, counted)
 
 
 def _figures(found: Statuses, counts: Counter[str], counted: list[Product]) -> dict[str, int]:
@@ -111,7 +111,7 @@ def _figures(found: Statuses, counts: Counter[str], counted: list[Product]) -> d
 
 
 def _is_on(product: Product, model: Model, level: Level) -> bool:
-    """Whether a product is part of a floor's plan: what stands or hangs there, and the slab itself."""
+    """True if a product is part of a floor's plan: a body above the floor, or the slab itself."""
     body = model.meshes.get(product.global_id)
     if body is None or product.role not in THINGS:
         return False
@@ -147,27 +147,29 @@ def _check_floor(model: Model, found: Statuses, level: Level) -> None:
         )
 
 
-def _told(found: Statuses, counts: Counter[str], counted: list[Product]) -> list[Finding]:
+def _status_findings(found: Statuses, counts: Counter[str], counted: list[Product]) -> list[Finding]:
     words = ", ".join(
         f"{counts[key]} {key.replace('_', ' ')}"
         for key in ("built", "in_progress", "not_started", "removed")
         if counts[key]
     )
     since = f"; {sum(item.global_id in found.standing for item in counted)} were built by {found.since}"
-    told = [Finding("status", f"on {found.day}: {words}{since if found.since else ''}")]
+    findings = [Finding("status", f"on {found.day}: {words}{since if found.since else ''}")]
     if found.unrelated:
         text = f"none of the schedule's {found.unrelated} GlobalIds is in the model: is it another model's?"
-        told.append(Finding("schedule_unrelated", text))
+        findings.append(Finding("schedule_unrelated", text))
     without = sorted(item.global_id for item in counted if item.global_id in found.without_task)
     if without:
         more = f" and {len(without) - MOST_NAMED} more" if len(without) > MOST_NAMED else ""
         named = f"{', '.join(without[:MOST_NAMED])}{more}"
-        told.append(Finding("no_task", f"{len(without)} elements have no task and count as built: {named}"))
+        findings.append(
+            Finding("no_task", f"{len(without)} elements have no task and count as built: {named}")
+        )
     phased = sorted(
         {name for item in counted if item.global_id in found.without_task for name in item.phases if name}
     )
     if phased:
         shown = ", ".join(f"'{legible(name)}'" for name in phased[:MOST_NAMED])
         text = f"phases without a day are not used: {shown}; give each a row of --schedule by its name"
-        told.append(Finding("phases_undated", text))
-    return told
+        findings.append(Finding("phases_undated", text))
+    return findings

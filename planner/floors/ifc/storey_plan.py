@@ -27,7 +27,7 @@ from stopgo.planner.floors.rings import Region
 from stopgo.planner.floors.strokes import Stroke, Word
 
 BESIDE = 1.0
-"""What stands farther than this from the floor is not part of its plan, metres."""
+"""A solid farther than this from the floor is not part of its plan, metres."""
 
 
 def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions) -> FloorPlan:
@@ -44,10 +44,10 @@ def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions)
     parts = parts_of(strokes, words, source=file.path, layers=())
     known = (item for item in parts.findings if item.code != "unknown_layer")
     georeference, odd_place = georeference_of(model.described.place, level=level.z)
-    told = {**_told(options), **({"schedule": digest} if digest else {})}
+    given = {**_given_options(options), **({"schedule": digest} if digest else {})}
     return FloorPlan(
         name=" ".join(filter(None, (file.path.stem, level.name, options.date))),
-        source=file.source(storey=level.name, date=options.date, since=options.since, options=told),
+        source=file.source(storey=level.name, date=options.date, since=options.since, options=given),
         outline=parts.outline,
         rooms=parts.rooms,
         openings=parts.openings,
@@ -62,7 +62,7 @@ def floor_on(level: Level, model: Model, file: FloorFile, options: FloorOptions)
 
 
 def _statuses(model: Model, options: FloorOptions) -> tuple[Statuses | None, str]:
-    """What is built on the day of the options, and the digest of the schedule it is from."""
+    """Construction status on the day of the options, and the digest of the schedule used."""
     if options.date is None:
         return None, ""
     schedule = None
@@ -74,9 +74,9 @@ def _statuses(model: Model, options: FloorOptions) -> tuple[Statuses | None, str
 
 
 def _as_of(item: Element, found: Statuses, options: FloorOptions) -> Element:
-    """An element as a target on the day: not while it is being built, unless told, nor once it was scanned.
+    """An element as on the day: a target unless scanned before or, by default, under construction.
 
-    What is being built stands in the way and may hide what is behind it.
+    An element under construction is an obstacle and may occlude.
     """
     guid = item.global_id or ""
     begun = found.on.get(guid) == "in_progress" and options.in_progress != "target"
@@ -87,15 +87,15 @@ def _as_of(item: Element, found: Statuses, options: FloorOptions) -> Element:
 
 def odd_products(model: Model) -> list[Finding]:
     """Products that could not be shaped, each by name."""
-    told = model.described
+    described = model.described
     return [
-        *(Finding("damaged_model", f"the file is damaged: {legible(text)}") for text in told.damage),
-        *(Finding("no_geometry", f"{name} has no shape that can be made") for name in told.failed),
-        *(Finding("kernel_crashed", f"{name} crashed the geometry kernel") for name in told.crashed),
+        *(Finding("damaged_model", f"the file is damaged: {legible(text)}") for text in described.damage),
+        *(Finding("no_geometry", f"{name} has no shape that can be made") for name in described.failed),
+        *(Finding("kernel_crashed", f"{name} crashed the geometry kernel") for name in described.crashed),
     ]
 
 
-def _told(options: FloorOptions) -> dict[str, Any]:
+def _given_options(options: FloorOptions) -> dict[str, Any]:
     names = ("scan_height", "robot_height", "in_progress")
     return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
 
@@ -119,7 +119,7 @@ def drawn_on(
     if not rooms:
         rooms = derived_rooms(floor, solids, doors)
         findings.append(
-            Finding("rooms_derived", f"the model has no spaces there; {len(rooms)} rooms are worked out")
+            Finding("rooms_derived", f"the model has no spaces there; {len(rooms)} rooms are inferred")
         )
     solids, odd_solids = _near_the_floor(solids, floor)
     findings += [*odd_solids, *_unknown(solids)]
@@ -134,18 +134,18 @@ def drawn_on(
 
 
 def _unknown(solids: list[Solid]) -> list[Finding]:
-    """Products without a class of their own: nobody knows what the laser makes of them."""
+    """Products without a class of their own: their effect on the laser is unknown."""
     count = sum(item.kind == "other" for item in solids)
-    text = f"{count} IfcBuildingElementProxy stand in the robot's way, hide nothing and are not scanned"
+    text = f"{count} IfcBuildingElementProxy are obstacles, hide nothing and are not scanned"
     return [Finding("proxies", text)] if count else []
 
 
 def _near_the_floor(solids: list[Solid], floor: Region) -> tuple[list[Solid], list[Finding]]:
-    """Without what stands beside the floor, such as on the roof of a lower wing."""
+    """Return the solids without those outside the floor, such as on the roof of a lower wing."""
     near = [item for item in solids if item.region.distance(floor) <= BESIDE]
     if len(near) == len(solids):
         return near, []
-    text = f"{len(solids) - len(near)} elements more than {BESIDE:g} m beside the floor are left out"
+    text = f"{len(solids) - len(near)} elements more than {BESIDE:g} m outside the floor are left out"
     return near, [Finding("beside_floor", text)]
 
 

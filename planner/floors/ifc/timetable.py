@@ -1,4 +1,4 @@
-"""A schedule kept beside the model: a CSV of GlobalIds with the start and the finish of their tasks."""
+"""A separate schedule of the model: a CSV of GlobalIds with the start and the finish of their tasks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KNOWN = {
         *("finishdate", "end", "end date", "enddate", "completion"),
     ),
 }
-"""What columns are called that hold a GlobalId, a task's name and its days; the first one counts."""
+"""Known column names for the GlobalId, a task's name and its days; the first match counts."""
 PARTS = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})(?:[ T].*)?")
 
 
@@ -64,15 +64,15 @@ def _delimiter(text: str) -> str:
     return max(",;\t", key=head.count)
 
 
-def _columns(header: Sequence[str], told: Mapping[str, str], path: Path) -> dict[str, int]:
+def _columns(header: Sequence[str], given: Mapping[str, str], path: Path) -> dict[str, int]:
     names = [name.strip().casefold() for name in header]
     found: dict[str, int] = {}
     for what, known in KNOWN.items():
-        wanted = (told[what].strip().casefold(),) if what in told else known
+        wanted = (given[what].strip().casefold(),) if what in given else known
         at = next((names.index(name) for name in wanted if name in names), None)
         if at is not None:
             found[what] = at
-        elif what in told or what == "guid":
+        elif what in given or what == "guid":
             raise _no_column(what, header, path)
     if "start" not in found and "finish" not in found:
         raise _no_column("finish", header, path)
@@ -111,7 +111,7 @@ def _tasks(
 
 
 def _day_first(cells: Iterable[str], path: Path) -> bool:
-    """Whether days are written before months; told by the days that are no months, else by the separator."""
+    """True if days are written before months: shown by days over 12, else by the separator."""
     written = [match for cell in cells if (match := PARTS.fullmatch(cell)) and len(match[1]) < 3]
     if any(int(match[1]) > 12 for match in written):
         return True

@@ -1,7 +1,7 @@
-"""Derives from line work what no layer says: solid walls, doors, passages, rooms and the floor.
+"""Derivation from line work of elements that no layer shows: solid walls, doors, passages, rooms, floor.
 
 Strokes in, strokes out: what is derived is drawn as if on the layers FLOOR, ROOMS, WALLS, DOORS and PASSAGES,
-and told in findings. Derived geometry is within 0.1 mm of the lines it is made of.
+and reported in findings. Derived geometry is within 0.1 mm of the lines it is made of.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from stopgo.planner.floors.rings import GAP, Region, canonical_region, polygons_
 from stopgo.planner.floors.strokes import Stroke, Word
 
 _COVERS = 0.6
-"""A drawn floor is taken if it covers this share of what the walls enclose."""
+"""A drawn floor is used if it covers this fraction of the area that the walls enclose."""
 _PANE = 0.02
 """Half the width in metres that windows' lines have as barriers."""
 _TREADS = 0.4
@@ -36,7 +36,7 @@ _PIECE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """Strokes and words as a layered drawing has them, and what was done to make them so."""
+    """Strokes and words as in a layered drawing, and findings on their derivation."""
 
     strokes: list[Stroke]
     words: list[Word]
@@ -47,7 +47,7 @@ class Derived:
 
 @dataclass(eq=False)
 class _Site:
-    """The line work in a frame of its own near the origin, in metres."""
+    """The line work in a local frame near the origin, in metres."""
 
     origin: FloatArray
     strokes: Sequence[Stroke]
@@ -61,7 +61,7 @@ class _Site:
         return [line for line in lines if len(line) > 1]
 
     def fills(self, role: str) -> list[shapely.Polygon]:
-        """What hatches of a role fill, without their holes."""
+        """Areas filled by hatches of a role, without their holes."""
         return [shape for item in self._filled(role) for shape in polygons_of(item)]
 
     def _filled(self, role: str) -> list[Region]:
@@ -76,7 +76,7 @@ class _Site:
         return np.vstack((line, line[:1])) if closed else line
 
     def names(self) -> list[tuple[str, FloatArray]]:
-        """Texts that name rooms, each with a place (2,)."""
+        """Texts that name rooms, each with a position (2,)."""
         words = [item for item in self.words if item.role in ("names", "rooms") and item.text and item.at]
         return [(item.text, np.array(item.at[0]) - self.origin) for item in words]
 
@@ -85,12 +85,12 @@ class _Site:
         return Stroke(frozen(np.round(points, 4) + self.origin), layer, role, closed=closed)
 
     def rings(self, shape: Region, role: str, layer: str) -> list[Stroke]:
-        """The rings of a region: holes go round the other way."""
+        """The rings of a region: holes have the opposite direction."""
         polygons = canonical_region(shape)
         return [self.stroke(ring, role, layer, closed=True) for part in polygons for ring in part.rings]
 
-    def tell(self, code: str, message: str, at: FloatArray | None = None) -> None:
-        """A finding, at a place in this frame."""
+    def report(self, code: str, message: str, at: FloatArray | None = None) -> None:
+        """Add a finding, at a position in this frame."""
         place = None if at is None else (float(at[0] + self.origin[0]), float(at[1] + self.origin[1]))
         self.findings.append(Finding(code, message, at=place))
 
@@ -139,14 +139,14 @@ def _origin(strokes: Sequence[Stroke]) -> FloatArray:
 
 
 def _walls_and_gaps(site: _Site) -> tuple[SolidWalls, list[WallGap]]:
-    """Walls without what doors open in them, and the gaps there."""
+    """Return walls without the openings of doors, and the gaps there."""
     beside = site.lines("doors", "openings", "windows")
     built, leaves = without_doors(site.lines("walls"))
     whole = walls_of(built, site.fills("walls"), beside=[*beside, *leaves])
     gaps = gaps_of(site.lines("doors"), site.lines("openings"), [*site.lines("other"), *leaves], whole)
     walls = whole.without([gap.opening for gap in gaps])
     for area in whole.too_thick:
-        site.tell(
+        site.report(
             "not_a_wall",
             f"a hatch of {area.area:.1f} m² on a layer of walls is no wall",
             area.centroid.coords[0],
@@ -166,14 +166,14 @@ def _barriers(site: _Site, walls: SolidWalls, gaps: Iterable[WallGap]) -> Region
 
 
 def _drawn_floor(site: _Site) -> Region:
-    """What is closed on the floor's layers."""
+    """Closed shapes on the floor's layers."""
     rings = drawn([item for item in site.strokes if item.role == "floor"], gap=GAP)
     outline, _ = outline_of(rings)
     return shapely.transform(outline, lambda xy: xy - site.origin)
 
 
 def _spaces(site: _Site, walls: SolidWalls, gaps: Sequence[WallGap]) -> Spaces:
-    """The floor: as drawn if that covers what walls enclose, else derived."""
+    """Return the floor: as drawn if it covers the area that walls enclose, else derived."""
     barriers = _barriers(site, walls, gaps)
     tiles = tiled_floor(site.lines("floor"), barriers)
     outline = _drawn_floor(site) if tiles.is_empty else tiles
@@ -186,7 +186,7 @@ def _spaces(site: _Site, walls: SolidWalls, gaps: Sequence[WallGap]) -> Spaces:
 def _rooms(
     site: _Site, walls: SolidWalls, gaps: Sequence[WallGap], spaces: Spaces
 ) -> tuple[list[WallGap], list[shapely.Polygon]]:
-    """Rooms of the floor, and the gaps between them; a passage that parts no two rooms is none."""
+    """Return rooms of the floor, and gaps between them, without passages that separate no rooms."""
     given = drawn([item for item in site.strokes if item.role == "rooms"], gap=GAP).closed
     if given:
         shown = [part for ring in given for part in polygons_of(ring.region)]
@@ -222,12 +222,12 @@ def _parting(gaps: Sequence[WallGap], rooms: Iterable[shapely.Polygon]) -> list[
 def _floor_strokes(site: _Site, spaces: Spaces) -> list[Stroke]:
     if spaces.tiled:
         area = spaces.floor.area
-        site.tell("inferred_floor", f"the floor is what its pattern of tiles covers: {area:.4g} m²")
+        site.report("inferred_floor", f"the floor is what its pattern of tiles covers: {area:.4g} m²")
         return site.rings(spaces.floor, "floor", "FLOOR")
     if spaces.closed_over is None:
         return [item for item in site.strokes if item.role == "floor"]
     area = spaces.floor.area
-    site.tell(
+    site.report(
         "inferred_floor",
         f"no layer shows the floor: {area:.4g} m² within the walls were taken, "
         f"gaps up to {spaces.closed_over:g} m in them closed (draw it on a layer FLOOR to be sure)",
@@ -238,7 +238,7 @@ def _floor_strokes(site: _Site, spaces: Spaces) -> list[Stroke]:
 def _wall_strokes(site: _Site, walls: SolidWalls) -> list[Stroke]:
     layer = next((item.layer for item in site.strokes if item.role == "walls"), "WALLS")
     if walls.joined:
-        site.tell(
+        site.report(
             "inferred_walls",
             f"{walls.joined} ends of wall lines were joined over gaps or across a wall's end",
         )
@@ -255,7 +255,7 @@ def _opening_strokes(site: _Site, gaps: Sequence[WallGap]) -> list[Stroke]:
         if own and kind != "window":
             loose = sum(not gap.held for gap in own)
             doubt = f"; {loose} of them do not reach walls on both sides" if loose else ""
-            site.tell(f"inferred_{role}", f"{len(own)} {role} were found in the line work{doubt}")
+            site.report(f"inferred_{role}", f"{len(own)} {role} were found in the line work{doubt}")
     return [
         site.stroke(gap.line, roles[gap.kind], gap.kind.upper(), closed=False)
         for gap in gaps
@@ -268,7 +268,7 @@ def _room_strokes(site: _Site, rooms: Sequence[shapely.Polygon]) -> list[Stroke]
     if given or len(rooms) < 2:
         return given
     area = sum(room.area for room in rooms)
-    site.tell(
+    site.report(
         "inferred_rooms",
         f"no layer shows rooms: {len(rooms)} were derived from the walls, {area:.4g} m² in all",
     )
@@ -276,7 +276,7 @@ def _room_strokes(site: _Site, rooms: Sequence[shapely.Polygon]) -> list[Stroke]
 
 
 def _things(site: _Site) -> list[Stroke]:
-    """What stands on the floor, and what nobody knows, as it is drawn; furniture and stairs as outlines."""
+    """Objects on the floor and unknown shapes, as drawn; furniture and stairs as outlines."""
     plain = ("columns", "beams", "railings", "windows", "other")
     things = [item for item in site.strokes if item.role in plain]
     for role, to, within in (("stairs", "stairs", _TREADS), ("furniture", "other", _PIECE)):

@@ -1,4 +1,4 @@
-"""Puts lines that touch into groups, and draws the outline of what a group shows."""
+"""Groups of touching lines, and the outline of the object that each group shows."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from stopgo.mission.geometry import FloatArray, IntArray
 from stopgo.planner.floors.rings import Region, polygons_of
 
 _FILLED = 0.5
-"""Where lines enclose less than this share of their hull, they are taken one by one."""
+"""If lines enclose less than this fraction of their hull, each line is a separate object."""
 _SMALL = 4.0
-"""A group whose hull is at most this large, in m², is one thing that nobody drives through."""
+"""A group whose hull is at most this large, in m², is one obstacle."""
 
 
 def groups_of(lines: Sequence[FloatArray], *, within: float) -> list[list[FloatArray]]:
-    """Polylines (n, 2) in groups that hang together over gaps of at most `within` metres."""
+    """Return polylines (n, 2) in groups that are connected over gaps of at most `within` metres."""
     drawn = [line for line in lines if len(line)]
     label = labels_of(
         [shapely.LineString(line) if len(line) > 1 else shapely.Point(line[0]) for line in drawn], within
@@ -41,7 +41,7 @@ def labels_of(shapes: Sequence[Region], within: float) -> IntArray:
 
 
 def outlines_of(lines: Sequence[FloatArray], *, within: float) -> list[shapely.Polygon]:
-    """What each group of lines covers: a thing's outline, filled."""
+    """Filled outline of each group of lines."""
     return [part for group in groups_of(lines, within=within) for part in _outline(group)]
 
 

@@ -1,4 +1,4 @@
-"""Parts a space that several rooms' names stand in, at its narrowest places between them."""
+"""Division of a space that contains several rooms' names, at the narrowest lines between them."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.planner.floors.rings import polygons_of
 
 WIDEST = 4.0
-"""No place wider than this, in metres, parts two rooms."""
+"""No line longer than this, in metres, separates two rooms."""
 _TURN = np.sin(np.radians(20))
 _LEAST = 1.0
 """Least area in m² of a part."""
 _MOST_CORNERS = 500
 _DETAIL = 0.03
-"""Corners of this size, in metres, are no corners of a room."""
+"""Corners of this size, in metres, are not corners of a room."""
 _KERF = 0.01
 
 
 def parted_by_labels(
     rooms: Sequence[shapely.Polygon], places: Sequence[FloatArray]
 ) -> tuple[list[shapely.Polygon], list[FloatArray]]:
-    """The rooms, parted where a narrow place lies between two labels, and the lines (2, 2) drawn there."""
+    """Return the rooms, divided where a narrow line lies between two labels, and these lines (2, 2)."""
     labels = shapely.points(np.array(places).reshape(-1, 2))
     parted: list[shapely.Polygon] = []
     cuts: list[FloatArray] = []
@@ -60,9 +60,9 @@ def _cut(
 
 
 def _halves(part: shapely.Polygon, cut: FloatArray) -> list[shapely.Polygon]:
-    """What a cut parts; it may run along walls' faces, so it has a width of its own."""
-    way = (cut[1] - cut[0]) / np.hypot(*(cut[1] - cut[0]))
-    line = shapely.LineString([cut[0] - 3 * _DETAIL * way, cut[1] + 3 * _DETAIL * way])
+    """Parts on both sides of a cut; a cut may run along walls' faces, so it has a width."""
+    direction = (cut[1] - cut[0]) / np.hypot(*(cut[1] - cut[0]))
+    line = shapely.LineString([cut[0] - 3 * _DETAIL * direction, cut[1] + 3 * _DETAIL * direction])
     pieces = polygons_of(part.difference(line.buffer(_KERF / 2, cap_style="flat")))
     halves = [piece for piece in pieces if piece.area >= _LEAST]
     if len(halves) != 2:
@@ -112,7 +112,7 @@ def _edges(ring: FloatArray) -> FloatArray:
 
 def _feet(points: FloatArray, edges: FloatArray) -> FloatArray:
     """For each point the nearest point (n, m, 2) of each edge."""
-    way = edges[:, 1] - edges[:, 0]
-    size = np.maximum(np.einsum("ij,ij->i", way, way), 1e-12)
-    t = np.einsum("nij,ij->ni", points[:, None, :] - edges[None, :, 0], way) / size
-    return np.asarray(edges[None, :, 0] + np.clip(t, 0.0, 1.0)[..., None] * way[None])
+    direction = edges[:, 1] - edges[:, 0]
+    size = np.maximum(np.einsum("ij,ij->i", direction, direction), 1e-12)
+    t = np.einsum("nij,ij->ni", points[:, None, :] - edges[None, :, 0], direction) / size
+    return np.asarray(edges[None, :, 0] + np.clip(t, 0.0, 1.0)[..., None] * direction[None])

@@ -1,4 +1,4 @@
-"""Derives the floor and its rooms from what bounds them: walls, glass, and the gaps that doors close."""
+"""Derivation of the floor and its rooms from barriers: walls, glass, and the gaps that doors close."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ENOUGH = 0.8
 LEAST_ROOM = 1.0
 """Least area in m² of a room."""
 _NARROW = 0.3
-"""What is nowhere wider than this, in metres, is no room."""
+"""A space that is nowhere wider than this, in metres, is not a room."""
 _OPEN = 0.25
 """A space open along more than this share of its outline, where nothing is drawn, is outside."""
 _BESIDE = 0.05
@@ -39,11 +39,11 @@ class Spaces:
     closed_over: float | None = None
     """The widest gap in the outer walls that was closed; None where the outline is drawn."""
     tiled: bool = False
-    """Whether a pattern of tiles shows the floor."""
+    """True if a pattern of tiles shows the floor."""
 
 
 def floor_within(barriers: Region) -> Spaces:
-    """The floor that barriers enclose, gaps in them closed as far as it takes; empty if there is none."""
+    """Return the floor that barriers enclose, with gaps closed where necessary; empty if there is none."""
     filled = _filled(barriers)
     enough = _ENOUGH * _free(_closed(filled, _CLOSED_OVER[-1]), barriers)
     for width in _CLOSED_OVER:
@@ -86,7 +86,7 @@ def _filled(shape: Region) -> Region:
 
 
 def _closed(filled: Region, width: float) -> Region:
-    """What lies in or behind a region when gaps up to `width` metres in it are closed."""
+    """Area in or enclosed by a region when gaps up to `width` metres in it are closed."""
     wide = filled.buffer(width / 2, quad_segs=3)
     # Round joins cut into corners; what was there before is there afterwards.
     return shapely.union_all([_filled(wide).buffer(-width / 2, quad_segs=3), filled])
@@ -112,7 +112,7 @@ def rooms_within(floor: Region, barriers: Region) -> tuple[shapely.Polygon, ...]
 
 
 def _without_slits(part: shapely.Polygon) -> list[shapely.Polygon]:
-    """The spaces of one part: slits that nobody passes join no rooms."""
+    """The spaces of one part; slits too narrow to pass do not connect rooms."""
     seeds = [
         seed for seed in polygons_of(part.buffer(-_NARROW / 2, join_style="mitre")) if seed.area > _NARROW**2
     ]

@@ -1,4 +1,4 @@
-"""Finds door swings: arcs of about a quarter turn as long as a leaf is wide, whatever they are drawn with."""
+"""Door swings: arcs of about a quarter turn with the radius of a leaf, drawn with any entity."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from stopgo.mission.geometry import FloatArray
 LEAF = (0.5, 1.6)
 """Width of a door's leaf in metres."""
 _SWEEP = (np.radians(28), np.radians(135))
-"""How far a drawn leaf swings: a quarter turn as a rule, less in narrow places, at times a little more."""
+"""Swing angle of a drawn leaf: usually a quarter turn, less in narrow rooms, sometimes a little more."""
 _FLAT = np.radians(0.3)
-"""A polyline that turns less than this at a point goes straight on."""
+"""A polyline that turns less than this at a point is straight there."""
 _FACET = np.radians(31)
 """A facet of a swing turns by no more than this."""
 _EVEN = 0.06
@@ -47,7 +47,7 @@ def swings_of(lines: Iterable[FloatArray]) -> list[Swing]:
 
 
 def radii_in(lines: Iterable[FloatArray]) -> list[float]:
-    """Radii of all quarter arcs in any unit: what tells how long a unit is."""
+    """Return the radii of all quarter arcs in any unit, which show the length of the unit."""
     return [swing.radius for line in lines for swing in _in_line(line, width=(0.0, np.inf))]
 
 
@@ -131,7 +131,7 @@ def paired(leaves: Sequence[Leaf], *, within: float = 0.2) -> list[tuple[Leaf, .
 
 
 def _meet(one: Leaf, other: Leaf, within: float) -> bool:
-    """Whether two leaves meet edge to edge on one line."""
+    """True if two leaves meet edge to edge on one line."""
     if np.hypot(*(one.shut - other.shut)) > within:
         return False
     a, b = one.shut - one.hinge, other.shut - other.hinge

@@ -19,7 +19,7 @@ PASSAGE = (0.6, 1.6)
 SYMBOL = (0.5, 6.0)
 """Length in metres of a door's symbol without a swing, such as a sliding door."""
 _BROAD = 0.4
-"""What is drawn broader than this (m), such as the place of an open garage door, is no line across."""
+"""A shape broader than this (m), such as the area of an open garage door, is not a line across."""
 _REACH = 0.3
 """Frames may keep a leaf this far (m) from its jamb."""
 _DRAWN_OPEN = 0.6
@@ -37,12 +37,12 @@ class WallGap:
     """A place where a wall is open: the line across it and how deep the wall is there, in metres."""
 
     kind: str
-    """`door`, `passage`, or `opening` where only its place tells a door from a window."""
+    """`door`, `passage`, or `opening` where only its position shows a door or a window."""
     line: FloatArray
     """From jamb to jamb in the middle of the wall (2, 2)."""
     depth: float
     held: bool
-    """Whether walls stand at both its ends."""
+    """True if walls are at both its ends."""
 
     @property
     def opening(self) -> shapely.Polygon:
@@ -101,7 +101,7 @@ def without_doors(lines: Sequence[FloatArray]) -> tuple[list[FloatArray], list[F
 
 
 def _runs(line: FloatArray, a: FloatArray, b: FloatArray) -> bool:
-    """Whether a line goes from `a` to `b` or back, within 2 cm."""
+    """True if a line goes from `a` to `b` or back, within 2 cm."""
     return any(np.abs(line - np.array(ends)).max() <= _TOUCH for ends in ((a, b), (b, a)))
 
 
@@ -149,12 +149,12 @@ class _Strokes:
         self._segments = np.concatenate(pieces) if pieces else np.empty((0, 2, 2))
 
     def along(self, a: FloatArray, b: FloatArray) -> bool:
-        """Whether one segment runs along most of the way from `a` to `b`, within 8 cm."""
-        way = b - a
-        length = float(np.hypot(*way))
-        way = way / length
-        out = np.array([-way[1], way[0]])
-        t = (self._segments - a) @ way
+        """True if one segment runs along most of the line from `a` to `b`, within 8 cm."""
+        direction = b - a
+        length = float(np.hypot(*direction))
+        direction = direction / length
+        out = np.array([-direction[1], direction[0]])
+        t = (self._segments - a) @ direction
         off = np.abs((self._segments - a) @ out).max(axis=1)
         covered = np.minimum(t.max(axis=1), length) - np.maximum(t.min(axis=1), 0.0)
         return bool(((off <= 0.08) & (covered >= 0.8 * length)).any())
@@ -172,18 +172,18 @@ def _leaf(swing: Swing, leaves: _Strokes, walls: _Near) -> Leaf:
 
 
 def _to_walls(hinge: FloatArray, end: FloatArray, near: Region) -> float:
-    """How far walls are beyond both ends of a shut leaf, at most 0.5 m each; more if it runs in walls."""
-    way = (end - hinge) / np.hypot(*(end - hinge))
+    """Distance of walls beyond both ends of a shut leaf, at most 0.5 m each; more if it runs in walls."""
+    direction = (end - hinge) / np.hypot(*(end - hinge))
     beyond = [
-        shapely.LineString([end - 0.02 * way, end + 0.5 * way]),
-        shapely.LineString([hinge + 0.02 * way, hinge - 0.5 * way]),
+        shapely.LineString([end - 0.02 * direction, end + 0.5 * direction]),
+        shapely.LineString([hinge + 0.02 * direction, hinge - 0.5 * direction]),
     ]
     beside = near.buffer(_FLUSH)  # hinges may stand off the wall's face
     away = 0.0
     for ray in beyond:
         hit = ray.intersection(beside)
         away += 0.5 if hit.is_empty else float(hit.distance(shapely.Point(ray.coords[0])))
-    inner = shapely.LineString([hinge + 0.1 * way, end - 0.1 * way])
+    inner = shapely.LineString([hinge + 0.1 * direction, end - 0.1 * direction])
     blocked = float(inner.intersection(near.buffer(-0.01)).length / inner.length)
     return away + (0.5 * blocked if blocked < _WHOLE else 0.1)  # or drawn over a wall that goes on
 
@@ -192,20 +192,22 @@ def _placed(line: FloatArray, kind: str, walls: _Near, *, reach: float) -> WallG
     """The gap that a line across a wall's opening stands for: moved into the wall, from jamb to jamb."""
     near = walls.around(shapely.LineString(line), 1.0)
     a, b = line
-    way = (b - a) / np.hypot(*(b - a))
-    out = np.array([-way[1], way[0]])
-    depths = [_depth(a, -way, out, near), _depth(b, way, out, near)]
+    direction = (b - a) / np.hypot(*(b - a))
+    out = np.array([-direction[1], direction[0]])
+    depths = [_depth(a, -direction, out, near), _depth(b, direction, out, near)]
     known = [depth for depth in depths if depth is not None]
     low, high = _common(known)
     middle = line + out * (low + high) / 2
-    trimmed, held = _trimmed(middle, way, near, reach)
+    trimmed, held = _trimmed(middle, direction, near, reach)
     return WallGap(kind, trimmed, max(high - low, 0.05), held)
 
 
-def _depth(end: FloatArray, way: FloatArray, out: FloatArray, near: Region) -> tuple[float, float] | None:
-    """From where to where a wall reaches across the line at a jamb, in metres to the line's left."""
+def _depth(
+    end: FloatArray, direction: FloatArray, out: FloatArray, near: Region
+) -> tuple[float, float] | None:
+    """Extent of a wall across the line at a jamb, in metres to the line's left; None if there is no wall."""
     for step in _JAMB:
-        at = end + step * way
+        at = end + step * direction
         probe = shapely.LineString([at - out * _DEEPEST, at + out * _DEEPEST])
         for part in shapely.get_parts(probe.intersection(near)):
             if part.is_empty:
@@ -225,21 +227,21 @@ def _common(depths: Sequence[tuple[float, float]]) -> tuple[float, float]:
     return (low, high) if low < high else min(depths, key=lambda d: (abs(d[0] + d[1]), d))
 
 
-def _trimmed(line: FloatArray, way: FloatArray, near: Region, reach: float) -> tuple[FloatArray, bool]:
+def _trimmed(line: FloatArray, direction: FloatArray, near: Region, reach: float) -> tuple[FloatArray, bool]:
     """The line between walls at most `reach` beyond its ends; and whether there are walls at both."""
     a, b = line
     middle = shapely.Point((a + b) / 2)
-    whole = shapely.LineString([a - reach * way, b + reach * way])
+    whole = shapely.LineString([a - reach * direction, b + reach * direction])
     free = [part for part in shapely.get_parts(whole.difference(near)) if part.length > 0.2]
     if not free:
         return line, bool(near.covers(whole))  # a door drawn over a wall that goes on below it
     piece = min(free, key=lambda part: (round(float(part.distance(middle)), 6), -part.length))
     ends = shapely.get_coordinates(piece)[[0, -1]]
-    if (ends[1] - ends[0]) @ way < 0:
+    if (ends[1] - ends[0]) @ direction < 0:
         ends = ends[::-1]
     limits = [
-        float((ends[0] - whole.coords[0]) @ way) > 1e-6,
-        float((whole.coords[-1] - ends[1]) @ way) > 1e-6,
+        float((ends[0] - whole.coords[0]) @ direction) > 1e-6,
+        float((whole.coords[-1] - ends[1]) @ direction) > 1e-6,
     ]
     kept = [ends[k] if limits[k] else line[k] for k in (0, 1)]
     return np.array(kept), all(limits)
@@ -284,26 +286,30 @@ def _apart(gaps: Sequence[WallGap]) -> list[WallGap]:
 
 def passages_of(walls: SolidWalls, known: Sequence[WallGap], closed: Region) -> list[WallGap]:
     """Gaps between walls' ends that face each other, where nothing known or `closed` (windows) lies."""
-    middles, ways, widths = caps_of(shapely.union_all(list(walls.solids)))
+    middles, directions, widths = caps_of(shapely.union_all(list(walls.solids)))
     shape = walls.shape
     taken = shapely.union_all([gap.place.buffer(0.05) for gap in known])
     found: list[WallGap] = []
-    for k, other in _facing(middles, ways):
+    for k, other in _facing(middles, directions):
         line = np.array([middles[k], middles[other]])
-        between = shapely.LineString([middles[k] + 0.01 * ways[k], middles[other] + 0.01 * ways[other]])
+        between = shapely.LineString(
+            [middles[k] + 0.01 * directions[k], middles[other] + 0.01 * directions[other]]
+        )
         if not (between.intersects(shape) or between.intersects(taken) or between.intersects(closed)):
             found.append(WallGap("passage", line, float(min(widths[k], widths[other])), held=True))
     return found
 
 
-def _facing(middles: FloatArray, ways: FloatArray) -> Iterator[tuple[int, int]]:
+def _facing(middles: FloatArray, directions: FloatArray) -> Iterator[tuple[int, int]]:
     """Pairs of ends that look at each other across a passage, the nearest first, each end once."""
     if len(middles) < 2:
         return
     across = middles[None, :, :] - middles[:, None, :]
-    ahead = np.einsum("ijk,ik->ij", across, ways)
-    aside = np.abs(across[..., 0] * ways[:, None, 1] - across[..., 1] * ways[:, None, 0])
-    facing = (ways @ ways.T < -0.95) & (ahead >= PASSAGE[0]) & (ahead <= PASSAGE[1]) & (aside <= 0.1)
+    ahead = np.einsum("ijk,ik->ij", across, directions)
+    aside = np.abs(across[..., 0] * directions[:, None, 1] - across[..., 1] * directions[:, None, 0])
+    facing = (
+        (directions @ directions.T < -0.95) & (ahead >= PASSAGE[0]) & (ahead <= PASSAGE[1]) & (aside <= 0.1)
+    )
     one, other = np.nonzero(np.triu(facing | facing.T, 1) & facing & facing.T)
     used: set[int] = set()
     for k in np.lexsort((other, one, ahead[one, other])).tolist():

@@ -1,4 +1,4 @@
-"""Makes solid walls of line work: what lies between two lines of a wall is filled, the rest stays a line."""
+"""Solid walls from line work: the area between two lines of a wall is filled, the rest stays lines."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ THICKEST = 1.0
 """So is one up to this wide that is many times as long."""
 _LONG = 5.0
 _FILLED = 1.6
-"""What is hatched or filled on a wall's layer is a wall up to this thickness in metres."""
+"""A hatched or filled area on a wall's layer is a wall up to this thickness in metres."""
 _BY_WALLS = 0.55
 """A wall's inside is bounded by wall lines along at least this share; an opening is not."""
 _MEETS = 0.05
@@ -53,7 +53,7 @@ class SolidWalls:
         return shapely.union_all([*self.solids, *shapely.buffer(list(self.lines), _ON, cap_style="square")])
 
     def without(self, places: Sequence[shapely.Polygon]) -> SolidWalls:
-        """The walls where nothing stands in `places`."""
+        """Return the walls without the areas in `places`."""
         if not places:
             return self
         gone = shapely.union_all(list(places))
@@ -121,23 +121,23 @@ def _segments(lines: Sequence[FloatArray]) -> FloatArray:
 
 def _bridges(drawn: FloatArray) -> FloatArray:
     """Segments (n, 2, 2) from free ends to what they nearly meet, and across open ends of double lines."""
-    ends, way = _free_ends(drawn)
+    ends, direction = _free_ends(drawn)
     if not len(ends):
         return np.empty((0, 2, 2))
     met, near = _to_lines(ends, drawn)
-    caps = _caps(ends[~met], way[~met])
+    caps = _caps(ends[~met], direction[~met])
     return np.concatenate([near, caps])
 
 
 def _free_ends(drawn: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Ends (n, 2) that touch no other segment, and the directions (n, 2) in which their lines end there."""
     ends = np.concatenate([drawn[:, 1], drawn[:, 0]])
-    way = np.concatenate([drawn[:, 1] - drawn[:, 0], drawn[:, 0] - drawn[:, 1]])
-    way = way / np.hypot(*way.T)[:, None]
+    direction = np.concatenate([drawn[:, 1] - drawn[:, 0], drawn[:, 0] - drawn[:, 1]])
+    direction = direction / np.hypot(*direction.T)[:, None]
     tree = shapely.STRtree(shapely.linestrings(drawn))
     point, _ = tree.query(shapely.points(ends), predicate="dwithin", distance=_GRID)
     free = np.bincount(point, minlength=len(ends)) <= 1
-    return ends[free], way[free]
+    return ends[free], direction[free]
 
 
 def _to_lines(ends: FloatArray, drawn: FloatArray) -> tuple[BoolArray, FloatArray]:
@@ -155,7 +155,7 @@ def _to_lines(ends: FloatArray, drawn: FloatArray) -> tuple[BoolArray, FloatArra
     return met, shapely.get_coordinates(across).reshape(-1, 2, 2)
 
 
-def _caps(ends: FloatArray, way: FloatArray) -> FloatArray:
+def _caps(ends: FloatArray, direction: FloatArray) -> FloatArray:
     """Segments that close double lines which simply end, side by side, such as at a door."""
     if len(ends) < 2:
         return np.empty((0, 2, 2))
@@ -165,8 +165,8 @@ def _caps(ends: FloatArray, way: FloatArray) -> FloatArray:
     one, other = pairs.T
     across = ends[other] - ends[one]
     width = np.hypot(*across.T)
-    along = np.abs(np.einsum("ij,ij->i", across, way[one])) / width
-    alike = np.einsum("ij,ij->i", way[one], way[other]) > 0.99
+    along = np.abs(np.einsum("ij,ij->i", across, direction[one])) / width
+    alike = np.einsum("ij,ij->i", direction[one], direction[other]) > 0.99
     good = alike & (along < 0.1) & (width > 0.03)
     best: dict[int, int] = {}
     for k in np.flatnonzero(good)[np.argsort(width[good], kind="stable")].tolist():
@@ -177,7 +177,7 @@ def _caps(ends: FloatArray, way: FloatArray) -> FloatArray:
 
 
 def _is_inside(faces: NDArray[np.object_], own: Region) -> BoolArray:
-    """Which faces are the inside of a wall: narrow, and wall lines nearly all round."""
+    """True for each face that is the inside of a wall: narrow, and almost surrounded by wall lines."""
     narrow = shapely.is_empty(shapely.buffer(faces, -THICK / 2, quad_segs=2))
     length = shapely.length(faces) / 2
     long = (length > _LONG * THICKEST) & shapely.is_empty(shapely.buffer(faces, -THICKEST / 2, quad_segs=2))
@@ -190,7 +190,7 @@ def _is_inside(faces: NDArray[np.object_], own: Region) -> BoolArray:
 
 
 def _share(faces: NDArray[np.object_], own: Region) -> FloatArray:
-    """The share of each face's outline that is a wall's line (n,)."""
+    """Fraction of each face's outline that is a wall's line (n,)."""
     rings, face = shapely.get_parts(shapely.boundary(faces), return_index=True)
     xy, ring = shapely.get_coordinates(rings, return_index=True)
     inner = ring[:-1] == ring[1:]
@@ -217,8 +217,8 @@ def caps_of(shape: Region) -> tuple[FloatArray, FloatArray, FloatArray]:
     found = [_caps_of_ring(ring) for part in polygons_of(shape) for ring in _rings(part)]
     if not found:
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0)
-    middles, ways, widths = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return middles, ways, widths
+    middles, directions, widths = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return middles, directions, widths
 
 
 def _rings(part: shapely.Polygon) -> list[FloatArray]:
@@ -229,13 +229,13 @@ def _rings(part: shapely.Polygon) -> list[FloatArray]:
 def _caps_of_ring(ring: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     edge = np.roll(ring, -1, axis=0) - ring
     length = np.hypot(*edge.T)
-    way = edge / length[:, None]
-    before, after = np.roll(way, 1, axis=0), np.roll(way, -1, axis=0)
+    direction = edge / length[:, None]
+    before, after = np.roll(direction, 1, axis=0), np.roll(direction, -1, axis=0)
     # Solid lies to the left: an end turns left on both sides.
-    left = (_cross(before, way) > 0.7) & (_cross(way, after) > 0.7)
+    left = (_cross(before, direction) > 0.7) & (_cross(direction, after) > 0.7)
     end = left & (length > 0.03) & (length <= THICKEST)
     middles = ring[end] + edge[end] / 2
-    return middles, np.stack([way[end][:, 1], -way[end][:, 0]], axis=1), length[end]
+    return middles, np.stack([direction[end][:, 1], -direction[end][:, 0]], axis=1), length[end]
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

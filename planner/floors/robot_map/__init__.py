@@ -1,6 +1,6 @@
-"""Reads a robot's map, a ROS map.yaml with its picture, as a floor in the map's own frame.
+"""Reader of robots' maps: a ROS map.yaml with its picture becomes a floor in the map's own frame.
 
-Occupied cells become walls, or obstacles where they are too small for one; what nobody knows is not floor.
+Occupied cells become walls, or obstacles where they are too small for one; unknown cells are not floor.
 The coordinates are those of the map, so that stops are where the robot takes them to be.
 """
 
@@ -35,9 +35,9 @@ from stopgo.planner.floors.strokes import Stroke
 from stopgo.planner.floors.survey import FloorChoice, Survey
 
 LEAST_WALL = 0.5
-"""Occupied cells that hang together over less than this, in metres, are an obstacle and no wall."""
+"""A connected group of occupied cells smaller than this, in metres, is an obstacle and not a wall."""
 LEAST_FLOOR = 1.0
-"""Free cells that hang together in less than this, in m², are no floor."""
+"""A connected group of free cells smaller than this, in m², is not floor."""
 _EIGHT = np.ones((3, 3), dtype=bool)
 
 
@@ -49,12 +49,12 @@ class _Grid:
     specks: NDArray[np.bool_]
     """Small obstacles."""
     floor: NDArray[np.bool_]
-    """Free cells and what stands on them."""
+    """Free cells and the obstacles on them."""
     findings: tuple[Finding, ...]
 
 
 def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
-    """The floor that a robot's map shows.
+    """Read the floor that a robot's map shows.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def read(file: FloorFile, options: FloorOptions) -> FloorPlan:
 
 
 def survey(file: FloorFile, options: FloorOptions) -> Survey:
-    """What a robot's map holds."""
+    """Return the survey of a robot's map."""
     description, picture = _opened(file)
     floor = read(file, options)
     cells = description.cells(read_picture(picture, name=description.image))
@@ -110,14 +110,14 @@ def survey(file: FloorFile, options: FloorOptions) -> Survey:
 
 
 def _opened(file: FloorFile) -> tuple[MapDescription, bytes]:
-    """The description, and the bytes of its picture, which lies beside it."""
+    """Return the description, and the bytes of its picture in the same folder."""
     description = read_description(file.data, name=str(file.path))
     path = file.path.parent / description.image
     try:
         return description, path.read_bytes()
     except (OSError, ValueError):
         raise InputError(
-            f"{file.path}: its image {description.image} cannot be read; put it beside the file, "
+            f"{file.path}: its image {description.image} cannot be read; put it in the same folder, "
             "or write where it is"
         ) from None
 
@@ -136,7 +136,7 @@ def _grid(description: MapDescription, picture: bytes, path: Path) -> _Grid:
 
 
 def _largest_floors(cells: NDArray[np.uint8], description: MapDescription, path: Path) -> NDArray[np.bool_]:
-    """Free cells that hang together, lone unknown ones among them, and the occupied cells beside them."""
+    """Connected free cells, with single unknown cells among them, and the adjacent occupied cells."""
     free = cells == FREE
     others = ndimage.convolve((~free).astype(np.uint8), _EIGHT.astype(np.uint8), mode="constant", cval=1)
     lone = (cells == UNKNOWN) & (others == 1)
@@ -150,8 +150,8 @@ def _largest_floors(cells: NDArray[np.uint8], description: MapDescription, path:
             "check image, negate, mode and the thresholds"
         )
     standing, _ = ndimage.label((cells == OCCUPIED) | kept, _EIGHT)
-    beside = np.unique(standing[kept])
-    return kept | (np.isin(standing, beside) & (cells == OCCUPIED))
+    adjacent = np.unique(standing[kept])
+    return kept | (np.isin(standing, adjacent) & (cells == OCCUPIED))
 
 
 def _small(occupied: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
@@ -166,7 +166,7 @@ def _small(occupied: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
 
 
 def _strokes(mask: NDArray[np.bool_], role: str, description: MapDescription) -> list[Stroke]:
-    """The outlines of cells as closed strokes; holes go round the other way."""
+    """Outlines of cells as closed strokes; holes have the opposite direction."""
     shapes = shapely.orient_polygons(smoothed(polygons_of_cells(mask)))
     return [
         Stroke(_ring(ring, description), "map", role, closed=True, fill=role != "floor")

@@ -1,4 +1,4 @@
-"""Makes polygons of the cells of a grid: exactly their outline, or smoothed within the size of a cell."""
+"""Polygons of the cells of a grid: their exact outline, or smoothed within the size of a cell."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reads the map.yaml of a robot's map: which picture it is, how large a pixel, where, and what grey means."""
+"""Description of a robot's map in its map.yaml: picture, pixel size, origin, and meaning of grey values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MODES = ("trinary", "scale", "raw")
 
 @dataclass(frozen=True)
 class MapDescription:
-    """What map_server reads of a map.yaml."""
+    """The values of a map.yaml that map_server reads."""
 
     image: str
     resolution: float
@@ -34,7 +34,7 @@ class MapDescription:
     def cells(self, picture: GreyPicture) -> NDArray[np.uint8]:
         """FREE, UNKNOWN or OCCUPIED for each pixel (rows, columns), the first row at the bottom.
 
-        What `scale` and `raw` call more or less occupied is unknown: nobody drives there, nobody measures it.
+        Values between free and occupied of `scale` and `raw` are unknown: not drivable and not a target.
         """
         grey = picture.grey.astype(np.float64)
         known = picture.opaque

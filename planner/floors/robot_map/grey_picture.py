@@ -1,4 +1,4 @@
-"""Reads the pictures that robots keep maps in: PGM and PNG, as one grey value and one opacity per pixel."""
+"""Reader of the pictures of robots' maps: PGM and PNG, as one grey value and one opacity per pixel."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class GreyPicture:
     grey: GreyBytes
     """(rows, columns), 0 black to 255 white; colours by their mean."""
     opaque: NDArray[np.bool_]
-    """(rows, columns): whether anything is drawn there."""
+    """(rows, columns): True where anything is drawn."""
 
 
 def read_picture(data: bytes, *, name: str) -> GreyPicture:

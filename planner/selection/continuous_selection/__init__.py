@@ -25,7 +25,7 @@ from stopgo.planner.selection.continuous_selection.cells import CellVisibility, 
 from stopgo.planner.selection.continuous_selection.prices import Prices, WantedUnits, prices_of
 from stopgo.planner.selection.demands import demands_of
 from stopgo.planner.selection.refine import joined, taken, with_rows
-from stopgo.planner.space.place import Place
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 from stopgo.planner.visibility import visibility
 from stopgo.planner.visibility.unit_ranges import ranges
 
@@ -93,7 +93,7 @@ class _CellSearch:
         self._seen, self._known = seen, seen
         self._asked, self.fixed = _asked(seen)
         self._overlook = CellVisibility(seen.candidates)
-        self._place = Place(seen.candidates.space)
+        self._place = StopFeasibility(seen.candidates.space)
         self._cells = self._overlook.whole()
         self._prices: Prices | None = None
         self.bound = 0

@@ -24,8 +24,8 @@ from stopgo.planner.selection.continuous_selection.cell_kernel import (
     overlook_all,
     part_too_far,
 )
-from stopgo.planner.space.place import Place
 from stopgo.planner.space.reach import reach_of
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 from stopgo.planner.visibility.exact_sight import open_space
 from stopgo.planner.visibility.sight.kernel import (
     clip_reach,
@@ -112,7 +112,7 @@ class CellVisibility:
         space = candidates.space
         self._space, self._settings, self._part = space, space.settings, candidates.chosen_part
         self._origin, self._targets = local_origin(space.floor), space.targets
-        self._place, self._reach = Place(space), reach_of(space)
+        self._place, self._reach = StopFeasibility(space), reach_of(space)
         a, b = self._targets.a - self._origin, self._targets.b - self._origin
         self._scene = scene_of(open_space(candidates), a, b, self._targets.units, self._targets.occluding)
         self._limits = limits_of(self._settings)

@@ -20,7 +20,7 @@ from stopgo.planner.selection.continuous_selection.cells import CellVisibility, 
 from stopgo.planner.selection.cover import cover_of
 from stopgo.planner.selection.demands import Demands, demands_of
 from stopgo.planner.space.navigable import navigable
-from stopgo.planner.space.place import Place
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 from stopgo.planner.visibility import visibility
 from tests.faults.sizes import size
 from tests.planner.worlds import column, hall, two_rooms
@@ -43,7 +43,7 @@ def places_in(found: Candidates, count: int, seed: int) -> Candidates:
     """Places drawn at random where a stop may be."""
     space = found.space
     xy = np.random.default_rng(seed).uniform(0, 9, size=(count, 2))
-    place = Place(space)
+    place = StopFeasibility(space)
     room = np.array([place.room_at(point) for point in xy])
     return judged(space, xy, room, part=found.chosen_part)
 
@@ -98,7 +98,7 @@ def test_no_choice_of_many_places_beats_the_bound(seed: int) -> None:
 
 
 def meets(tried: Visibility, rows: tuple[int, ...], demands: Demands, needed: IntArray) -> bool:
-    """Whether these places see what is needed."""
+    """True if these positions see the required units."""
     got = np.zeros(tried.targets.total, dtype=bool)
     for row in rows:
         got[tried.seen_by(row)] = True

@@ -28,7 +28,7 @@ from stopgo.planner.candidates.triangulation import (
 )
 from stopgo.planner.geometry.shapes import segments_of
 from stopgo.planner.space.navigable import navigable
-from stopgo.planner.space.place import Place
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 from tests.faults.sizes import size
 from tests.planner.worlds import (
     SHARED,
@@ -92,14 +92,14 @@ def test_dropped_triangles_say_why() -> None:
 
 def test_without_rooms_seeds_are_contour_and_column_centres() -> None:
     floor = floor_of(box(0, 0, 8, 6), elements=[column("a", 3, 3), column("b", 5, 3)])
-    place = Place(navigable(floor, Settings(edge=0)))
+    place = StopFeasibility(navigable(floor, Settings(edge=0)))
     seeds = distinct(seeds_of(place.rooms[0], DrawnBoundary.of(place), d_max=100))
     assert np.round(seeds, 6).tolist() == [[0, 0], [0, 6], [3, 3], [5, 3], [8, 0], [8, 6]]
 
 
 def test_with_rooms_seeds_are_corners_and_centres_of_round_elements() -> None:
     floor = hall(8, 6, column("square", 2, 3), element("round", "columns", round_column(6, 3)))
-    place = Place(navigable(floor, Settings()))
+    place = StopFeasibility(navigable(floor, Settings()))
     seeds = distinct(seeds_of(place.rooms[0], DrawnBoundary.of(place), d_max=100))
     inside = [p for p in seeds if 0.5 < p[0] < 7.5]
     local = [(round(x - 0.2, 3), round(y - 0.2, 3)) for x, y in inside]
@@ -233,7 +233,7 @@ def test_counts_stay_near_the_paper_s(name: str, paper: tuple[int, int], ours: t
 
 def test_rooms_are_split_along_their_own_contour_only() -> None:
     """Walls between two rooms belong to both, and far walls to neither."""
-    place = Place(navigable(two_rooms(1.0), Settings()))
+    place = StopFeasibility(navigable(two_rooms(1.0), Settings()))
     seeds = seeds_of(place.rooms[0], DrawnBoundary.of(place), d_max=1.0)
     around = shapely.LineString(segments_of(place.rooms[0]).reshape(-1, 2))
     assert shapely.distance(shapely.points(seeds), around).max() < 2e-3

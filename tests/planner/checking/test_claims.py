@@ -1,4 +1,4 @@
-"""What a mission claims its stops see, counted anew: a plan's claims hold, and what is more is told."""
+"""Recount of a mission's coverage claims: a plan's claims hold, and excess claims are reported."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def test_candidates_of_another_program_are_not_loaded() -> None:
     found = recount(mission, replace(space, settings=settings))
     assert found.visible is None
     assert found.as_json()["share"] is None
-    assert "of how many is not known: candidates = tests.planner.no_such_module:generate" in found.in_words()
+    assert "total unknown: candidates = tests.planner.no_such_module:generate" in found.in_words()
     assert list(overclaims(mission, found, None)) == []
 
 

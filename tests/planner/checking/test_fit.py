@@ -1,4 +1,4 @@
-"""Whether a mission fits a floor: what planning makes fits, and what is moved is told with its distance."""
+"""Fit of a mission on a floor: a plan fits, and a moved stop is reported with its distance."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_a_way_keeps_the_robots_radius_from_elements_exactly() -> None:
     assert told(floor, driven((1.0, 1.0), (1.0, 1.45), (5.0, 1.45), (5.0, 1.0))) == []
     (problem,) = told(floor, driven((1.0, 1.0), (1.0, 1.451), (5.0, 1.451), (5.0, 1.0)))
     assert problem.startswith(
-        "$.stops[0].approach[2]: the way from (1.000, 1.451) to (5.000, 1.451) is 0.349 m from pillar at "
+        "$.stops[0].approach[2]: the segment from (1.000, 1.451) to (5.000, 1.451) is 0.349 m from pillar at "
     )
     assert problem.endswith("less than 0.350 m")
 
@@ -95,16 +95,16 @@ def test_the_robot_that_is_sent_decides_if_it_is_the_wider_one() -> None:
 def test_a_door_too_narrow_is_no_way() -> None:
     (problem,) = told(two_rooms(0.69), driven((2.0, 2.0), (6.0, 2.0)))
     assert problem.startswith(
-        "$.stops[0].approach[1]: the way from (2.000, 2.000) to (6.000, 2.000) is 0.000 m"
+        "$.stops[0].approach[1]: the segment from (2.000, 2.000) to (6.000, 2.000) is 0.000 m"
     )
     assert "from door d (0.690 m clear, less than door_access 0.700 m)" in problem
 
 
 def test_a_way_off_the_floor_is_told() -> None:
     (stop, leg) = told(hall(6, 4), driven((3.0, 2.0), (3.0, 9.0)))
-    assert stop == "$.stops[0]: s1 at (3.000, 9.000) is off the floor: (3.000, 9.000) lies 5.000 m beside it"
+    assert stop == "$.stops[0]: s1 at (3.000, 9.000) is off the floor: (3.000, 9.000) lies 5.000 m outside it"
     assert leg.startswith(
-        "$.stops[0].approach[1]: the way from (3.000, 2.000) to (3.000, 9.000) is off the floor"
+        "$.stops[0].approach[1]: the segment from (3.000, 2.000) to (3.000, 9.000) is off the floor"
     )
 
 
@@ -121,7 +121,7 @@ def test_a_place_deep_within_an_element_is_told() -> None:
     floor = floor_of(box(0, 0, 20, 10), elements=(element("core", "walls", box(5, 0, 15, 10)),))
     assert told(floor, driven((10.0, 5.0))) == [
         "$.stops[0]: s1 at (10.000, 5.000) lies within core",
-        "$.stops[0].approach[0]: the way from (10.000, 5.000) to (10.000, 5.000) lies within core",
+        "$.stops[0].approach[0]: the segment from (10.000, 5.000) to (10.000, 5.000) lies within core",
     ]
 
 

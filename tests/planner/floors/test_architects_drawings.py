@@ -334,7 +334,7 @@ def test_a_drawing_in_which_nothing_tells_walls_is_refused(tmp_path: Path) -> No
     drawing = new_drawing()
     flat(drawing.modelspace(), walls="0", doors="0")
     with pytest.raises(
-        InputError, match="nothing tells walls from other lines; ask for an export with layers"
+        InputError, match="walls cannot be distinguished from other lines; ask for an export with layers"
     ):
         read(drawing, tmp_path)
     is_the_flat(read(drawing, tmp_path, layers={"0": "walls"}))

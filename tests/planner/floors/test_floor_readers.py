@@ -31,7 +31,7 @@ def test_a_file_of_no_known_kind_is_refused_by_name(tmp_path: Path) -> None:
 
 
 def test_an_option_that_means_nothing_is_refused() -> None:
-    with pytest.raises(InputError, match=r"--storey means nothing for a DXF drawing; leave it out \(known"):
+    with pytest.raises(InputError, match=r"--storey does not apply to a DXF drawing; remove it \(known"):
         read_floor(OFFICE, FloorOptions(storey="EG"))
 
 

@@ -81,7 +81,7 @@ def test_rooms_that_cannot_see_one_another_are_told_with_a_way_out() -> None:
     assert network is not None
     assert len(apart) == len(network.pieces) - 1 > 0
     assert "spheres" in apart[0].message
-    assert report.strict_answer == 1
+    assert report.strict_exit_code == 1
     assert "COMPONENTS" in report.as_text()
 
 
@@ -92,7 +92,7 @@ def test_a_plan_that_nobody_asked_to_register_tells_into_how_many_pieces_its_sca
     assert len(joined.pieces) > 1
     assert told.message.startswith(f"the scans fall into {len(joined.pieces)} pieces that no overlap joins")
     assert told.message in report.as_text()
-    assert report.strict_answer == 0, "a surveyor may have spheres"
+    assert report.strict_exit_code == 0, "a surveyor may have spheres"
 
 
 def test_a_plan_whose_scans_join_anyway_says_nothing() -> None:

@@ -1,4 +1,4 @@
-"""What coverage counts, and that no room and no kind of element is given up for the sake of the whole."""
+"""Counting of coverage: no room and no kind of element is neglected for the whole."""
 
 from __future__ import annotations
 

@@ -275,5 +275,5 @@ def test_the_coverage_of_a_mission_is_its_own() -> None:
 def test_no_further_mission_is_planned_for_one_share() -> None:
     share = settled("hall", robots=2).shares[1]
     known = PlannedFloor(share.floor, share.space.settings, share.mission)
-    with pytest.raises(InputError, match="shares its floor with 1 more"):
+    with pytest.raises(InputError, match="divides its floor with 1 more"):
         top_up(known, np.empty((0, 3)))

@@ -1,4 +1,4 @@
-"""What is not seen well enough counts as not seen, wherever it is asked; and what that costs."""
+"""Limits on views: a view outside the limits does not count in any figure; and their cost."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_no_set_of_candidates_is_smaller_than_the_bound(views: int) -> None:
 
 
 def enough(counts: np.ndarray, seen: Visibility, settings: Settings) -> bool:
-    """Whether the shares of the whole, of the room and of every kind are met."""
+    """True if the coverage of the whole, of the room and of every kind is met."""
     space, targets = seen.candidates.space, seen.targets
     kinds = np.array([item.kind for item in space.floor.elements])[targets.element][targets.unit_segment]
     groups = [(np.ones(targets.total, bool), settings.coverage), (space.unit_room == 0, 0.7)]
@@ -157,7 +157,7 @@ def test_what_cannot_be_seen_as_asked_is_told_and_strict_refuses_it() -> None:
     made = plan(closet, Settings(views=9)).first
     assert [item.code for item in made.figures.grave] == ["limits_not_met"]
     assert "from 9 stops" in made.figures.grave[0].message
-    assert PlanReport(made, {}, {}).strict_answer == 1
+    assert PlanReport(made, {}, {}).strict_exit_code == 1
     assert made.figures.whole.coverage >= 0.9
 
 

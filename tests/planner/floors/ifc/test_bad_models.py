@@ -1,4 +1,4 @@
-"""What is no model, or a damaged one: one line that names the file and the way out; the rest goes on."""
+"""Files that are not models, or damaged: one line names the file and the remedy; the rest is read."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def test_the_drawing_of_a_storey_is_the_same_floor(
 
 
 def two_rooms_again(path: Path) -> Any:
-    """What `read` takes for a house: the file that is there already, as it is."""
+    """Argument of `read` for a house: the file that exists already, unchanged."""
 
     class Written:
         def write(self, _: Path) -> Path:

@@ -1,4 +1,4 @@
-"""What is built on a day stands and is scanned, what is begun is in the way, what is to come is not there."""
+"""Status on a day: finished elements are scanned, started ones are obstacles, later ones are absent."""
 
 from __future__ import annotations
 

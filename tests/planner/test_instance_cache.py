@@ -1,4 +1,4 @@
-"""What is worked out of a noun is kept with it, and with nothing else."""
+"""Instance cache: a derived value is stored with its instance only."""
 
 from __future__ import annotations
 

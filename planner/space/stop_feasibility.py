@@ -1,4 +1,4 @@
-"""Whether a stop may be at a point: decided by exact distances, with the reason where it may not."""
+"""Feasibility of stop positions: decided by exact distances, with the reason where a stop is not allowed."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from stopgo.mission.stages import AT_EDGE, AVOIDED, IN_HOLE, KEPT, OUTSIDE, TOO_
 from stopgo.planner.geometry.shapes import SLACK, boundary_lines, local_origin, to_shape
 
 
-class Place:
-    """A navigable space, prepared for asking about many points."""
+class StopFeasibility:
+    """A navigable space, prepared for deciding at which positions a stop is allowed."""
 
     def __init__(self, space: NavigableSpace) -> None:
         self.space = space
@@ -32,7 +32,7 @@ class Place:
         return max(self.space.settings.d_sec, self.space.settings.radius)
 
     def reasons(self, xy: FloatArray, room: IntArray) -> IntArray:
-        """Index into DROP_REASONS for each point (n, 2) in the drawing's coordinates."""
+        """Index into DROP_REASONS for each position (n, 2) in the drawing's coordinates."""
         local = np.asarray(xy, dtype=np.float64).reshape(-1, 2) - self.origin
         points = shapely.points(local)
         in_room = np.array(
@@ -50,14 +50,14 @@ class Place:
         ).astype(np.int64)
 
     def avoided(self, xy: FloatArray) -> BoolArray:
-        """Whether each point (n, 2) lies in a circle that the user wants no stop in."""
+        """True for each point (n, 2) in a circle where the user allows no stop."""
         inside = np.zeros(len(xy), dtype=bool)
         for x, y, radius in self.space.settings.avoid:
             inside |= np.hypot(xy[:, 0] - x, xy[:, 1] - y) <= radius
         return inside
 
     def room_at(self, xy: FloatArray) -> int:
-        """The room nearest a point, by the order of rooms where several are."""
+        """Number of the room nearest to a point; of several, the first."""
         point = shapely.Point(xy - self.origin)
         return int(np.argmin([room.distance(point) for room in self.rooms]))
 

@@ -1,4 +1,4 @@
-"""Which pieces of the drive area are connected, by the crossings between them."""
+"""Connected parts of the drive area, joined by the gap crossings between its pieces."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from stopgo.planner.geometry.shapes import GRID, polygon_parts
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Pieces of the drive area and the connected part each belongs to, looked up by triangles."""
+    """Pieces of the drive area with the connected part of each; points are looked up by triangles."""
 
     pieces: tuple[BaseGeometry, ...]
     part: IntArray
@@ -42,8 +42,8 @@ class Parts:
         points = shapely.points(xy)
         point, cell = self.tree.query(points, predicate="dwithin", distance=GRID)
         found[point] = self.cell_part[cell]
-        for way, part in zip(self.gaps, self.gap_part, strict=True):
-            found[shapely.dwithin(shapely.LineString(way), points, GRID)] = part
+        for crossing, part in zip(self.gaps, self.gap_part, strict=True):
+            found[shapely.dwithin(shapely.LineString(crossing), points, GRID)] = part
         return found
 
     def touching(self, line: BaseGeometry) -> set[int]:
@@ -69,7 +69,7 @@ def parts_of(drive_area: BaseGeometry, gaps: FloatArray) -> Parts:
     cells = np.concatenate([np.empty(0, dtype=object), *triangles])
     piece_of = np.repeat(np.arange(len(pieces)), [len(some) for some in triangles]).astype(np.int64)
     tree = shapely.STRtree(cells)
-    nodes = _nodes(len(pieces), tree, piece_of, gaps)
+    nodes = _end_nodes(len(pieces), tree, piece_of, gaps)
     total = int(max(len(pieces), nodes.max(initial=-1) + 1))
     links = coo_array((np.ones(len(nodes)), (nodes[:, 0], nodes[:, 1])), shape=(total, total))
     labels = connected_components(links, directed=False)[1] if total else np.empty(0, np.int64)
@@ -85,8 +85,8 @@ def parts_of(drive_area: BaseGeometry, gaps: FloatArray) -> Parts:
     )
 
 
-def _nodes(pieces: int, tree: shapely.STRtree, piece_of: IntArray, gaps: FloatArray) -> IntArray:
-    """Both ends of each crossing as numbers (k, 2): the piece they lie in, else a number of their own."""
+def _end_nodes(pieces: int, tree: shapely.STRtree, piece_of: IntArray, gaps: FloatArray) -> IntArray:
+    """Node numbers of both ends of each crossing (k, 2): the piece they lie in, else a new number."""
     _, own = np.unique(gaps.reshape(-1, 2), axis=0, return_inverse=True)
     nodes = own.reshape(-1) + pieces
     point, cell = tree.query(shapely.points(gaps.reshape(-1, 2)), predicate="dwithin", distance=GRID)

@@ -1,4 +1,4 @@
-"""What the robot gets through: decided by distances, exactly, whatever the walls look like."""
+"""Passable openings and gaps: decided by exact distances, for walls of any shape."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def state(floor: FloorPlan, settings: Settings | None = None) -> OpeningState:
 
 
 WALLS = list(product((0.02, 0.1, 0.24, 0.6), (0.6, 2.0, 3.213), (0.0, 17.0, 30.0, 45.0, 90.0)))
-"""How thick a wall is, where its opening is, and how it is turned."""
+"""Thickness of a wall, position of its opening, and angle."""
 
 
 @pytest.mark.parametrize(("thick", "at", "degrees"), some(WALLS, every=4))

@@ -1,4 +1,4 @@
-"""Which openings the robot gets through, to what lies on both sides, and what is in its way."""
+"""Openings that the robot can pass to the rooms on both sides, and the obstacle where it cannot."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from stopgo.mission.geometry import FloatArray
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import OpeningState
 from stopgo.planner.geometry.shapes import HAIRLINE, SLACK, boundary_lines, polygon_parts, to_shape, widened
-from stopgo.planner.space.connected import Parts, parts_of
+from stopgo.planner.space.connected_parts import Parts, parts_of
 from stopgo.planner.space.gaps import Gap, gaps_between
 from stopgo.planner.space.ground import Ground
 from stopgo.planner.space.opening_joins import Crossing, middle_and_normal
 from stopgo.planner.space.targets import LINE_WALL, solid_of
 
 NEAR_OPENING = 1.6
-"""How far from an opening (m) the obstacle that blocks it is looked for."""
-REACHED_SHARE = 0.2
-"""An opening leads somewhere if it reaches this share of where the robot may drive there …"""
+"""Distance from an opening (m) within which the obstacle that blocks it is searched."""
+REACHED_FRACTION = 0.2
+"""An opening leads to a room if it reaches this fraction of the drive area there …"""
 REACHED_AREA = 0.5
 """… or at least this much of it (m²)."""
 
@@ -34,16 +34,16 @@ REACHED_AREA = 0.5
 def opening_states(
     ground: Ground, drive_area: BaseGeometry, gaps: FloatArray, settings: Settings
 ) -> tuple[tuple[OpeningState, ...], tuple[Finding, ...]]:
-    """What each opening is to the robot, and a finding for each inner one it cannot pass."""
+    """Return the state of each opening for the robot, and a finding for each inner one it cannot pass."""
     parts = parts_of(drive_area, gaps)
 
     @cache
-    def led_into(room: int | None) -> OpeningSide:
-        return _led_into(room, parts, ground)
+    def side_of(room: int | None) -> OpeningSide:
+        return _opening_side(room, parts, ground)
 
     states, findings = [], []
     for crossing in ground.crossings:
-        sides = [] if crossing.closed_because else [led_into(room) for room in crossing.rooms]
+        sides = [] if crossing.closed_because else [side_of(room) for room in crossing.rooms]
         why = crossing.closed_because or _not_reached(crossing, parts, sides, ground, settings)
         states.append(OpeningState(crossing.opening, crossing.rooms, crossing.width, not why, why))
         if why and not why.startswith("exterior"):
@@ -61,39 +61,39 @@ def _opening_finding(crossing: Crossing, why: str, ground: Ground) -> Finding:
 
 @dataclass(frozen=True)
 class OpeningSide:
-    """What lies on one side of an opening."""
+    """The room, or the floor outside every room, on one side of an opening."""
 
     shape: BaseGeometry
     main: frozenset[int]
-    """Parts that make up a good share of where the robot may drive there."""
+    """Parts that make up a large fraction of the drive area there."""
 
 
-def _led_into(room: int | None, parts: Parts, ground: Ground) -> OpeningSide:
-    """A room, or for None the floor outside every room."""
+def _opening_side(room: int | None, parts: Parts, ground: Ground) -> OpeningSide:
+    """Return the side of an opening that is a room, or for None the floor outside every room."""
     if room is None:
         rooms = [to_shape(item.polygons, ground.origin) for item in ground.floor.rooms]
         shape = ground.outline.difference(shapely.union_all(rooms))
     else:
         shape = to_shape(ground.floor.rooms[room].polygons, ground.origin)
     free = parts.area_by_part(shape)
-    enough = min(REACHED_AREA, REACHED_SHARE * sum(free.values()))
+    enough = min(REACHED_AREA, REACHED_FRACTION * sum(free.values()))
     return OpeningSide(shape, frozenset(part for part, area in free.items() if area >= enough and area > 0))
 
 
 def _not_reached(
     crossing: Crossing, parts: Parts, sides: Sequence[OpeningSide], ground: Ground, settings: Settings
 ) -> str:
-    """Why the robot does not get from the opening to what lies on both sides; empty if it does."""
+    """Reason why the robot cannot drive from the opening to both sides; empty if it can."""
     here = parts.touching(crossing.clear)
     if here and all(here & side.main or not side.main for side in sides):
         return ""
-    return _narrowest(crossing, parts, sides, ground, settings)
+    return _limiting_gap(crossing, parts, sides, ground, settings)
 
 
-def _narrowest(
+def _limiting_gap(
     crossing: Crossing, parts: Parts, sides: Sequence[OpeningSide], ground: Ground, settings: Settings
 ) -> str:
-    """The place near an opening that is widest among those a robot must pass, in words."""
+    """Describe the gap near an opening that limits the robot's size most."""
     window = shapely.Point(middle_and_normal(crossing.clear)[0]).buffer(NEAR_OPENING)
     walls = ground.walls(settings).near(window)
     gaps = gaps_between(walls, short=-2 * float(walls.clearance.max(initial=0.0)) + 0.05, long=-SLACK)
@@ -103,9 +103,9 @@ def _narrowest(
     def opens(gap: Gap) -> bool:
         return _opens(crossing, cells, ground, window, gap.width / 2 - SLACK)
 
-    widest = bisect_left(gaps, True, key=opens)  # a robot gets wherever a wider one does
+    widest = bisect_left(gaps, True, key=opens)  # a robot can reach every point that a wider robot reaches
     if widest == len(gaps):
-        return f"no place for a robot of radius {settings.radius:.3f} m next to it"
+        return f"no room for a robot of radius {settings.radius:.3f} m next to it"
     gap = gaps[widest]
     names = " and ".join(dict.fromkeys(_owner(walls.segments[k], ground) for k in gap.walls))
     need = float(walls.clearance[list(gap.walls)].sum())
@@ -113,7 +113,7 @@ def _narrowest(
 
 
 def _cells_of(parts: Parts, side: OpeningSide, window: BaseGeometry) -> NDArray[np.object_]:
-    """Where the robot drives on one side near an opening, leaving out pockets it cannot get to."""
+    """Triangles of the drive area on one side near an opening, without pockets that it cannot reach."""
     near = parts.tree.query(side.shape.intersection(window), predicate="intersects")
     return parts.cells[near[np.isin(parts.cell_part[near], sorted(side.main))]]
 
@@ -125,7 +125,7 @@ def _opens(
     window: BaseGeometry,
     radius: float,
 ) -> bool:
-    """Whether a robot of this radius gets from the opening to the cells of both rooms."""
+    """True if a robot of this radius can drive from the opening to the cells on both sides."""
     near = boundary_lines(ground.obstacles.intersection(window))
     free = window.intersection(ground.outline).difference(ground.obstacles)
     free = free.difference(widened(near, radius, quad_segs=16))

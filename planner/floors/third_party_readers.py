@@ -1,4 +1,4 @@
-"""Readers of floors that installed packages bring: entry points in `stopgo.floor`, each a `Reader`."""
+"""Third-party floor readers: entry points of installed packages in `stopgo.floor`, each a `Reader`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from stopgo.planner.floors.reader import Reader
 
 
 def foreign_readers() -> Iterator[Variant[Reader]]:
-    """Each reader that an installed package brings."""
+    """Each reader of an installed third-party package."""
     for name in installed("floor"):
         found: Variant[Reader] = variant("floor", name, {}, said=f"floor reader {name}")
         found.of_kind(found.what, Reader)
@@ -19,7 +19,7 @@ def foreign_readers() -> Iterator[Variant[Reader]]:
 
 
 def sound(reader: Variant[Reader], given: object, digest: str) -> FloorPlan:
-    """What another's reader gives, if it is a floor of this file whose every number is finite."""
+    """Return the result of a third-party reader, if it is a floor of this file with finite numbers only."""
     floor: FloorPlan = reader.of_kind(given, FloorPlan)
     if floor.source.digest != digest:
         raise reader.wrong("gave the floor of another file: its digest is not that of the bytes")

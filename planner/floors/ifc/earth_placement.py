@@ -1,4 +1,4 @@
-"""What an IFC file says of its place on earth, in its own words and units."""
+"""Georeference data of an IFC file, in its own terms and units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When an IFC file says that its products are built: tasks of both schemas, days and phases in properties."""
+"""Construction dates of an IFC file's products: tasks of both schemas, days and phases in properties."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PHASE_NAMES = re.compile(
 )
 REMOVED_NAMES = re.compile(r"^(phase demolished|abbruchphase|phase de démolition)$", re.IGNORECASE)
 NEVER = ("", "none", "keine", "aucun", "<none>")
-"""What a product says of the phase that removes it when none does."""
+"""Value of a product's demolition phase if no phase removes it."""
 DAY = re.compile(r"^\d{4}-\d{2}-\d{2}")
 
 
@@ -54,15 +54,15 @@ def _order(task: Task) -> tuple:
 
 def _of_tasks(model: ifcopenshell.file) -> Iterator[tuple[Any, Task]]:
     for task in model.by_type("IfcTask"):
-        told = _dated_2x3(task) if model.schema == "IFC2X3" else _dated(task)
-        if told is None:
+        dated = _dated_2x3(task) if model.schema == "IFC2X3" else _dated(task)
+        if dated is None:
             continue
         for relation in getattr(task, "OperatesOn", None) or ():
-            yield from ((item, told) for item in relation.RelatedObjects if item.is_a("IfcProduct"))
+            yield from ((item, dated) for item in relation.RelatedObjects if item.is_a("IfcProduct"))
         for relation in getattr(task, "HasAssignments", None) or ():
             product = getattr(relation, "RelatingProduct", None)
             if product is not None and product.is_a("IfcProduct"):
-                yield product, told
+                yield product, dated
 
 
 def _dated(task: Any) -> Task | None:

@@ -1,4 +1,4 @@
-"""Whether a plan is of the floor that is meant: walls that are missing, lines nobody read, floor left out."""
+"""Plausibility of a plan: missing walls, legs over lines that were not read, little floor reached."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from stopgo.mission.stages.figures import LEG_OVER_IGNORED
 from stopgo.planner.geometry.shapes import HAIRLINE, local_origin, to_shape, union
 from stopgo.planner.space.targets import solid_of
 
-BESIDE_WALL = 0.35
+AT_WALL = 0.35
 """A room's outline this close (m) to an element has a wall there."""
 WALLED = 0.3
-"""Share of a room's outline that has walls, below which they are missing …"""
+"""Fraction of a room's outline with walls, below which walls are missing …"""
 MANY = 0.5
-"""… which is grave where it is so for this share of the rooms."""
+"""… which is grave if it applies to this fraction of the rooms."""
 STRAY = 10.0
 """Elements farther than this (m) from the floor do not belong to it."""
 LITTLE = 0.5
-"""Share of the floor below which a plan that reaches no more is doubtful."""
+"""Fraction of the floor; a plan that reaches less is doubtful."""
 OPEN_END = (1e-3, 0.3)
 """Ends of walls drawn as lines that stop this far (m) from another wall leave a gap."""
-BESIDE_LEG = 0.15
-"""A finding this close (m) to where the robot drives bears on the drive."""
+NEAR_LEG = 0.15
+"""A finding this close (m) to the driven strip concerns the drive."""
 
 
-def doubts_of(route: Route, *, reached_m2: float) -> tuple[Finding, ...]:
-    """What is doubtful about a plan, seen as a whole."""
+def plausibility_findings(route: Route, *, reached_m2: float) -> tuple[Finding, ...]:
+    """Return the findings about a plan as a whole."""
     space = route.selection.visibility.candidates.space
     return (
         *over_ignored(space.floor, legs_of(route), stops=len(route.approaches), radius=space.settings.radius),
@@ -45,20 +45,20 @@ def doubts_of(route: Route, *, reached_m2: float) -> tuple[Finding, ...]:
 
 
 def near_legs(findings: Sequence[Finding], route: Route) -> set[int]:
-    """Places in `findings` of those that lie where the robot drives, or right beside it."""
+    """Indices in `findings` of those on the strip that the robot drives over, or close to it."""
     space = route.selection.visibility.candidates.space
     origin, legs = local_origin(space.floor), shapely.union_all(legs_of(route))
-    reach = space.settings.radius + BESIDE_LEG
+    reach = space.settings.radius + NEAR_LEG
     near = set()
     for k, item in enumerate(findings):
-        beside = item.at is not None and legs.distance(shapely.Point(np.array(item.at) - origin)) <= reach
-        if beside or item.code == LEG_OVER_IGNORED:
+        is_near = item.at is not None and legs.distance(shapely.Point(np.array(item.at) - origin)) <= reach
+        if is_near or item.code == LEG_OVER_IGNORED:
             near.add(k)
     return near
 
 
 def legs_of(route: Route) -> tuple[BaseGeometry, ...]:
-    """Every leg in the local frame, the way back last."""
+    """Every leg in the local frame, the return leg last."""
     origin = local_origin(route.selection.visibility.candidates.space.floor)
     legs = route.approaches if route.return_leg is None else (*route.approaches, route.return_leg)
     lines = (leg - origin for leg in legs)
@@ -82,7 +82,7 @@ def over_ignored(
         line, leg = tree.query(lines, predicate="intersects")
         if len(leg):
             first = int(np.lexsort((line, leg))[0])
-            at = _place(lines[line[first]].intersection(swept[leg[first]]), origin)
+            at = _first_corner(lines[line[first]].intersection(swept[leg[first]]), origin)
             names = _named(sorted(set(leg.tolist())), stops)
             message = (
                 f"the robot drives over lines on layer {layer}, which are not read: {names} "
@@ -98,7 +98,7 @@ def _named(legs: Sequence[int], stops: int) -> str:
     return f"leg{'s' * (len(names) > 1)} {', '.join(names[:4])}{more}"
 
 
-def _place(shape: BaseGeometry, origin: FloatArray) -> tuple[float, float]:
+def _first_corner(shape: BaseGeometry, origin: FloatArray) -> tuple[float, float]:
     """The first corner of a shape, in the drawing's metres."""
     x, y = min(map(tuple, shapely.get_coordinates(shape).tolist()))
     return (float(x + origin[0]), float(y + origin[1]))
@@ -110,14 +110,14 @@ def _little_reached(space: NavigableSpace, reached_m2: float) -> Iterator[Findin
         yield Finding(
             "little_reached",
             f"the plan reaches {reached_m2:.1f} m² of {whole:.1f} m² of floor; "
-            "see what is unreached, and why",
+            "see `unreached` for the reasons",
         )
 
 
 def _missing_walls(space: NavigableSpace) -> Iterator[Finding]:
-    """Rooms with hardly a wall around them, which show nothing and hide nothing.
+    """Rooms almost without walls around them; they have no targets and no occluders.
 
-    Shapes on unknown layers do not count: they hide nothing, whatever they are.
+    Shapes on unknown layers do not count: they do not occlude.
     """
     origin = local_origin(space.floor)
     rooms = [room for room in space.rooms if room.room is not None]
@@ -126,7 +126,7 @@ def _missing_walls(space: NavigableSpace) -> Iterator[Finding]:
     known = [
         item for item in space.floor.elements if item.kind != "other" and (item.obstacle or item.occludes)
     ]
-    walls = union([solid_of(item, origin, HAIRLINE) for item in known]).buffer(BESIDE_WALL, quad_segs=2)
+    walls = union([solid_of(item, origin, HAIRLINE) for item in known]).buffer(AT_WALL, quad_segs=2)
     shapely.prepare(walls)
     outlines = [shapely.boundary(to_shape(room.area, origin)) for room in rooms]
     bare = [
@@ -164,7 +164,7 @@ def _stray_elements(floor: FloorPlan) -> Iterator[Finding]:
         away = 0.0 if shape.is_empty else float(shape.distance(outline))
         if away > STRAY:
             message = f"{item.id} lies {away:.0f} m from the floor; is it part of this storey?"
-            yield Finding("stray_element", message, item.id, _place(shape, origin))
+            yield Finding("stray_element", message, item.id, _first_corner(shape, origin))
 
 
 def _wall_gaps(space: NavigableSpace) -> Iterator[Finding]:

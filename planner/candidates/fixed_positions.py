@@ -1,4 +1,4 @@
-"""Positions that do not come from a strategy: doorways, and places the user asks for."""
+"""Positions that do not come from a strategy: doorways, and stops that the user requires."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from stopgo.mission.stages import DROP_REASONS, KEPT, NavigableSpace, OpeningSta
 from stopgo.planner.candidates.proposals import Proposals
 from stopgo.planner.geometry.shapes import local_origin, to_shape
 from stopgo.planner.space.opening_joins import widest_clear
-from stopgo.planner.space.place import Place
+from stopgo.planner.space.stop_feasibility import StopFeasibility
 
 
 def doorways(space: NavigableSpace) -> Proposals:
-    """The middle of every opening the robot drives through, where that is asked for or may join scans."""
+    """Middle of every opening that is driven through, if the settings require it or it may join scans."""
     settings = space.settings
     if not (settings.door_scan or settings.door_candidates or settings.least_overlap > 0):
         return Proposals.of(np.empty((0, 2)), [])
@@ -33,18 +33,22 @@ def _middle(space: NavigableSpace, state: OpeningState, obstacles: shapely.Geome
     return shapely.get_coordinates(widest)[[0, -1]].mean(axis=0) + origin
 
 
-def places_to_use(place: Place) -> Proposals:
-    """The user's own stops.
+def required_stops(feasibility: StopFeasibility) -> Proposals:
+    """Return the stops that the user requires.
 
     Raises
     ------
     InputError
-        Where no stop may be, naming the place and the reason.
+        Where a stop is not allowed; it names the position and the reason.
     """
-    points = np.array(place.space.settings.use, dtype=np.float64).reshape(-1, 2)
-    rooms = [place.room_at(point) for point in points]
+    points = np.array(feasibility.space.settings.use, dtype=np.float64).reshape(-1, 2)
+    rooms = [feasibility.room_at(point) for point in points]
     for point, room in zip(points, rooms, strict=True):
-        reason = int(place.reasons(point[None], np.array([room]))[0])
+        reason = int(feasibility.reasons(point[None], np.array([room]))[0])
         if reason != KEPT:
-            raise InputError(f"use = {point[0]:g},{point[1]:g}: no stop may be there, {DROP_REASONS[reason]}")
+            why = DROP_REASONS[reason]
+            raise InputError(
+                f"use = {point[0]:g},{point[1]:g}: a stop is not allowed there ({why}); "
+                "choose another position"
+            )
     return Proposals.of(points, rooms, must=True)

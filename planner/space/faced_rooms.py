@@ -1,4 +1,4 @@
-"""Which room each unit of a target faces, so that coverage can be told and asked for room by room."""
+"""Assignment of target units to the rooms they face, so that coverage is reported and required by room."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from stopgo.planner.geometry.shapes import to_shape
 from stopgo.planner.space.ground import Ground
 
 AHEAD = (0.02, 0.1, 0.25)
-"""Distances (m) in front of a face at which its room is looked for: rooms often begin a little off it."""
-BESIDE = 0.3
-"""Faces of jambs and niches belong to a room at most this far (m) beside them."""
+"""Distances (m) in front of a face at which its room is searched: rooms often begin a little off it."""
+JAMB_DISTANCE = 0.3
+"""Faces of jambs and niches belong to a room at most this far (m) from them."""
 
 
 def faced_rooms(targets: Targets, rooms: Sequence[RoomSpace], ground: Ground) -> IntArray:
@@ -25,23 +25,23 @@ def faced_rooms(targets: Targets, rooms: Sequence[RoomSpace], ground: Ground) ->
     middle, normal = targets.unit_xy - ground.origin, _normals(targets)
     found = np.full(targets.total, -1, dtype=np.int64)
     for ahead in AHEAD:
-        left = np.flatnonzero(found < 0)
-        found[left] = _first(tree, middle[left] + ahead * normal[left], 0.0)
+        unassigned = np.flatnonzero(found < 0)
+        found[unassigned] = _nearest_room(tree, middle[unassigned] + ahead * normal[unassigned], 0.0)
     front = middle + AHEAD[0] * normal
-    left = np.flatnonzero(found < 0)
-    left = left[shapely.intersects(ground.outline, shapely.points(front[left]))]
-    found[left] = _first(tree, front[left], BESIDE)
+    unassigned = np.flatnonzero(found < 0)
+    unassigned = unassigned[shapely.intersects(ground.outline, shapely.points(front[unassigned]))]
+    found[unassigned] = _nearest_room(tree, front[unassigned], JAMB_DISTANCE)
     return frozen(found, np.int64)
 
 
 def _normals(targets: Targets) -> FloatArray:
-    """Unit vector out of each unit's face (units, 2); zero for targets that are seen from both sides."""
+    """Unit vector out of each unit's face (units, 2); zero for targets that are visible from both sides."""
     along = targets.b - targets.a
     out = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.hypot(*along.T), 1e-12)[:, None]
     return np.where(targets.occluding[:, None], out, 0.0)[targets.unit_segment]
 
 
-def _first(tree: shapely.STRtree, points: FloatArray, distance: float) -> IntArray:
+def _nearest_room(tree: shapely.STRtree, points: FloatArray, distance: float) -> IntArray:
     """The nearest room within a distance of each point, of several the first; -1 where there is none."""
     found = np.full(len(points), -1, dtype=np.int64)
     at, room = tree.query_nearest(shapely.points(points), max_distance=max(distance, 1e-9))
