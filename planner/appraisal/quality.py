@@ -15,7 +15,7 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Selection, Visibility
 from stopgo.mission.stages.coverage_totals import ledger_of
 from stopgo.mission.stages.figures import LimitCost, Quality, percent
-from stopgo.planner.selection import quick
+from stopgo.planner.selection import quick_estimate
 from stopgo.planner.visibility import seen_well
 from stopgo.planner.visibility.limited import without
 
@@ -37,7 +37,7 @@ def quality_of(selection: Selection) -> Quality | None:
     in_sight = _in_sight(seen)
     stops, costs = len(selection.chosen), []
     for key, words in told.items():
-        fewer, bound = quick(_under(in_sight, without(settings, key)))
+        fewer, bound = quick_estimate(_under(in_sight, without(settings, key)))
         costs.append(LimitCost(key, words, stops=stops, without=fewer, bound=bound))
     ledger = ledger_of(seen)
     return Quality(tuple(costs), ledger.amount(in_sight.visible), ledger.amount(_possible(seen)))

@@ -22,9 +22,9 @@ from stopgo.planner.covering_tour.zones import Zone, zones_of
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, rank_at_door
 from stopgo.planner.routing.legs import Legs
-from stopgo.planner.selection import METHODS, left_by, offered_further, posed
+from stopgo.planner.selection import METHODS, cover_problem, offered_for_follow_up, remaining_cover
 from stopgo.planner.selection.bound import lower_bound
-from stopgo.planner.selection.connected_selection import JoinedCover
+from stopgo.planner.selection.connected_selection import ConnectedCover
 from stopgo.planner.selection.cover import Cover
 
 MOST_PLACES = 1500
@@ -216,11 +216,13 @@ def problem_of(route: Route, done: IntArray | None = None) -> TourProblem:
     together: Together = _any_rows
     joins = visibility.candidates.space.settings.least_overlap > 0
     if done is not None:
-        whole, cover = left_by(visibility, done)
+        whole, cover = remaining_cover(visibility, done)
         if joins:
-            cover, together = _joined(visibility, whole, done, chosen, offered_further(visibility, done))
+            cover, together = _joined(
+                visibility, whole, done, chosen, offered_for_follow_up(visibility, done)
+            )
     else:
-        whole, stays, cover = posed(visibility)
+        whole, stays, cover = cover_problem(visibility)
         if joins:
             cover, together = _joined(visibility, whole, stays, chosen, np.arange(whole.rows))
     offered = np.flatnonzero(np.diff(cover.sees.indptr)).astype(np.int64)
@@ -249,9 +251,9 @@ def _joined(
     Rows `fixed` stay or were scanned before; they hang together with the others.
     """
     cover = whole.with_one_of_each([np.array([row]) for row in fixed])
-    task = JoinedCover(cover, links_of(visibility.candidates), offered)
+    task = ConnectedCover(cover, links_of(visibility.candidates), offered)
     most = task.parts(np.union1d(chosen, fixed))
-    left = whole.after(fixed).offering(np.sort(np.concatenate(task.grounds)))
+    left = whole.after(fixed).offering(np.sort(np.concatenate(task.regions)))
     return left, lambda rows: task.parts(np.union1d(rows, fixed)) <= most
 
 

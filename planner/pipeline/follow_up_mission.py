@@ -32,7 +32,7 @@ from stopgo.planner.floors import options_of, read_floor
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing import route
 from stopgo.planner.routing.assemble import assemble
-from stopgo.planner.selection import select_further
+from stopgo.planner.selection import select_follow_up
 from stopgo.planner.space.navigable import navigable
 from stopgo.planner.space.reach import reach_of
 from stopgo.planner.visibility import visibility
@@ -156,7 +156,7 @@ def top_up(
         )
     known = replace(planned, floor=_with(planned.floor, obstacles)) if obstacles else planned
     seen, done = _with_places(known, places)
-    selection = select_further(seen, done)
+    selection = select_follow_up(seen, done)
     if not len(selection.chosen):
         return None
     driven = route(selection)

@@ -21,8 +21,8 @@ from stopgo.planner.covering_tour.problem import problem_of
 from stopgo.planner.overlap import links_of
 from stopgo.planner.routing import legs_between, points_and_ends, rank_at_door
 from stopgo.planner.routing.assemble import assemble
-from stopgo.planner.selection import posed
-from stopgo.planner.selection.separators import pieces_of
+from stopgo.planner.selection import cover_problem
+from stopgo.planner.selection.separators import components_of
 from tests.faults.sizes import size, some
 from tests.planner.worlds import box, column, door, floor_of, hall, planned, room, shell, two_rooms, wall
 
@@ -102,7 +102,7 @@ class EveryTour:
         selection = self.driven.selection
         candidates = selection.visibility.candidates
         settings = candidates.space.settings
-        self.cover, fixed, _ = posed(selection.visibility)
+        self.cover, fixed, _ = cover_problem(selection.visibility)
         self.must = set(fixed.tolist())
         everywhere = replace(selection, chosen=np.arange(self.cover.rows))
         points, self.ends = points_and_ends(everywhere)
@@ -217,7 +217,7 @@ def test_a_plan_is_never_slower_and_sees_what_is_asked_for(world: str, case: int
     driven, made = two_step(world, case), joint(world, case)
     assert made.time is not None
     assert made.time.bound <= made.time.seconds <= made.time.two_step_s == pytest.approx(seconds_of(driven))
-    whole, fixed, _ = posed(made.selection.visibility)
+    whole, fixed, _ = cover_problem(made.selection.visibility)
     assert not whole.missing(whole.covered_by(made.selection.chosen)).any()
     assert set(fixed.tolist()) <= set(made.selection.chosen.tolist())
     assert sorted(made.order.tolist()) == list(range(len(made.selection.chosen)))
@@ -270,7 +270,7 @@ def test_scans_that_are_to_register_still_do() -> None:
     driven = two_step("rooms", 0, overlap=0.1)
     made = in_least_time(driven)
     links = links_of(made.selection.visibility.candidates)
-    pieces = [len(pieces_of(links, one.selection.chosen)) for one in (driven, made)]
+    pieces = [len(components_of(links, one.selection.chosen)) for one in (driven, made)]
     assert pieces[1] <= pieces[0]
     assert made.time is not None and made.time.seconds <= made.time.two_step_s
 
