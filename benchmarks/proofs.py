@@ -17,7 +17,7 @@ from stopgo.mission.stages.network import network_of
 from stopgo.planner import plan
 from stopgo.planner.floors import options_of, read_floor
 from stopgo.planner.overlap import USUAL_SHARE
-from stopgo.planner.scan_simulation.proving import prove
+from stopgo.planner.scan_simulation.verification import prove
 
 HEAD = (
     *("floor", "stops", "promised", "acquired at 0.1°", "claims not in sight", "missed between rays"),

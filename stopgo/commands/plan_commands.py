@@ -373,7 +373,7 @@ def prove_command(
     from stopgo.mission.console.table import printable
     from stopgo.mission.files.atomic import must_be_writable
     from stopgo.mission.proof.proof_text import proof_json, proof_text
-    from stopgo.planner.scan_simulation.proof_files import proof_files, prove_file
+    from stopgo.planner.scan_simulation.verification_files import proof_files, prove_file
 
     folder = mission.parent if out is None else _folder(out)
     files = proof_files(folder, mission)

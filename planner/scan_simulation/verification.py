@@ -27,13 +27,13 @@ from stopgo.mission.proof.plan_proof import (
 )
 from stopgo.mission.stages import NavigableSpace, Targets, weights_of
 from stopgo.mission.stages.coverage_totals import OUTSIDE
-from stopgo.planner.scan_simulation.asked import AskedPoints
 from stopgo.planner.scan_simulation.casting import SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, ExtrudedFloor, extruded, heights_of
-from stopgo.planner.scan_simulation.joining import joined
-from stopgo.planner.scan_simulation.registering import registered, surface_of
+from stopgo.planner.scan_simulation.registration import registered, surface_of
+from stopgo.planner.scan_simulation.scan_network import joined
 from stopgo.planner.scan_simulation.scanning import ScanCount, ScannerPose, scanned, stand_of
 from stopgo.planner.scan_simulation.strips import Strips, strips_of
+from stopgo.planner.scan_simulation.unit_requirements import AskedPoints
 
 SPACINGS_MM = (2, 5, 10, 20, 50)
 INCIDENCES_DEG = (45, 60, 70, 80)

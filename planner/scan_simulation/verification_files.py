@@ -15,7 +15,7 @@ from stopgo.mission.files.coverage_json import Coverage, read_coverage
 from stopgo.mission.files.mission_json import read
 from stopgo.mission.proof.plan_proof import PlanProof, Simulation
 from stopgo.planner.pipeline.follow_up_mission import PlannedFloor, planned_floor
-from stopgo.planner.scan_simulation.proving import prove
+from stopgo.planner.scan_simulation.verification import prove
 
 NAMES = {"recording": "proof.rrd", "page": "proof.html", "proof": "proof.json"}
 """A proof's files in the order in which they appear."""

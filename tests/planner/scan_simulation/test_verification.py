@@ -21,10 +21,10 @@ from stopgo.mission.stages import NavigableSpace
 from stopgo.planner import plan
 from stopgo.planner.scan_simulation.casting import RayFan, SolidScene
 from stopgo.planner.scan_simulation.extrusion import NONE, extruded
-from stopgo.planner.scan_simulation.proving import prove
-from stopgo.planner.scan_simulation.registering import off, registered, surface_of
+from stopgo.planner.scan_simulation.registration import off, registered, surface_of
 from stopgo.planner.scan_simulation.scanning import ScannerPose, scanned
 from stopgo.planner.scan_simulation.strips import strips_of
+from stopgo.planner.scan_simulation.verification import prove
 from stopgo.planner.space.navigable import navigable
 from tests.planner.worlds import box, column, element, hall, two_rooms
 

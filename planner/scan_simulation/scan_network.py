@@ -9,7 +9,7 @@ import numpy as np
 
 from stopgo.mission.geometry import FloatArray, frozen
 from stopgo.mission.proof.plan_proof import ScanNetwork
-from stopgo.planner.scan_simulation.registering import Registered, off
+from stopgo.planner.scan_simulation.registration import Registered, off
 
 PairPoses = dict[int, list[tuple[int, FloatArray]]]
 """Of each scan, the others it is registered with, and their poses in it."""
