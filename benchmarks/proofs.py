@@ -17,7 +17,7 @@ from stopgo.mission.stages.network import network_of
 from stopgo.planner import plan
 from stopgo.planner.floors import options_of, read_floor
 from stopgo.planner.overlap import USUAL_SHARE
-from stopgo.planner.scan_simulation.verification import prove
+from stopgo.planner.scan_simulation.verification import verify
 
 HEAD = (
     *("floor", "stops", "promised", "acquired at 0.1°", "claims not in sight", "missed between rays"),
@@ -66,7 +66,7 @@ def proved(path: Path, options: dict[str, float], **more: float) -> tuple[PlanPr
     told = msgspec.json.decode(coverage_json(made.route, made.mission, made.figures), type=Coverage)
     begin = time.process_time()
     simulation = Simulation(range_m=settings.range, joining_m=settings.farthest_overlap)
-    proof = prove(made.mission, made.space, simulation, told)
+    proof = verify(made.mission, made.space, simulation, told)
     return proof, time.process_time() - begin
 
 

@@ -373,10 +373,10 @@ def prove_command(
     from stopgo.mission.console.table import printable
     from stopgo.mission.files.atomic import must_be_writable
     from stopgo.mission.proof.proof_text import proof_json, proof_text
-    from stopgo.planner.scan_simulation.verification_files import proof_files, prove_file
+    from stopgo.planner.scan_simulation.verification_files import verification_files, verify_file
 
     folder = mission.parent if out is None else _folder(out)
-    files = proof_files(folder, mission)
+    files = verification_files(folder, mission)
     for path in files.values():
         must_be_writable(path)
     assumed = {"noise_m": noise / 1000, "slant": slant}
@@ -384,7 +384,7 @@ def prove_command(
     given = {"step_deg": step, "height_m": height, "ceiling_m": ceiling}
     heights = {key: value for key, value in given.items() if value is not None}
     warnings: list[str] = []
-    proof, planned = prove_file(
+    proof, planned = verify_file(
         mission, floor, coverage, {**assumed, **heights}, say=_progress, warn=warnings.append
     )
     _progress("")
