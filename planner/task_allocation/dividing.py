@@ -14,7 +14,7 @@ from stopgo.mission.geometry import IntArray, frozen, polyline_length
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Route, Selection
 from stopgo.mission.stages.division import DividedRoute
-from stopgo.planner.routing import Ends, check_place, tour_bound
+from stopgo.planner.routing import Ends, check_position, tour_bound
 from stopgo.planner.routing.assemble import assemble
 from stopgo.planner.selection import coverage_steps
 from stopgo.planner.selection.cover import cover_of
@@ -64,7 +64,7 @@ def _fleet(route: Route, settings: Settings) -> DividedRoute:
         )
     places = settings.starts
     for place in places[1:]:
-        check_place(selection.visibility.candidates, "start", place)
+        check_position(selection.visibility.candidates, "start", place)
     closed = settings.tour != "open"
     clock = tour_times(
         selection,

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from stopgo.mission.geometry import FloatArray, IntArray
-from stopgo.planner.routing.proof import proved
+from stopgo.planner.routing.proof import tour_proof
 from stopgo.planner.routing.tour import NANOMETRES, nanometres, shortest_tour
 from stopgo.planner.task_allocation.tour_times import TourTimes
 
@@ -77,4 +77,4 @@ def driven_together(times: FloatArray, stops: int, *, closed: bool) -> float:
         # an edge of no length would be none to the sparse solver
         return max(0.0, float(minimum_spanning_tree(whole + 1e-9).sum()) - 1e-9 * (stops + 1))
     order = shortest_tour(whole, seed=1)
-    return proved(nanometres(whole), order).bound / NANOMETRES
+    return tour_proof(nanometres(whole), order).bound / NANOMETRES

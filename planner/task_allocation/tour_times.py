@@ -92,7 +92,7 @@ class TourTimes:
 
     def line(self, a: int, b: int) -> FloatArray:
         """The polyline (n, 2) from point a to point b: the same in both directions."""
-        line = self.legs.way(min(a, b), max(a, b))
+        line = self.legs.path(min(a, b), max(a, b))
         return line if a <= b else frozen(line[::-1])
 
     def _told(self, line: FloatArray) -> LegFacts:

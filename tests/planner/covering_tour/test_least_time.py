@@ -180,7 +180,7 @@ class EveryTour:
 
     def _fact(self, a: int, b: int) -> tuple[float, float, float] | None:
         if (a, b) not in self.facts:
-            line = self.legs.way(a, b)
+            line = self.legs.path(a, b)
             if len(line) < 2:
                 self.facts[a, b] = None
             else:
