@@ -12,7 +12,7 @@ from stopgo.mission.console.table import duration
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Route
 from stopgo.planner.candidates import candidates
-from stopgo.planner.covering_tour import in_least_time
+from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.floors import read_floor
 from stopgo.planner.routing import route
 from stopgo.planner.selection import select
@@ -44,7 +44,7 @@ def row(name: str, scan: str, path: Path, options: dict[str, float]) -> list[obj
     settings = Settings(minimise="time", **{**options, **SCANS[scan]})
     before = route(refined(select(visibility(candidates(navigable(read_floor(path), settings))))))
     begin = time.process_time()
-    made = in_least_time(before)
+    made = least_time_route(before)
     took = time.process_time() - begin
     return [name, scan, *figures_of(before, made, settings), f"{took:.1f}"]
 

@@ -27,7 +27,7 @@ from stopgo.mission.settings import Settings
 from stopgo.mission.stages import KEPT, Candidates, NavigableSpace, Visibility
 from stopgo.mission.stages.coverage_totals import CoverageTotals, ledger_of
 from stopgo.planner.candidates import candidates
-from stopgo.planner.covering_tour import in_least_time
+from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.floors import options_of, read_floor
 from stopgo.planner.geometry.shapes import local_origin
 from stopgo.planner.routing import route
@@ -161,7 +161,7 @@ def top_up(
         return None
     driven = route(selection)
     if planned.settings.minimise == "time":
-        driven = in_least_time(driven, done=done)
+        driven = least_time_route(driven, done=done)
     mission = assemble(driven)
     stops = np.array([(stop.x, stop.y, stop.heading) for stop in mission.stops])
     once = replace(ledger_of(known.seen), asked=frozen([1], np.int64))

@@ -15,7 +15,7 @@ from stopgo.mission.document.schedule import leg_times, schedule, turn_time
 from stopgo.mission.document.specs import robot_of
 from stopgo.mission.settings import Settings
 from stopgo.mission.stages import Route
-from stopgo.planner.covering_tour import in_least_time
+from stopgo.planner.covering_tour import least_time_route
 from stopgo.planner.covering_tour.leg_table import MICROSECONDS
 from stopgo.planner.covering_tour.problem import problem_of
 from stopgo.planner.overlap import links_of
@@ -83,7 +83,7 @@ def two_step(world: str, case: int = 0, **more: Any) -> Route:
 
 @cache
 def joint(world: str, case: int) -> Route:
-    return in_least_time(two_step(world, case))
+    return least_time_route(two_step(world, case))
 
 
 def seconds_of(driven: Route) -> float:
@@ -249,7 +249,7 @@ def test_what_a_change_takes_is_what_the_whole_line_then_takes_more(world: str) 
         times, line = problem.times, problem.line
         for leg in range(len(line) - 1):
             added = times.inserted(line, leg)
-            for place in sorted(set(range(times.places)) - set(line))[:6]:
+            for place in sorted(set(range(times.positions)) - set(line))[:6]:
                 longer = [*line[: leg + 1], place, *line[leg + 1 :]]
                 assert times.total(longer) - times.total(line) == added[place]
         turned = times.turned(line, 1)
@@ -259,7 +259,7 @@ def test_what_a_change_takes_is_what_the_whole_line_then_takes_more(world: str) 
 
 def test_a_zone_is_left_by_no_selection_that_sees_enough() -> None:
     problem = problem_of(two_step("rooms", 0))
-    asked, cover = problem.asked, problem.task.cover
+    asked, cover = problem.bound_problem, problem.task.cover
     assert asked.zones
     for zone in asked.zones:
         beyond = np.setdiff1d(np.arange(cover.rows), zone.rows)
@@ -268,7 +268,7 @@ def test_a_zone_is_left_by_no_selection_that_sees_enough() -> None:
 
 def test_scans_that_are_to_register_still_do() -> None:
     driven = two_step("rooms", 0, overlap=0.1)
-    made = in_least_time(driven)
+    made = least_time_route(driven)
     links = links_of(made.selection.visibility.candidates)
     pieces = [len(components_of(links, one.selection.chosen)) for one in (driven, made)]
     assert pieces[1] <= pieces[0]
@@ -282,7 +282,7 @@ def test_of_very_many_candidates_the_nearest_are_tried_and_the_bound_is_lower(
     every = joint("rooms", 2).time
     monkeypatch.setattr(stopgo.planner.covering_tour.problem, "MOST_PLACES", 8)
     monkeypatch.setattr(stopgo.planner.covering_tour.problem, "MOST_BOUNDED", bounded)
-    some = in_least_time(two_step("rooms", 2)).time
+    some = least_time_route(two_step("rooms", 2)).time
     assert every is not None and some is not None
     assert 0 < some.bound <= every.bound
     assert some.seconds <= some.two_step_s
