@@ -280,7 +280,7 @@ def test_of_very_many_candidates_the_nearest_are_tried_and_the_bound_is_lower(
     bounded: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     every = joint("rooms", 2).time
-    monkeypatch.setattr(stopgo.planner.covering_tour.problem, "MOST_PLACES", 8)
+    monkeypatch.setattr(stopgo.planner.covering_tour.problem, "MOST_POSITIONS", 8)
     monkeypatch.setattr(stopgo.planner.covering_tour.problem, "MOST_BOUNDED", bounded)
     some = least_time_route(two_step("rooms", 2)).time
     assert every is not None and some is not None

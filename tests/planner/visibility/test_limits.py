@@ -173,5 +173,5 @@ def test_what_cannot_be_seen_as_asked_is_told_and_strict_refuses_it() -> None:
     ],
 )
 def test_limits_that_leave_nothing_are_named(limits: dict[str, Any], told: str) -> None:
-    with pytest.raises(NegativeResult, match=rf"^test: nothing in sight is seen well enough: .*{told}"):
+    with pytest.raises(NegativeResult, match=rf"^test: no visible target is within the limits: .*{told}"):
         plan(FLOOR, replace(Settings(), **limits))

@@ -251,7 +251,7 @@ def test_a_wall_drawn_as_a_line_hides_and_is_scanned_on_both_sides() -> None:
 def test_nothing_in_sight_is_an_answer() -> None:
     far = hall(6, 4, targets := column("c", 20.0, 20.0))
     assert targets.target
-    with pytest.raises(StopgoError, match="in its sight"):
+    with pytest.raises(StopgoError, match="no target is visible"):
         visibility(candidates(navigable(far, Settings(targets=("columns",)))))
 
 
