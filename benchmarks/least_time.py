@@ -1,4 +1,4 @@
-"""What choosing stops and tour together saves against fewest stops and then the shortest route, floor by floor."""
+"""Time saved by choosing stops and tour together, against fewest stops first, floor by floor."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def main() -> None:
 
 
 def row(name: str, scan: str, path: Path, options: dict[str, float]) -> list[object]:
-    """A floor's times, both ways."""
+    """A floor's times by both methods."""
     settings = Settings(minimise="time", **{**options, **SCANS[scan]})
     before = route(refined(select(visibility(candidates(navigable(read_floor(path), settings))))))
     begin = time.process_time()
@@ -50,7 +50,7 @@ def row(name: str, scan: str, path: Path, options: dict[str, float]) -> list[obj
 
 
 def figures_of(before: Route, made: Route, settings: Settings) -> list[str]:
-    """Both times, what is saved, stops and the bound."""
+    """Both times, the saving, stops and the lower bound."""
     told = made.time
     assert told is not None
     moving = told.two_step_s - len(before.order) * (settings.settle + settings.scan_time)

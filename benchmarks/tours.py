@@ -1,4 +1,4 @@
-"""Tours against peers and proven bounds, and the paper's grids against exact ways.
+"""Tours compared with other solvers and proven bounds; the paper's grids compared with exact paths.
 
 Run: python -m benchmarks.tours. Peers are fast-tsp, pyvrp and OR-tools where they can be imported: they
 are not dependencies. Each peer that runs for a given time gets the time of planning.md's comparison.
@@ -36,7 +36,7 @@ SIDE = 100.0
 SEEDS = {10: 5, 20: 5, 50: 5, 200: 3, 1000: 1}
 """Instances per number of points."""
 SECONDS = {10: 1.0, 20: 1.0, 50: 1.0, 200: 5.0, 1000: 5.0}
-"""What a peer that runs for a given time is given."""
+"""Time limit of a solver that runs for a given time."""
 ANTS_UP_TO = 200
 LONG_SEARCH = 5
 """Perturbations of the long search among the best found, in multiples of ours."""
@@ -216,7 +216,7 @@ def _proved(instances: list[FloatArray]) -> str:
 
 
 def ways_table() -> str:
-    """Stop pairs that a grid connects and how much longer its ways are than the exact ones."""
+    """Stop pairs that a grid connects, and the excess length of its paths over exact ones."""
     space = navigable(office(60, 40, seed=1), Settings())
     stops = free_points(space, 50, seed=1)
     exact, spent = _timed(lambda: paths_between(space, stops))
@@ -248,7 +248,7 @@ def _timed(action: Callable[[], Ways]) -> tuple[Ways, float]:
 
 
 def free_points(space: NavigableSpace, count: int, *, seed: int) -> FloatArray:
-    """Positions (count, 2) in the largest piece of the drive area, well inside it."""
+    """Positions (count, 2) in the largest part of the drive area, well inside it."""
     pieces = [shapely.Polygon(p.exterior, p.holes).buffer(-0.3) for p in space.drive_area]
     largest = max(pieces, key=shapely.area)
     low_x, low_y, high_x, high_y = largest.bounds
