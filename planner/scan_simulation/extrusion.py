@@ -24,7 +24,7 @@ BEAM_WIDTH_M = 0.2
 SEE_THROUGH_M = {"windows": (0.9, 2.1), "railings": (0.0, 1.0), "other": (0.0, 1.0)}
 """Assumed lower and upper height of targets that the laser passes, by kind."""
 NONE = -1
-HANGING = "beams"
+BEAM_KIND = "beams"
 """The kind that is fixed below the ceiling."""
 
 
@@ -87,7 +87,7 @@ def extruded(floor: FloorPlan, closed: Sequence[FloatArray], ceiling: float) -> 
 
 def heights_of(item: Element, ceiling: float) -> tuple[float, float]:
     """Lower and upper height of an element above the floor."""
-    if item.kind == HANGING:
+    if item.kind == BEAM_KIND:
         return ceiling - BEAM_M, ceiling
     return (0.0, ceiling) if item.occludes else SEE_THROUGH_M.get(item.kind, SEE_THROUGH_M["other"])
 
@@ -100,7 +100,7 @@ def _sides(item: Element, index: int, ceiling: float) -> Iterator[_Upright]:
 
 
 def _undersides(item: Element, index: int, ceiling: float) -> Iterator[_Level]:
-    if item.kind == HANGING and (item.occludes or item.target):
+    if item.kind == BEAM_KIND and (item.occludes or item.target):
         low, _ = heights_of(item, ceiling)
         for solid in item.solids:
             yield from (_Level(flat, index) for flat in _flat(solid, low))
@@ -110,7 +110,7 @@ def _undersides(item: Element, index: int, ceiling: float) -> Iterator[_Level]:
 
 def _is_passed(item: Element) -> bool:
     """True if the laser hits an element and passes it; beams stop the laser."""
-    return not item.occludes and item.kind != HANGING
+    return not item.occludes and item.kind != BEAM_KIND
 
 
 def _edges(item: Element) -> Iterator[tuple[FloatArray, FloatArray]]:

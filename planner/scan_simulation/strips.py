@@ -10,7 +10,7 @@ import shapely
 from stopgo.mission.floor import FloorPlan
 from stopgo.mission.geometry import BoolArray, FloatArray, IntArray, frozen
 from stopgo.mission.stages import Targets
-from stopgo.planner.scan_simulation.extrusion import HANGING, NONE, ExtrudedFloor, heights_of
+from stopgo.planner.scan_simulation.extrusion import BEAM_KIND, NONE, ExtrudedFloor, heights_of
 
 CELL_M = 0.1
 """Height of a cell; it is as wide as its unit."""
@@ -78,13 +78,13 @@ def strips_of(solids: ExtrudedFloor, targets: Targets, floor: FloorPlan, ceiling
     """The strips of all targets, with the lookup from sides of the solids to units."""
     element = targets.element[targets.unit_segment]
     spans = np.array([heights_of(item, ceiling) for item in floor.elements]).reshape(-1, 2)
-    hangs = np.array([item.kind == HANGING for item in floor.elements], dtype=bool)[element]
+    is_beam = np.array([item.kind == BEAM_KIND for item in floor.elements], dtype=bool)[element]
     low, high = spans[element].T
-    rows = np.maximum(1, np.ceil((high - low) / CELL_M - 1e-9)).astype(np.int64) + hangs
+    rows = np.maximum(1, np.ceil((high - low) / CELL_M - 1e-9)).astype(np.int64) + is_beam
     first = np.concatenate([[0], np.cumsum(rows)])
     unit = np.repeat(np.arange(targets.total), rows)
     row = np.arange(first[-1]) - first[unit]
-    below = hangs[unit] & (row == rows[unit] - 1)
+    below = is_beam[unit] & (row == rows[unit] - 1)
     top = np.minimum(low[unit] + (row + 1) * CELL_M, high[unit])
     bottom = low[unit] + row * CELL_M
     z = np.where(below, low[unit], (top + bottom) / 2)
@@ -92,7 +92,7 @@ def strips_of(solids: ExtrudedFloor, targets: Targets, floor: FloorPlan, ceiling
     along = along / np.hypot(*along.T)[:, None]
     side = np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(along))])[unit]
     first_piece, piece_unit = _pieces(solids, targets)
-    patch, patch_unit = _patches(targets, hangs, solids.origin)
+    patch, patch_unit = _patches(targets, is_beam, solids.origin)
     return Strips(
         first_cell=frozen(first, np.int64),
         low=frozen(low),
@@ -100,7 +100,7 @@ def strips_of(solids: ExtrudedFloor, targets: Targets, floor: FloorPlan, ceiling
         area=frozen(targets.unit_length[unit] * np.where(below, UNDER_M, top - bottom)),
         middle=frozen(np.column_stack([(targets.unit_xy - solids.origin)[unit], z])),
         normal=frozen(np.where(below[:, None], (0.0, 0.0, 1.0), side)),
-        under=frozen(hangs, np.bool_),
+        under=frozen(is_beam, np.bool_),
         first_piece=frozen(first_piece, np.int64),
         piece_unit=frozen(piece_unit, np.int64),
         patch=frozen(patch, np.int64),
@@ -144,9 +144,9 @@ def _flush(solids: ExtrudedFloor, targets: Targets) -> tuple[IntArray, IntArray,
     return face, segment, shapely.distance(lines[face], wanted[segment])
 
 
-def _patches(targets: Targets, hangs: BoolArray, origin: FloatArray) -> tuple[IntArray, IntArray]:
+def _patches(targets: Targets, is_beam: BoolArray, origin: FloatArray) -> tuple[IntArray, IntArray]:
     """Squares along the edges of beams, and the unit of each; where two overlap, the first."""
-    unit = np.flatnonzero(hangs)
+    unit = np.flatnonzero(is_beam)
     if not len(unit):
         return np.empty(0, np.int64), np.empty(0, np.int64)
     along = (targets.b - targets.a)[targets.unit_segment[unit]]

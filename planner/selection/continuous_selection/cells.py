@@ -144,8 +144,10 @@ class CellVisibility:
         self._limits = limits_of(self._settings)
         own = [k for k, part in enumerate(self._reach.parts.part) if part == self._part]
         pieces = [self._reach.parts.pieces[k] for k in own]
-        ways = self._reach.parts.gaps[self._reach.parts.gap_part == self._part]
-        self._drive = shapely.union_all([*pieces, *shapely.linestrings(ways)] if len(ways) else pieces)
+        crossings = self._reach.parts.gaps[self._reach.parts.gap_part == self._part]
+        self._drive = shapely.union_all(
+            [*pieces, *shapely.linestrings(crossings)] if len(crossings) else pieces
+        )
         self._rooms = shapely.union_all(self._place.rooms)
         for shape in (self._drive, self._rooms):
             shapely.prepare(shape)

@@ -78,79 +78,81 @@ class SightLines:
 
         `scanner` is the scanner's own position, if `xy` is a viewpoint next to a door's line.
         """
-        place = to_grid(xy - self._origin)
-        units, edges = self._near(self._points, place), self._near(self._lines, place)
+        position = to_grid(xy - self._origin)
+        units, edges = self._near(self._points, position), self._near(self._lines, position)
         units = units if among is None else units[among[units]]
         reach = round(self._reach / GRID)
-        units = units[sees(place, self._midpoints.among(units), self._edges[edges], reach=reach)]
-        stand = place if scanner is None else to_grid(scanner - self._origin)
-        return units if self._limits.none else units[self._well_seen(stand, self._midpoints.among(units))]
+        units = units[sees(position, self._midpoints.among(units), self._edges[edges], reach=reach)]
+        origin = position if scanner is None else to_grid(scanner - self._origin)
+        return units if self._limits.none else units[self._well_seen(origin, self._midpoints.among(units))]
 
-    def _well_seen(self, place: IntArray, midpoints: Midpoints) -> BoolArray:
-        stretches = SeenSegments(midpoints.a - place, midpoints.b - place, midpoints.pieces // 2)
+    def _well_seen(self, position: IntArray, midpoints: Midpoints) -> BoolArray:
+        stretches = SeenSegments(midpoints.a - position, midpoints.b - position, midpoints.pieces // 2)
         return well_seen(stretches, (midpoints.odd - 1) // 2, self._limits)
 
-    def _near(self, tree: shapely.STRtree, place: IntArray) -> IntArray:
+    def _near(self, tree: shapely.STRtree, position: IntArray) -> IntArray:
         """Candidates for items within range, and slightly more, ascending."""
-        found = tree.query(shapely.Point(place * GRID), predicate="dwithin", distance=self._reach + 4 * GRID)
+        found = tree.query(
+            shapely.Point(position * GRID), predicate="dwithin", distance=self._reach + 4 * GRID
+        )
         return np.sort(found)
 
 
-def sees(place: IntArray, midpoints: Midpoints, edges: IntArray, *, reach: int | None) -> BoolArray:
+def sees(position: IntArray, midpoints: Midpoints, edges: IntArray, *, reach: int | None) -> BoolArray:
     """True for each midpoint (n,) that a position (2,) sees past edges (e, 2, 2); it lies on none of them.
 
     `reach` is the range in grid steps.
     """
-    a, b = midpoints.a - place, midpoints.b - place
-    way = (midpoints.pieces - midpoints.odd)[:, None] * a + midpoints.odd[:, None] * b
+    a, b = midpoints.a - position, midpoints.b - position
+    offset = (midpoints.pieces - midpoints.odd)[:, None] * a + midpoints.odd[:, None] * b
     seen = ~midpoints.face | (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] > 0)
     if reach is not None:
-        seen &= _within(way, midpoints.pieces, reach)
+        seen &= _within(offset, midpoints.pieces, reach)
     lines = np.flatnonzero(seen)
-    near = _nearest_first(edges - place, way[lines], midpoints.pieces[lines])
-    seen[lines] = _open(way[lines], midpoints.pieces[lines], near)
+    near = _nearest_first(edges - position, offset[lines], midpoints.pieces[lines])
+    seen[lines] = _open(offset[lines], midpoints.pieces[lines], near)
     return seen
 
 
-def _within(way: IntArray, pieces: IntArray, reach: int) -> BoolArray:
-    """True where way / pieces is at most `reach` long."""
-    squared = (way.astype(float) ** 2).sum(axis=1)
+def _within(offset: IntArray, pieces: IntArray, reach: int) -> BoolArray:
+    """True where offset / pieces is at most `reach` long."""
+    squared = (offset.astype(float) ** 2).sum(axis=1)
     limit = (pieces.astype(float) * reach) ** 2
     inside: BoolArray = squared < limit
     for k in np.flatnonzero(np.abs(squared - limit) <= CLOSE * limit):
-        x, y = way[k].tolist()
+        x, y = offset[k].tolist()
         inside[k] = x * x + y * y <= (int(pieces[k]) * reach) ** 2
     return inside
 
 
-def _nearest_first(edges: IntArray, way: IntArray, pieces: IntArray) -> IntArray:
+def _nearest_first(edges: IntArray, offset: IntArray, pieces: IntArray) -> IntArray:
     """Edges as near as the farthest midpoint, by their distance; floating point only sorts and keeps more."""
     ends = edges.astype(float)
     along = ends[:, 1] - ends[:, 0]
     squared = np.maximum((along**2).sum(axis=1), 1.0)
     foot = np.clip(-(ends[:, 0] * along).sum(axis=1) / squared, 0.0, 1.0)
     away = np.hypot(*(ends[:, 0] + foot[:, None] * along).T)
-    farthest = np.hypot(*(way / pieces[:, None]).T).max(initial=0.0)
+    farthest = np.hypot(*(offset / pieces[:, None]).T).max(initial=0.0)
     order = np.argsort(away, kind="stable")
     return edges[order[away[order] <= farthest + 2.0]]
 
 
-def _open(way: IntArray, pieces: IntArray, edges: IntArray) -> BoolArray:
-    """True where no edge blocks the line (n, 2) / pieces, or the line rotated slightly to one side."""
-    left, right = np.ones(len(way), dtype=bool), np.ones(len(way), dtype=bool)
+def _open(offset: IntArray, pieces: IntArray, edges: IntArray) -> BoolArray:
+    """True where no edge blocks `offset` / pieces (n, 2), or that line rotated slightly to one side."""
+    left, right = np.ones(len(offset), dtype=bool), np.ones(len(offset), dtype=bool)
     begin = 0
     while begin < len(edges) and len(lines := np.flatnonzero(left | right)):
         end = begin + 1 + PAIRS // len(lines)
-        on_left, on_right = _blocked(way[lines], pieces[lines], edges[begin:end])
+        on_left, on_right = _blocked(offset[lines], pieces[lines], edges[begin:end])
         left[lines] &= ~on_left
         right[lines] &= ~on_right
         begin = end
     return left | right
 
 
-def _blocked(way: IntArray, pieces: IntArray, edges: IntArray) -> tuple[BoolArray, BoolArray]:
+def _blocked(offset: IntArray, pieces: IntArray, edges: IntArray) -> tuple[BoolArray, BoolArray]:
     """True where some edge crosses the line, rotated slightly to the left and slightly to the right."""
-    (from_high, from_low), (to_high, to_low) = (_side(way, edges[:, k]) for k in range(2))
+    (from_high, from_low), (to_high, to_low) = (_side(offset, edges[:, k]) for k in range(2))
     start, end = _sign(from_high, from_low), _sign(to_high, to_low)
     left, right = (start > 0) != (end > 0), (start >= 0) != (end >= 0)
     line, edge = np.nonzero(left | right)
@@ -168,9 +170,9 @@ def _any(crossed: BoolArray, line: IntArray, edge: IntArray) -> BoolArray:
     return found
 
 
-def _side(way: IntArray, points: IntArray) -> tuple[IntArray, IntArray]:
+def _side(offset: IntArray, points: IntArray) -> tuple[IntArray, IntArray]:
     """Cross product of each line with each point (n, m), as high and low part: above 0 on its left."""
-    (x_high, y_high), (x_low, y_low) = (way >> SPLIT).T[:, :, None], (way & LOW).T[:, :, None]
+    (x_high, y_high), (x_low, y_low) = (offset >> SPLIT).T[:, :, None], (offset & LOW).T[:, :, None]
     x, y = points.T[:, None, :]
     return _carried(x_high * y - y_high * x, x_low * y - y_low * x)
 

@@ -79,13 +79,13 @@ def _end_of(
     test: Callable[[IntArray], BoolArray], inner: IntArray, outer: IntArray, guess: FloatArray
 ) -> IntArray:
     """The unit farthest from `inner` towards `outer` up to which all units pass; `inner` does (n,)."""
-    way = np.sign(outer - inner)
-    at = np.clip(np.where(way > 0, np.floor(guess), np.ceil(guess)), *np.sort([inner, outer], axis=0))
+    step = np.sign(outer - inner)
+    at = np.clip(np.where(step > 0, np.floor(guess), np.ceil(guess)), *np.sort([inner, outer], axis=0))
     at = at.astype(np.int64)
     while (wrong := (at != inner) & ~test(at)).any():
-        at[wrong] -= way[wrong]
-    while (more := (at != outer) & test(np.where(at == outer, at, at + way))).any():
-        at[more] += way[more]
+        at[wrong] -= step[wrong]
+    while (more := (at != outer) & test(np.where(at == outer, at, at + step))).any():
+        at[more] += step[more]
     return at
 
 
@@ -203,9 +203,9 @@ def _at_most(
 ) -> BoolArray:
     """True where the left side is at most the right one, for each midpoint; exact where they are close."""
     odd, pieces = 2 * unit + 1, 2 * stretches.units
-    way = (pieces - odd)[:, None] * stretches.a + odd[:, None] * stretches.b
+    offset = (pieces - odd)[:, None] * stretches.a + odd[:, None] * stretches.b
     area, along = _area(stretches), stretches.b - stretches.a
-    squared = (way.astype(float) ** 2).sum(axis=1)
+    squared = (offset.astype(float) ** 2).sum(axis=1)
     rough = _Measures(
         area.astype(float),
         (along.astype(float) ** 2).sum(axis=1),
@@ -216,7 +216,7 @@ def _at_most(
     left, right = sides(rough, limit)
     found: BoolArray = left < right
     for k in np.flatnonzero(np.abs(left - right) <= CLOSE * right):
-        (x, y), (dx, dy), p = way[k].tolist(), along[k].tolist(), int(pieces[k])
+        (x, y), (dx, dy), p = offset[k].tolist(), along[k].tolist(), int(pieces[k])
         slant = x * x + y * y + (rise * p) ** 2
         exact = _Measures(int(area[k]), dx * dx + dy * dy, x * x + y * y, slant, p)
         least, most = sides(exact, Fraction(limit))

@@ -1,4 +1,4 @@
-"""`--minimise time` from the command line on: reports, pictures, checks, further missions, sharing out."""
+"""`--minimise time` from the command line on: reports, pictures, checks, follow-up missions, allocation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What two scans have in common, and how firmly it holds them: numbers that can be checked on paper."""
+"""Overlap and registration strength of two scans: numbers that can be checked on paper."""
 
 from __future__ import annotations
 

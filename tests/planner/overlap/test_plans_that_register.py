@@ -1,4 +1,4 @@
-"""Plans whose scans register: one network, told, checked anew, and what would join what lies apart."""
+"""Plans whose scans register: one network, reported and checked; remedies for separate components."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The paper's grids: legs that keep clear, joined at doors, never shorter than the exact ways."""
+"""The paper's grids: legs with clearance, joined at doors, never shorter than the exact paths."""
 
 from __future__ import annotations
 

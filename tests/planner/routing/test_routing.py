@@ -1,4 +1,4 @@
-"""Ways against an independent visibility graph, and tours against every permutation."""
+"""Paths compared with an independent visibility graph, and tours with every permutation."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def selection_at(space: NavigableSpace, xy: np.ndarray) -> Selection:
 
 
 def geodesics(floor: FloorPlan, points: np.ndarray, radius: float) -> dict[int, dict[int, float]]:
-    """Shortest ways between points that keep `radius` from everything, by a graph over all corners."""
+    """Shortest paths between points that keep `radius` from everything, by a graph over all corners."""
     blocked = shapely.union_all([shape.buffer(radius, quad_segs=16) for shape in obstacles_of(floor)])
     ground = shapely.union_all([shape_of(polygon) for polygon in floor.outline])
     free = ground.difference(blocked)

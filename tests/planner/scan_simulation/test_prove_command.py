@@ -1,4 +1,4 @@
-"""`stopgo prove` as a user calls it: its files, its answers, and what it refuses in one line."""
+"""`stopgo prove` as a user calls it: its files, its results, and its errors in one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What coverage counts, and that no room and no kind of element is given up for the sake of the whole."""
+"""Coverage demands: the units they count, and required fractions of every room and kind of element."""
 
 from __future__ import annotations
 

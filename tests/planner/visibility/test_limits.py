@@ -1,4 +1,4 @@
-"""What is not seen well enough counts as not seen, wherever it is asked; and what that costs."""
+"""Units outside the limits on views count as not seen in every stage; and the cost of limits."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_no_set_of_candidates_is_smaller_than_the_bound(views: int) -> None:
 
 
 def enough(counts: np.ndarray, seen: Visibility, settings: Settings) -> bool:
-    """Whether the shares of the whole, of the room and of every kind are met."""
+    """True if the required fractions of the whole, of the room and of every kind are met."""
     space, targets = seen.candidates.space, seen.targets
     kinds = np.array([item.kind for item in space.floor.elements])[targets.element][targets.unit_segment]
     groups = [(np.ones(targets.total, bool), settings.coverage), (space.unit_room == 0, 0.7)]

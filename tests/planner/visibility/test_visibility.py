@@ -48,7 +48,7 @@ TURNED = [(name, degrees) for name in REAL for degrees in (0.0, 17.0, 45.0)]
 
 
 def rows_of(seen: Visibility, rows: Iterable[int]) -> np.ndarray:
-    """Whether each of these candidates sees each unit."""
+    """True where one of these candidates sees a unit."""
     found = np.zeros((len(list(rows)), seen.targets.total), dtype=bool)
     for k, row in enumerate(rows):
         found[k, seen.seen_by(row)] = True
@@ -81,7 +81,7 @@ def test_a_real_floor_agrees_with_brute_force(name: str, degrees: float) -> None
 
 
 def at(floor: FloorPlan, xy: np.ndarray, settings: Settings | None = None) -> Visibility:
-    """What given positions see."""
+    """Visibility from given positions."""
     space = navigable(floor, settings or Settings())
     zeros = frozen(np.zeros(len(xy)), np.int64)
     given = Candidates(
